@@ -28,7 +28,8 @@ COMMANDS = {"accuracy": "benchmarks.accuracy", "paper": "benchmarks.papers.runne
             "mutate": "benchmarks.mutate.runner", "kit-score": "benchmarks.kit_score",
             "kill-batch": "benchmarks.kill_batch", "skips": "benchmarks.skips",
             "stability": "benchmarks.stability.runner"}
-NOT_TOPICS = {"__init__", "__main__", "accuracy", "harness", "signatures", "kit_score", "kill_batch", "skips"}
+NOT_TOPICS = {"__init__", "__main__", "accuracy", "harness", "signatures", "kit_score", "kill_batch", "skips",
+              "llvmpipe", "embree_packets"}
 
 
 def topics() -> list[str]:

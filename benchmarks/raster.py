@@ -1,8 +1,12 @@
-"""The rasterizer against Embree's rays through the same texels, and how its cost grows.
+"""The rasterizer against Embree's rays through the same texels and against llvmpipe, and how its cost grows.
 
-Embree traces with one thread, as one `EmbreeScene.run(output=True)` call does, over a prebuilt hierarchy; the
+`run`: Embree traces with one thread, as one `EmbreeScene.run(output=True)` call does, over a prebuilt hierarchy; the
 rasterizer starts from the triangles each time and runs on all threads. The batch of depth maps is compared with
 `run` in its default mode, over rays made beforehand.
+
+Packets of coherent rays (`embree_packets`) and OpenGL in software (`llvmpipe`, where moderngl is installed) run on all
+threads as well. Scenes are `stage`, whose vase has interpolated vertex normals, and `atrium`, which has none. Pairs are
+interleaved; a ratio is the median over pairs, with the least and the greatest in the note.
 """
 
 import math
@@ -11,17 +15,24 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.harness import Row, ratio, seconds
+from benchmarks import llvmpipe
+from benchmarks.embree_packets import Packets
+from benchmarks.harness import Ratio, Row, ratio, seconds
 from refgi.rsm import camera_projection, gbuffer, paraboloid_depth_maps, rasterize
 from refgi.rsm.raster.projection import Projection, paraboloid_projection
 from refgi.scene import Geometry, load_scene, material_table
 
 CHANNELS = ("depth", "position", "normal", "albedo", "material_id", "triangle_id")
+TARGETS = ("depth", "position", "normal", "albedo")  # what a deferred renderer on a graphics card writes
+SIZE = 1024
 
 
 def rows(quick: bool) -> Iterator[Row]:
     """Yield ratios to Embree, and time per triangle and per pixel."""
     yield from _against_embree("atrium:faces=100000", 5 if quick else 15)
+    for faces in (100_000,) if quick else (10_000, 100_000, 400_000):
+        for name in ("stage", "atrium"):
+            yield from _against_packets(f"{name}:faces={faces}", 5 if quick else 15)
     yield from _depth_maps(3 if quick else 9)
     yield from _growth((10_000, 100_000) if quick else (10_000, 100_000, 1_000_000, 10_000_000))
 
@@ -40,6 +51,37 @@ def _against_embree(name: str, repeats: int) -> Iterator[Row]:
         measured = ratio(function, trace, repeats)
         note = f"{1e3 * measured.seconds_a:.1f} ms against {1e3 * measured.seconds_b:.0f} ms"
         yield Row(f"{label} 1024^2, {name} / Embree", measured.median, "", aim, note)
+
+
+def _against_packets(name: str, repeats: int) -> Iterator[Row]:
+    """Time visibility and the whole G-buffer over Embree's packets, and over a G-buffer of OpenGL in software."""
+    scene = load_scene(name)
+    materials, shape = material_table(scene.materials, np.float32), scene.geometry
+    projection = camera_projection(scene.camera, SIZE, SIZE)
+    packets = Packets(shape, projection)
+
+    def visibility() -> Any:
+        return rasterize(shape, projection)
+
+    def whole() -> Any:
+        return gbuffer(shape, materials, scene.camera, SIZE, SIZE).resolve(*TARGETS)
+
+    for label, function in (("visibility", visibility), ("G-buffer", whole)):
+        measured = ratio(function, packets.trace, repeats)
+        aim = "<= 0.5" if label == "visibility" else ""
+        yield Row(f"{label} {SIZE}^2, {name} / Embree packets", measured.median, "", aim, _spread(measured))
+    missing = llvmpipe.available()
+    if missing:
+        yield Row(f"G-buffer {SIZE}^2, {name} / llvmpipe", math.nan, "", "", f"skipped: {missing}")
+        return
+    pipe = llvmpipe.Pipe(scene, SIZE)
+    measured = ratio(whole, pipe.draw, repeats)
+    yield Row(f"G-buffer {SIZE}^2, {name} / llvmpipe, read back", measured.median, "", "<= 0.3", _spread(measured))
+
+
+def _spread(measured: Ratio) -> str:
+    return (f"{measured.low:.2f} .. {measured.high:.2f}; {1e3 * measured.seconds_a:.1f} ms against "
+            f"{1e3 * measured.seconds_b:.1f} ms")
 
 
 def _depth_maps(repeats: int) -> Iterator[Row]:

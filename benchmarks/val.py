@@ -6,7 +6,7 @@ REFGI_DATA names their folder, built-in ones of as many faces elsewhere.
 """
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from refgi import Frame, load_scene
 from refgi.cluster import ValSettings, val
 from refgi.scene import Scene
 from refgi.settings import of
+from refgi.splat import MultiresSettings, multires
 from refgi.stages import observe
 from refgi.truth.vpl import VplSettings, vpl
 
@@ -30,6 +31,16 @@ PARTS = {  # stages of each line of Table 2, and the paper's ms on cornell_horse
     "depth maps": (("cluster.shadow_maps",), 4.2),
     "indirect light": (("cluster.irradiance",), 35.0),
     "blur": (("cluster.blur",), 10.7),
+    "subsplats": (("multires.criteria", "multires.refine", "multires.upsample"), 0.0),
+}
+EVERYWHERE = "every light at every pixel"
+Light = Callable[[Frame], Any]
+LIGHTS: dict[str, Light] = {
+    "8 x 8 interleaved and blurred": lambda frame: val(frame, of(ValSettings, interleaving=8)),
+    "the same, lights assigned by cluster": lambda frame: val(frame, of(ValSettings, interleaving=8,
+                                                                        assignment="cluster")),
+    "every light at subsplats": lambda frame: multires(frame, of(MultiresSettings, lights=1024, visibility="val")),
+    EVERYWHERE: lambda frame: val(frame, of(ValSettings, interleaving=1)),
 }
 
 
@@ -49,19 +60,27 @@ def _frames(name: str, size: int, repeats: int, paper: float) -> Iterator[Row]:
     """Frames a second as published and in full, and the breakdown of the paper's Table 2."""
     scene, moves = _scene(name), iter(range(1, 10000))
 
-    def frame(settings: ValSettings) -> None:
+    def frame(light: Light) -> None:
         moved = Frame(_moved(scene, 1e-4 * next(moves)), width=size, height=size)
-        moved.radiance(val(moved, settings))
+        moved.radiance(light(moved))
 
-    for label, aim, settings in (
-            ("8 x 8 interleaved and blurred", f"> {paper}", of(ValSettings, interleaving=8)),
-            ("the same, lights assigned by cluster", f"> {paper}",
-             of(ValSettings, interleaving=8, assignment="cluster")),
-            ("every light at every pixel", "", of(ValSettings, interleaving=1))):
-        def draw(how: ValSettings = settings) -> None:
-            frame(how)
+    for label, light in LIGHTS.items():
+        def draw(light: Light = light) -> None:
+            frame(light)
 
+        aim = "" if label == EVERYWHERE else f"> {paper}"
         yield Row(f"{name}: {label}", 1 / seconds(draw, repeats), "frames/s", aim, _breakdown(draw, repeats))
+    yield from _saved(name, Frame(scene, width=size, height=size))
+
+
+def _saved(name: str, frame: Frame) -> Iterator[Row]:
+    """Error that evaluating fewer lights or fewer receivers adds to every light at every pixel."""
+    everywhere = LIGHTS[EVERYWHERE](frame).astype(np.float64)
+    covered = frame.gbuffer.covered
+    for label, light in LIGHTS.items():
+        if label != EVERYWHERE:
+            error = np.sqrt(np.square((light(frame) - everywhere)[:, covered]).mean()) / everywhere[:, covered].mean()
+            yield Row(f"{name}: {label}, RMSE / mean to every light at every pixel", float(error), "", "")
 
 
 def _moved(scene: Scene, step: float) -> Scene:

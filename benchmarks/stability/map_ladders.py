@@ -15,8 +15,8 @@ from benchmarks.stability.ladder import Ladder
 from benchmarks.stability.maths import cross, dot
 from benchmarks.stability.pair_ladders import filled
 from refgi.jit import kernel
-from refgi.rsm.buffers.attributes import _barycentric
-from refgi.rsm.buffers.runs import image_ray
+from refgi.rsm.buffers.surfaces import barycentric_axes
+from refgi.rsm.buffers.texel_rays import image_ray
 from refgi.rsm.raster.projection import (
     PARABOLOID,
     PERSPECTIVE,
@@ -60,8 +60,11 @@ def _rays(x: Array, out: Array) -> None:
 @kernel
 def _volumes(x: Array, out: Array) -> None:
     for i in range(x.shape[1]):
-        ray = x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i]
-        out[0, i] = _barycentric(ray, x[6, i], x[7, i], x[8, i], x[9, i], x[10, i], x[11, i])
+        first, second = barycentric_axes(
+            (x[6, i], x[7, i], x[8, i]), (x[9, i], x[10, i], x[11, i]), (x[12, i], x[13, i], x[14, i]),
+            (x[0, i], x[1, i], x[2, i]))  # fmt: skip
+        out[0, i] = x[3, i] * first[0] + x[4, i] * first[1] + x[5, i] * first[2]
+        out[1, i] = x[3, i] * second[0] + x[4, i] * second[1] + x[5, i] * second[2]
 
 
 def draw_points(kind: int, rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
@@ -149,24 +152,33 @@ def paraboloid_ray(m: Any, x: Any) -> Any:  # noqa: ARG001
 
 
 def draw_edges(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
-    """Return rays that pass edges of triangles, at any distance of them, and needles."""
+    """Return rays and triangles at any distance of them, needles and small ones far away among them."""
     origin, along = rng.uniform(-1, 1, (3, BLOCK)), directions(rng)
     a = directions(rng) * sizes(rng, 1e-6, 1e6)
     b = np.where(rng.random(BLOCK) < 0.5, a + directions(rng) * sizes(rng, 1e-12, 1.0), directions(rng))
-    return np.concatenate([origin, along, origin + a, origin + b])
+    c = np.where(rng.random(BLOCK) < 0.5, a + directions(rng) * sizes(rng, 1e-9, 1.0), directions(rng))
+    return np.concatenate([origin, along, origin + a, origin + b, origin + c])
 
 
-def volume(m: Any, x: Any) -> Any:  # noqa: ARG001
-    a, b = ([p - o for p, o in zip(x[k : k + 3], x[:3], strict=True)] for k in (6, 9))
-    return [dot(x[3:6], cross(a, b))]
+def _edges(x: Any) -> Any:
+    """Return v1 - v0, v2 - v0 and v0 - o."""
+    v0, v1, v2 = x[6:9], x[9:12], x[12:15]
+    return tuple([p - q for p, q in zip(end, start, strict=True)] for end, start in ((v1, v0), (v2, v0), (v0, x[:3])))
+
+
+def volumes(m: Any, x: Any) -> Any:  # noqa: ARG001
+    """Return d . ((v2 - v0) x (v0 - o)) and d . ((v0 - o) x (v1 - v0))."""
+    one, two, far = _edges(x)
+    return [dot(x[3:6], cross(two, far)), dot(x[3:6], cross(far, one))]
 
 
 def products(m: Any, x: Any, real: Any) -> Any:
-    """Return half an ULP of the six products of a volume, all taken as positive."""
-    a, b = ([abs(p - o) for p, o in zip(x[k : k + 3], x[:3], strict=True)] for k in (6, 9))
+    """Return half an ULP of the six products of each volume, all taken as positive."""
     d = [abs(c) for c in x[3:6]]
-    total = sum(d[i] * (a[j] * b[k] + a[k] * b[j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)))
-    return total * m.number(np.float64(np.finfo(real).eps / 2))
+    one, two, far = ([abs(c) for c in edge] for edge in _edges(x))
+    totals = [sum(d[i] * (a[j] * far[k] + a[k] * far[j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)))
+              for a in (two, one)]  # fmt: skip
+    return np.stack([total * m.number(np.float64(np.finfo(real).eps / 2)) for total in totals])
 
 
 def of_the_map(m: Any, x: Any, real: Any) -> Any:
@@ -186,7 +198,7 @@ LADDERS = (
            reals=("float64",), lowest=-1e-3, brief=3 * BLOCK),
     Ladder("map.paraboloid_ray", "the unit disc, to the rim", draw_image, filled(_rays, 3), paraboloid_ray, 6.0,
            source="6 roundings, each at most one ULP", lowest=-1.0),
-    Ladder("map.barycentric", "edges 1e-12 .. 1e6 m, needles, rays upon edges", draw_edges, filled(_volumes), volume,
+    Ladder("map.barycentric", "edges 1e-12 .. 1e6 m, needles, small and far", draw_edges, filled(_volumes, 2), volumes,
            7.0, source="7 roundings of half an ULP of the six products (the unit)", scale=products, conditioned=False,
            reals=("float64",), lowest=-np.inf, extended=4_000_000),
 )

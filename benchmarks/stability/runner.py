@@ -13,7 +13,7 @@ import sys
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
+from functools import cache, partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from benchmarks.stability.tasks import Task
 from refgi.compare.provenance import environment
 from refgi.stress.rows import Row, Stability, markdown, over_scenes, read_rows, write_rows
 
+WAITING = ("kills",)  # parts whose tasks leave a processor idle
 PARTS = ("kernels", "pictures", "rays", "files", "faults", "kills", "sameness")
 ROOT = Path(__file__).parents[2]
 BEGIN, END = "<!-- table -->", "<!-- end of table -->"
@@ -33,13 +34,14 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--part", action="append", choices=PARTS, help="repeatable; all where absent")
     parser.add_argument("--task", action="append", help="of these parts the task of this name alone; repeatable")
     parser.add_argument("--short", action="store_true", help="fewer cases: under a minute in all")
-    parser.add_argument("--processes", type=int, help="parts at once; 2 in the short form, else 1")
+    parser.add_argument("--processes", type=int, help="tasks at once; 2 in the short form and of what mostly waits")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--page", type=Path, help="page whose table is made anew")
     options = parser.parse_args(arguments)
-    parts, processes = options.part or PARTS, options.processes or (2 if options.short else 1)
-    if min(processes, len(parts)) > 1:
-        run_apart(parts, options.out, options.task, processes, short=options.short)
+    parts = options.part or PARTS
+    beside = [part for part in parts if options.processes or options.short or part in WAITING]
+    if (options.processes or 2) > 1:
+        run_apart(beside, options.out, options.task, options.processes or 2, short=options.short)
     result = Stability(environment=environment(),
                        rows=tuple(run_parts(parts, options.out, options.task, short=options.short)))
     write_rows(result, options.out / "stability.json")
@@ -82,16 +84,20 @@ def run_parts(parts: Iterable[str], folder: Path, names: Sequence[str] | None = 
 
 
 def run_apart(parts: Iterable[str], folder: Path, names: Sequence[str] | None, processes: int, *, short: bool) -> None:
-    """Run parts in processes of their own, so that `run_parts` finds their tasks finished."""
+    """Run tasks in processes of their own, so that `run_parts` finds them finished."""
+    tasks = [(part, task.name) for part in parts for task in tasks_of(part, short=short)
+             if names is None or task.name in names]
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        list(pool.map(partial(_run_part, folder, names, short), parts))
+        list(pool.map(partial(_run_task, folder, short), reversed(tasks)))  # the longest of the short form come last
 
 
-def _run_part(folder: Path, names: Sequence[str] | None, short: bool, part: str) -> None:
-    for _ in run_parts([part], folder, names, short=short):
+def _run_task(folder: Path, short: bool, task: tuple[str, str]) -> None:
+    part, name = task
+    for _ in run_parts([part], folder, [name], short=short):
         pass
 
 
+@cache
 def sources_digest() -> str:
     """Return a digest of all that a figure may depend on: the package and these benchmarks."""
     digest = hashlib.sha256()

@@ -6,6 +6,7 @@ are run. `[truth]` has the key `passes`: after how many the path tracer is stopp
 
 import itertools
 import json
+import math
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -18,6 +19,7 @@ from refgi.settings import Settings, from_text
 
 FILES = Path(__file__).with_name("files")
 TRUTH = "truth"
+MOST_CHOICES = 10_000  # of one table: more would run for weeks
 
 
 class Choice(NamedTuple):
@@ -154,6 +156,8 @@ def _combinations(table: Any, where: str) -> Iterable[tuple[str, ...]]:
     expect(isinstance(table, dict), where, "a table of settings", type(table).__name__)
     lists = [[f"{key}={value_text(value)}" for value in (values if isinstance(values, list) else [values])]
              for key, values in sorted(flat(table).items())]
+    count = math.prod(map(len, lists))
+    expect(count <= MOST_CHOICES, where, f"at most {MOST_CHOICES:,} combinations", f"{count:,}")
     return itertools.product(*lists)
 
 

@@ -130,13 +130,19 @@ def expect_coordinates(uv: Array, faces: int, where: str) -> None:
         expect(False, f"{where}: uv of face {row}", f"finite texture coordinates up to {LARGEST:g}", uv[row].tolist())
 
 
+def as_float64(values: Array) -> Array:
+    """Return values as float64; a signalling NaN of float32 becomes a quiet one without a word."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(values, np.float64)
+
+
 def missing_normals(normals: Array) -> Array:
     """Return which normals give no direction.
 
     `normals` (n, 3): vectors of any length. Returns (n,) bool: true where one is zero, not finite, or so short or long
     that its square is.
     """
-    longest = np.abs(np.asarray(normals, np.float64)).max(axis=1, initial=0.0)
+    longest = np.abs(as_float64(normals)).max(axis=1, initial=0.0)
     return np.asarray(~((longest > SHORTEST) & (longest < LONGEST)))
 
 

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect
-from refgi.scene.mesh import Batch, Mesh, batches, missing_normals
+from refgi.scene.mesh import Batch, Mesh, as_float64, batches, missing_normals
 from refgi.scene.model import DirectionalLight, Geometry, Light
 from refgi.scene.values import Array
 
@@ -117,7 +117,7 @@ def unit_normals(mesh: Mesh) -> Array:
     `mesh`: a mesh with normals. Returns (n, 3) float64: unit vectors; (0, 1, 0) at a vertex that no face with an area
     uses.
     """
-    normals = np.asarray(mesh.normals, np.float64)
+    normals = as_float64(np.asarray(mesh.normals))
     missing = missing_normals(normals)
     if missing.any():
         normals = np.where(missing[:, None], mean_face_normals(mesh.vertices, mesh.faces), normals)

@@ -205,6 +205,7 @@ def _object_meshes(
 def _read_once(contents: dict[str, Contents | InputError], name: str, folder: Path, *, suggest: bool) -> Contents:
     if name not in contents:
         try:
+            expect("\n" not in name, "name", "one line", name)
             # suggestions for a missing name take long to find, and are not shown after so many faults
             expect(suggest or is_there(folder / name), f"{folder / name}", "a file", "none")
             contents[name] = read_mesh_file(folder / name)

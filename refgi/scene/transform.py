@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from refgi.errors import expect
-from refgi.scene.mesh import Mesh, missing_normals
+from refgi.scene.mesh import Mesh, as_float64, missing_normals
 from refgi.scene.values import Array
 
 IDENTITY = np.eye(4)
@@ -78,9 +78,9 @@ def transformed_all(meshes: Sequence[Mesh], matrices: Array) -> list[Mesh]:
 def _moved(mesh: Mesh, matrix: Array, inverse: Array, mirrors: bool) -> Mesh:
     with np.errstate(over="ignore", invalid="ignore"):  # final coordinates are checked by `repair`
         vertices = np.asarray(mesh.vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-    normals = mesh.normals
+        normals = None if mesh.normals is None else as_float64(mesh.normals)
     if normals is not None:
-        normals = np.where(missing_normals(normals)[:, None], 0.0, np.asarray(normals, np.float64)) @ inverse
+        normals = np.where(missing_normals(normals)[:, None], 0.0, normals) @ inverse
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
     faces, uv = mesh.faces, mesh.uv

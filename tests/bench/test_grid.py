@@ -70,6 +70,7 @@ def test_methods_are_chosen_in_the_grid_s_order():
     ("[sii]\nlihgts = 3", "did you mean"),
     ("[sii]\nlights = 'many'", "lights"),
     ("[truth]\npasses = [1]", "2 and more"),
+    (f"[sii]\nlights = {list(range(1, 102))}\nseed = {list(range(100))}", "at most 10,000 combinations, got '10,100'"),
     ("[truth]\nsamples = 3", "passes alone"),
 ])
 def test_what_is_wrong_is_said(file, text, said):

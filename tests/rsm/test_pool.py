@@ -5,8 +5,10 @@ import threading
 
 import numpy as np
 
-from refgi.rsm import pool
+from refgi.rsm import gbuffer, pool
 from refgi.rsm.pool import plane
+from refgi.scene import Camera, Material, material_table
+from tests.rsm.shapes import height_field
 
 SHAPE = (3, 256, 320)
 
@@ -65,3 +67,18 @@ def test_threads_never_get_the_same_memory():
     for worker in workers:
         worker.join()
     assert not wrong
+
+
+def test_a_moved_camera_finds_the_memory_of_the_last_frame(monkeypatch):
+    """Of lists, too, whose length depends on the view."""
+    fresh = pool._Pool()
+    monkeypatch.setattr(pool, "_pool", fresh)
+    shape, materials = height_field(160_000), material_table((Material(),), np.float32)
+    idle = []
+    for step in range(5):
+        camera = Camera((0.01 * step, 2.0, 1.2), (0, 0, 0), width=400, height=300)
+        gbuffer(shape, materials, camera).resolve("position", "normal", "albedo", "depth")
+        gc.collect()
+        idle.append(sum(size * len(blocks) for size, blocks in fresh._idle.items()))
+    assert idle[0] > 1 << 22
+    assert set(idle) == {idle[0]}

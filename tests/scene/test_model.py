@@ -189,3 +189,12 @@ def test_missing_normals_are_filled_in() -> None:
     mesh, dropped = repaired(Mesh(VERTICES, FACES, normals), "mesh")
     assert dropped == 0
     assert np.asarray(mesh.normals).tolist() == [[0, 0, 1]] * 3
+
+
+def test_a_signalling_nan_is_a_missing_normal_without_a_warning() -> None:
+    """Python warnings are errors here: a file can hold any bits."""
+    normals = np.tile(np.float32([0, 0, 2]), (3, 1))
+    normals[1, 0] = np.array(0x7FA00000, np.uint32).view(np.float32)
+    turned = transformed_all([Mesh(VERTICES, FACES, normals)], np.diag([2.0, 1, 1, 1])[None])[0]
+    for mesh in (Mesh(VERTICES, FACES, normals), turned):
+        assert np.asarray(repaired(mesh, "mesh")[0].normals).tolist() == [[0, 0, 1]] * 3

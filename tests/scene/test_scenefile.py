@@ -107,6 +107,7 @@ def test_normals_only_where_asked_for(tmp_path: Path) -> None:
     (changed("objects", 0, "mesh", value="sqare.ply"), "objects[0].mesh", "did you mean 'square.ply'"),
     (changed("objects", 0, "mesh", value="square.stl"), "objects[0].mesh", ".stl"),
     (changed("objects", 0, "mesh", value="."), "objects[0].mesh", "."),
+    (changed("objects", 0, "mesh", value="a\nb.ply"), "objects[0].mesh", "one line, got 'a\\nb.ply'"),
     (changed("objects", 0, "mesh", value="nul\0.ply"), "objects[0].mesh", "ply"),
     ({"objects": []}, "objects", "[]"),
     ({"schema": 2}, "schema", "2"),

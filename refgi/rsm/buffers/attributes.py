@@ -3,35 +3,40 @@
 Every texel of every projection has a ray: an origin o and a direction d, where d reaches depth 1 (planar maps) or has
 unit length (paraboloid). With v_i relative to o and N = (v1 - v0) x (v2 - v0) the hit is o + t d,
 t = v0 . N / (d . N), and t is the depth itself. Positions therefore lie on the ray and on the plane to float64
-rounding, before the cast to the buffer's type. Interpolated normals use barycentric coordinates
-b_i = d . (v_j x v_k) / (d . N).
+rounding, before the cast to the buffer's type. `surfaces` has how normals are interpolated.
 """
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.buffers.runs import (
-    Rows,
-    Runs,
-    Surface,
-    allocate_runs,
-    cross,
-    describe_runs,
-    find_runs,
-    image_ray,
-    row_view,
-    runs_at,
-    towards,
+from refgi.rsm.buffers.lines import (
+    LINE,
+    LINES,
+    SIDE,
+    mix_normals,
+    spread,
+    store,
+    store_depth,
+    store_distance,
+    store_material,
+    store_points,
+    store_units,
+    write_hits,
+    write_ray,
+    write_rays,
 )
+from refgi.rsm.buffers.runs import TABLE, Runs, find_runs
+from refgi.rsm.buffers.surfaces import ALBEDO, BATCH, COLUMNS, INPUTS, NORMAL, Records, Surface, describe
+from refgi.rsm.buffers.texel_rays import row_view
+from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection
 
 Array = npt.NDArray[Any]
 
-STRIP = 8  # rows resolved at once: their runs stay in cache
+ROWS = 16  # of a tile: its records stay in cache, and most of a triangle's runs lie in one tile
 
 
 class ChannelMask(NamedTuple):
@@ -56,160 +61,132 @@ class Planes(NamedTuple):
     material_id: Array  # (H, W) int32
 
 
+class Tile(NamedTuple):
+    """Texels resolved at once: `rows` rows from `top` on, `columns` columns from `left` on, all of one map."""
+
+    top: int
+    left: int
+    rows: int
+    columns: int
+
+
+class Scratch(NamedTuple):
+    """Scratch arrays of each worker."""
+
+    runs: Runs
+    records: Records
+    line: Array  # (workers, LINES LINE) float64: see `lines`
+
+
+def allocate(workers: int, rows: int = ROWS) -> Scratch:
+    """Allocate scratch arrays for workers that resolve tiles of `rows` rows."""
+    most = rows * SIDE + 2
+    runs = Runs(np.empty((workers, rows, SIDE + 1), np.int32), np.empty((workers, rows, SIDE), np.int32),
+                np.empty((workers, rows), np.int32), np.zeros((workers, TABLE), np.int32))  # fmt: skip
+    records = Records(np.empty((workers, most), np.int32), np.empty((workers, most), np.int32),
+                      plane((workers, most, COLUMNS), np.float64), np.zeros((workers, (INPUTS + COLUMNS) * BATCH)))
+    records.fixed[:, 0] = 0.0  # of texels that see nothing
+    records.material[:, 0] = -1
+    return Scratch(runs, records, np.ones((workers, LINES * LINE)))
+
+
 @kernel(parallel=True)
 def resolve(
-    surface: Surface, projection: Projection, triangle_id: Array, channels: ChannelMask, planes: Planes, workers: int
+    surface: Surface, projection: Projection, triangle_id: Array, channels: ChannelMask, planes: Planes,
+    scratch: Scratch,
 ) -> None:
     """Fill the planes of the chosen channels.
 
     `projection`: the maps that `triangle_id` was drawn on. `triangle_id` (H, W): triangle at each texel, -1 for none.
-    `channels`: which planes to fill. `workers`: threads; strips of rows are assigned to them round-robin.
+    `channels`: which planes to fill. `scratch`: of each worker; strips of rows are assigned to them round-robin.
     """
+    workers, height, width = len(scratch.line), projection.height, projection.width
+    strips = (height + ROWS - 1) // ROWS  # of a map
     for worker in prange(workers):
-        _resolve_rows(surface, projection, triangle_id, channels, planes, worker, workers)
+        runs, records, line = _runs_of(scratch, worker), _records_of(scratch, worker), scratch.line[worker]
+        for strip in range(worker, strips * len(projection.origin), workers):
+            m = strip // strips
+            first = (strip - m * strips) * ROWS
+            for left in range(0, width, SIDE):
+                tile = Tile(m * height + first, left, min(ROWS, height - first), min(SIDE, width - left))
+                count = find_runs(triangle_id, tile.top, tile.top + tile.rows, left, left + tile.columns, runs, records)
+                describe(surface, projection, m, count, records)
+                _fill(projection, tile, False, len(surface.normals) > 0, runs, records, line, channels, planes)
 
 
 @kernel
-def _resolve_rows(
-    surface: Surface, projection: Projection, triangle_id: Array, channels: ChannelMask, planes: Planes, first: int,
-    step: int,
-) -> None:
-    """Fill every `step`-th strip of rows from strip `first` on.
+def _runs_of(scratch: Scratch, worker: int) -> Runs:
+    runs = scratch.runs
+    return Runs(runs.first[worker], runs.record[worker], runs.number[worker], runs.table[worker])
 
-    Triangles are looked up once a run of texels. The rest is the same arithmetic for all texels of a row, free of
-    branches, in SIMD lanes. Strips, because each call with arrays costs atomic reference counts, which threads share.
-    """
-    height, width = triangle_id.shape
-    runs = allocate_runs(STRIP, width)
-    for top in range(first * STRIP, height, step * STRIP):
-        rows = (top, min(top + STRIP, height))
-        _fill_rows(surface, projection, find_runs(triangle_id, rows, runs), runs, rows, channels, planes)
+
+@kernel
+def _records_of(scratch: Scratch, worker: int) -> Records:
+    records = scratch.records
+    return Records(records.face[worker], records.material[worker], records.fixed[worker], records.batch[worker])
 
 
 @kernel
 def resolve_at(
-    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, channels: ChannelMask, planes: Planes
+    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, channels: ChannelMask, planes: Planes,
+    scratch: Scratch,
 ) -> None:
     """Fill the planes of the chosen channels at some texels, with the bits that `resolve` gives there.
 
     `projection`: the maps that `triangle_id` was drawn on. `triangle_id` (H, W): triangle at each texel, -1 for none.
-    `texel` (n,): texels of the flattened maps. `channels`: which planes to fill. `planes`: the result, n rows of one
-    texel.
+    `texel` (n,): texels of the flattened maps. `channels`: which planes to fill. `planes`: the result, one row of n
+    texels. `scratch`: of one worker.
     """
-    runs = allocate_runs(len(texel), 1)
-    _fill_rows(surface, projection, runs_at(triangle_id, texel, runs), runs, (0, len(texel)), channels, planes)
+    runs, records, line = _runs_of(scratch, 0), _records_of(scratch, 0), scratch.line[0]
+    width, height, done = projection.width, projection.height, 0
+    while done < len(texel):  # as many as follow one another on the same map
+        m, count = texel[done] // width // height, 0
+        while count < BATCH and done + count < len(texel) and texel[done + count] // width // height == m:
+            row, column = texel[done + count] // width, texel[done + count] % width
+            face = triangle_id[row, column]
+            records.face[count + 1] = max(face, 0)
+            runs.first[0, count], runs.record[0, count] = count, count + 1 if face >= 0 else 0
+            write_ray(projection, row, column, count, line)
+            count += 1
+        runs.first[0, count], runs.number[0] = count, count
+        describe(surface, projection, m, count + 1, records)
+        tile = Tile(m * height, done, 1, count)
+        _fill(projection, tile, True, len(surface.normals) > 0, runs, records, line, channels, planes)
+        done += count
 
 
 @kernel
-def _fill_rows(
-    surface: Surface, projection: Projection, count: int, runs: Runs, rows: Rows, channels: ChannelMask, planes: Planes
+def _fill(
+    projection: Projection, tile: Tile, listed: bool, smooth: bool, runs: Runs, records: Records, line: Array,
+    channels: ChannelMask, planes: Planes,
 ) -> None:
-    """Fill some rows of the planes; `count` is one past the last run."""
-    describe_runs(surface, projection, count, runs)
-    if channels.depth or channels.distance or channels.position:
-        _intersect(projection, rows, runs, channels, planes)
-    _write_constant(rows, runs, channels, planes)
-    if len(surface.normals) > 0 and channels.normal:
-        _interpolate(surface, projection, rows, runs, planes.normal)
+    """Fill a tile of the planes row by row: what depends on the triangle run by run, the rest along the whole row.
 
-
-@kernel
-def _intersect(projection: Projection, rows: Rows, runs: Runs, channels: ChannelMask, planes: Planes) -> None:
-    """Write t, the length of t d and the point o + t d of each texel: inf, inf and 0 without surface."""
-    across, half, kind = 2.0 / projection.width, projection.half[0], projection.kind
-    slot, fixed, width = runs.slot, runs.fixed, runs.slot.shape[1]
-    line, hit = np.empty((6, width)), np.empty((4, width))
-    for row in range(rows[0], rows[1]):
-        y = row - rows[0]
-        view, v = row_view(projection, runs.row[y])
-        middle = runs.column[y] + 0.5
-        for x in range(width):
-            run = np.uint64(slot[y, x])
-            line[0, x], line[1, x], line[2, x] = fixed[run, 0], fixed[run, 1], fixed[run, 2]
-            line[3, x], line[4, x], line[5, x] = fixed[run, 3], fixed[run, 4], fixed[run, 5]
-        for x in range(width):
-            ox, oy, oz, dx, dy, dz = image_ray(kind, view, ((x + middle) * across - 1.0) * half, v)
-            gx, gy, gz = line[3, x], line[4, x], line[5, x]
-            facing = dx * gx + dy * gy + dz * gz
-            t = ((line[0, x] - ox) * gx + (line[1, x] - oy) * gy + (line[2, x] - oz) * gz) / facing
-            covered = slot[y, x] > 0
-            hit[0, x] = t if covered else np.inf
-            hit[1, x] = ox + t * dx if covered else 0.0
-            hit[2, x] = oy + t * dy if covered else 0.0
-            hit[3, x] = oz + t * dz if covered else 0.0
+    `listed`: `line` holds rays of texels from anywhere on the tile's map, which belong in row 0 of the planes.
+    """
+    fixed, first, record, material = records.fixed, runs.first, runs.record, records.material
+    kind, left, columns = projection.kind, tile.left, tile.columns
+    for y in range(tile.rows):
+        row, count = 0 if listed else tile.top + y, runs.number[y]
+        view, v = row_view(projection, tile.top + y)
+        if not listed:
+            write_rays(projection, view, v, left, columns, line)
+        if channels.depth or channels.distance or channels.position:
+            write_hits(kind, view, y, count, first, record, fixed, line)
+        if channels.depth:
+            store_depth(row, left, columns, line, planes.depth)
         if channels.distance:
-            for x in range(width):
-                _, _, _, dx, dy, dz = image_ray(kind, view, ((x + middle) * across - 1.0) * half, v)
-                planes.distance[row, x] = hit[0, x] * math.sqrt(dx * dx + dy * dy + dz * dz)
-        _store_hits(hit, row, channels, planes)
-
-
-@kernel
-def _store_hits(hit: Array, row: int, channels: ChannelMask, planes: Planes) -> None:
-    """Round depths and points of a row to the buffer's type."""
-    if channels.depth:
-        for x in range(hit.shape[1]):
-            planes.depth[row, x] = hit[0, x]
-    if channels.position:
-        for axis in range(3):
-            for x in range(hit.shape[1]):
-                planes.position[axis, row, x] = hit[1 + axis, x]
-
-
-@kernel
-def _write_constant(rows: Rows, runs: Runs, channels: ChannelMask, planes: Planes) -> None:
-    """Write along each run what is the same all along it."""
-    slot, fixed, corner = runs.slot, runs.fixed, runs.corner
-    normal, albedo = planes.normal, planes.albedo
-    for row in range(rows[0], rows[1]):
-        y = row - rows[0]
-        if channels.normal:
-            for x in range(slot.shape[1]):
-                run = np.uint64(slot[y, x])
-                normal[0, row, x], normal[1, row, x], normal[2, row, x] = fixed[run, 6], fixed[run, 7], fixed[run, 8]
+            store_distance(kind, view, row, left, columns, line, planes.distance)
+        if channels.position:
+            store_points(kind, view, row, left, columns, line, planes.position)
+        if smooth and channels.normal:
+            mix_normals(kind, y, count, first, record, fixed, line)
+            store_units(row, left, columns, line, planes.normal)
+        elif channels.normal:
+            spread(NORMAL, y, count, first, record, fixed, line)
+            store(row, left, columns, line, planes.normal)
         if channels.albedo:
-            for x in range(slot.shape[1]):
-                run = np.uint64(slot[y, x])
-                albedo[0, row, x], albedo[1, row, x], albedo[2, row, x] = fixed[run, 9], fixed[run, 10], fixed[run, 11]
+            spread(ALBEDO, y, count, first, record, fixed, line)
+            store(row, left, columns, line, planes.albedo)
         if channels.material_id:
-            for x in range(slot.shape[1]):
-                planes.material_id[row, x] = corner[np.uint64(slot[y, x]), 3]
-
-
-@kernel
-def _barycentric(ray: Any, ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
-    """Return d . (a x b), relative to the ray's origin: a barycentric coordinate up to the common factor d . N."""
-    ox, oy, oz, dx, dy, dz = ray
-    cx, cy, cz = cross(ax - ox, ay - oy, az - oz, bx - ox, by - oy, bz - oz)
-    return dx * cx + dy * cy + dz * cz
-
-
-@kernel
-def _interpolate(surface: Surface, projection: Projection, rows: Rows, runs: Runs, normal: Array) -> None:
-    """Replace face normals by interpolated ones, on the same side."""
-    vertices, faces, shading, fixed = surface.vertices, surface.faces, surface.normals, runs.fixed
-    for row in range(rows[0], rows[1]):
-        y = row - rows[0]
-        view, v = row_view(projection, runs.row[y])
-        middle = runs.column[y] + 0.5
-        for x in range(normal.shape[2]):
-            run = runs.slot[y, x]
-            if run == 0:
-                continue
-            face = runs.start[run, 0]
-            i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-            u = ((x + middle) * (2.0 / projection.width) - 1.0) * projection.half[0]
-            ray = image_ray(projection.kind, view, u, v)
-            gx, gy, gz = fixed[run, 3], fixed[run, 4], fixed[run, 5]
-            facing = ray[3] * gx + ray[4] * gy + ray[5] * gz
-            ix, iy, iz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-            jx, jy, jz = vertices[j, 0], vertices[j, 1], vertices[j, 2]
-            kx, ky, kz = vertices[k, 0], vertices[k, 1], vertices[k, 2]
-            a = _barycentric(ray, jx, jy, jz, kx, ky, kz) / facing
-            b = _barycentric(ray, kx, ky, kz, ix, iy, iz) / facing
-            c = 1.0 - a - b
-            sx = a * shading[i, 0] + b * shading[j, 0] + c * shading[k, 0]
-            sy = a * shading[i, 1] + b * shading[j, 1] + c * shading[k, 1]
-            sz = a * shading[i, 2] + b * shading[j, 2] + c * shading[k, 2]
-            nx, ny, nz = towards(gx, gy, gz, -ray[3], -ray[4], -ray[5])
-            normal[0, row, x], normal[1, row, x], normal[2, row, x] = towards(sx, sy, sz, nx, ny, nz)
+            store_material(row, left, y, count, first, record, material, planes.material_id)

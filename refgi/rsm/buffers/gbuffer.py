@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.rsm.buffers.attributes import ChannelMask, Planes, resolve, resolve_at
-from refgi.rsm.buffers.runs import Surface
+from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, resolve_at
+from refgi.rsm.buffers.surfaces import Surface
 from refgi.rsm.buffers.textures import paint
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection, camera_projection
@@ -171,12 +171,12 @@ class GBuffer:
         missing = tuple(name for name in ChannelMask._fields if name in names and name not in self._channels)
         computed = {}
         if missing:
-            planes = _planes(missing, (len(texel), 1), self.dtype)
+            planes = _planes(missing, (1, len(texel)), self.dtype)
             surface = _surface(self._geometry, self._materials, self.dtype)
             channels = ChannelMask(*(name in missing for name in ChannelMask._fields))
-            resolve_at(surface, self.projection, self.visibility.triangle_id, texel, channels, planes)
+            resolve_at(surface, self.projection, self.visibility.triangle_id, texel, channels, planes, allocate(1, 1))
             paint(self._geometry, self._materials, self.projection, self.visibility.triangle_id, planes.albedo, texel)
-            computed = {name: getattr(planes, name)[..., 0] for name in missing}
+            computed = {name: getattr(planes, name)[..., 0, :] for name in missing}
         return tuple(computed[n] if n in computed else values_at(self.resolve(n)[0], texel) for n in names)
 
 
@@ -260,7 +260,8 @@ def _resolve(
     """
     planes = _planes(names, triangle_id.shape, dtype)
     channels = ChannelMask(*(name in names for name in ChannelMask._fields))
-    resolve(_surface(geometry, materials, dtype), projection, triangle_id, channels, planes, numba.get_num_threads())
+    scratch = allocate(numba.get_num_threads())
+    resolve(_surface(geometry, materials, dtype), projection, triangle_id, channels, planes, scratch)
     paint(geometry, materials, projection, triangle_id, planes.albedo)
     return {name: getattr(planes, name) for name in names}
 

@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.buffers.runs import cross, image_ray, row_view
+from refgi.rsm.buffers.surfaces import cross
+from refgi.rsm.buffers.texel_rays import image_ray, row_view
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.scene.model import Geometry, MaterialTable
 from refgi.scene.texture.footprint import footprint_means

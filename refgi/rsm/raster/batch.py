@@ -23,6 +23,7 @@ Array = npt.NDArray[Any]
 
 NEAREST = 1e-9  # share of a triangle's size under which a hit is rounding: its plane holds the eye
 BATCH = 64  # triangles set up at once
+EMPTY = 0xFFFFFFFF  # key of a texel where nothing is; others have nearness in the upper half, EMPTY - id in the lower
 LIMIT, CORNERS, ROWS = 15 * BATCH, 16 * BATCH, 28  # where a batch's limits and corners start, and its rows in all
 
 
@@ -56,23 +57,23 @@ def edge(
 
 
 @kernel
-def draw(corners: Array, faces: Array, part: Part, nearness: Array, ids: Array) -> None:
-    """Write nearness and id of triangles where each is the nearest so far; ties stay with the earlier one.
+def draw(corners: Array, faces: Array, part: Part, width: int, keys: Array) -> None:
+    """Keep the greatest key at each texel: of the nearest triangle, of the earliest one where several are as near.
 
-    `corners` (n, 4): projected vertices. `faces` (m, 3): vertices of each triangle. `part`: which triangles, in which
-    order, and where. `nearness` (h, max(w, LANES)): nearest so far, float32; 0 where nothing is. `ids` (h, max(w,
-    LANES)): triangle id, int32.
+    `corners` (n, 4): projected vertices. `faces` (m, 3): vertices of each triangle. `part`: which triangles and where.
+    `width`: columns of the map. `keys` ((bottom - top + 1) (width + LANES),): keys so far, `EMPTY` where nothing is.
 
     The loop over triangles is inside, because a call with arrays costs atomic reference counts, which threads share.
     """
-    width, members, boxes = nearness.shape[1], part.members, part.boxes
+    members, boxes, stride = part.members, part.boxes, width + LANES
     setup = np.zeros(ROWS * BATCH)
     for base in range(part.start, part.stop, BATCH):
         count = min(BATCH, part.stop - base)
         _gather(corners, faces, members, base, count, setup)
         _set_up(setup, width)
         for b in range(count):
-            face, limit = members[base + b], np.float32(setup[LIMIT + b])
+            face = members[base + b]
+            earliness, nearest = EMPTY - np.int64(face), _key(setup[LIMIT + b], EMPTY)
             a0, b0, c0, t0 = setup[b], setup[BATCH + b], setup[2 * BATCH + b], setup[3 * BATCH + b]
             a1, b1, c1, t1 = setup[4 * BATCH + b], setup[5 * BATCH + b], setup[6 * BATCH + b], setup[7 * BATCH + b]
             a2, b2, c2, t2 = setup[8 * BATCH + b], setup[9 * BATCH + b], setup[10 * BATCH + b], setup[11 * BATCH + b]
@@ -88,17 +89,35 @@ def draw(corners: Array, faces: Array, part: Part, nearness: Array, ids: Array) 
                     first, last = _cut(first, last, a0, r0)
                     first, last = _cut(first, last, a1, r1)
                     first, last = _cut(first, last, a2, r2)
-                for block in range((last - first + LANES) // LANES):
-                    # a fixed number of lanes becomes straight SIMD code; those outside the span fail by themselves
-                    start = min(first + block * LANES, width - LANES)
-                    line, place_0, x0 = np.uint64(row), np.uint64(start), start + 0.5
-                    for lane in range(LANES):
-                        x, column = x0 + lane, place_0 + np.uint64(lane)
-                        near = np.float32(an * x + rn)
-                        inside = (a0 * x + r0 >= t0) & (a1 * x + r1 >= t1) & (a2 * x + r2 >= t2)
-                        if inside & (near > nearness[line, column]) & (near <= limit):
-                            nearness[line, column] = near
-                            ids[line, column] = face
+                place, x0 = np.uint64((row - part.top) * stride + first), first + 0.5
+                # a multiple of LANES is SIMD code without a rest; lanes outside the triangle fail by themselves
+                for lane in range((last - first + LANES) & -LANES):
+                    at, x = place + np.uint64(lane), x0 + np.int32(lane)
+                    key, before = _key(an * x + rn, earliness), keys[at]
+                    inside = (a0 * x + r0 >= t0) & (a1 * x + r1 >= t1) & (a2 * x + r2 >= t2)
+                    keys[at] = key if inside & (key <= nearest) & (key > before) else before
+
+
+@kernel
+def unpack(keys: Array, width: int, top: int, bottom: int, nearness: Array, ids: Array) -> None:
+    """Write nearness (h, w) float32 and triangle ids (h, w) int32 of rows `top` to `bottom` from their keys."""
+    bits = nearness.view(np.int32)
+    for row in range(top, bottom + 1):
+        line, place = np.uint64(row), np.uint64((row - top) * (width + LANES))
+        for x in range(width):
+            key, column = keys[place + np.uint64(x)], np.uint64(x)
+            bits[line, column] = key >> 32
+            ids[line, column] = EMPTY - (key & EMPTY) if key > EMPTY else -1
+
+
+@kernel
+def _key(near: float, earliness: Any) -> Any:
+    """Return a number that is greater for the nearer triangle, then for the earlier one; negative behind the eye.
+
+    Nearness is rounded to float32, of which positive numbers have the order of their bits.
+    """
+    rounded = np.float32(near)
+    return (np.int64(rounded.view(np.int32)) << 32) | earliness
 
 
 @kernel
@@ -135,7 +154,8 @@ def _set_up(setup: Array, width: int) -> None:
         setup[14 * BATCH + b] = (c0 * ni + c1 * nj + c2 * nk) * scale
         size = max(_size(xi, yi, wi, width), max(_size(xj, yj, wj, width), _size(xk, yk, wk, width)))
         # no area, or seen edge-on: nothing is near enough
-        setup[LIMIT + b] = 1.0 / (NEAREST * size) if det != 0.0 else 0.0
+        limit = 1.0 / (NEAREST * size)
+        setup[LIMIT + b] = limit if (det != 0.0) & (limit > 0.0) else 0.0
 
 
 @kernel

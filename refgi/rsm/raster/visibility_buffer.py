@@ -1,8 +1,9 @@
 """The visibility buffer: nearest triangle and its inverse depth at every texel.
 
 Work is split by rows. One map is cut into bands; each band keeps the list of triangles that reach it, in mesh order,
-and draws them alone, so that the result does not depend on the height of a band or the number of threads. Several
-maps are drawn one map per task without lists. Depth is kept as nearness in float32, ties go to the lowest id.
+and draws them alone, so that the result does not depend on the height of a band or the number of threads. Several maps
+are drawn one map per task without lists. Whoever draws has keys of nearness and id of its own and writes the planes at
+the end. Depth is kept as nearness in float32, ties go to the lowest id.
 """
 
 from typing import Any, NamedTuple
@@ -13,7 +14,8 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
-from refgi.rsm.raster.batch import Part, draw
+from refgi.rsm.raster.batch import EMPTY, Part, draw, unpack
+from refgi.rsm.raster.paraboloid import BLOCK as PARABOLOID_BLOCK
 from refgi.rsm.raster.paraboloid import draw_paraboloids
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.rsm.raster.triangle import LANES, bound_triangles, project_vertices
@@ -49,6 +51,7 @@ class Scratch(NamedTuple):
     cells: Array  # (workers, n, 4) int32
     boxes: Array  # (workers, BATCH, 4) uint16
     members: Array  # (workers, BATCH) int32
+    keys: Array  # (workers, height (width + LANES)) int64: nearness and triangle of each texel
 
 
 @stage("rsm.rasterize")
@@ -76,34 +79,36 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     """
     vertices, faces = geometry.vertices, geometry.faces
     height, width = projection.shape
-    columns = max(width, LANES)
+    columns = max(width, PARABOLOID_BLOCK) if projection.kind == PARABOLOID else width
     visibility = Visibility(plane((height, columns), np.int32), plane((height, columns), np.float32))
-    _clear(visibility.triangle_id, visibility.inverse_depth)
     workers = numba.get_num_threads()
     if projection.kind == PARABOLOID:
+        _clear(visibility.triangle_id, visibility.inverse_depth)
         draw_paraboloids(projection, vertices, faces, workers, visibility.inverse_depth, visibility.triangle_id)
     elif projection.maps > 1:
-        _draw_maps(projection, vertices, faces, scratch(workers, len(vertices)), visibility)
+        _draw_maps(projection, vertices, faces, scratch(workers, len(vertices), projection), visibility)
     else:
         corners, cells = plane((len(vertices), 4), np.float64), plane((len(vertices), 4), np.int32)
         _project(projection, vertices, corners, cells)
-        rows = band_rows or min(max(projection.height // 32, 4), 32)
-        _draw_bands(corners, faces, bands(corners, cells, faces, width, height, rows), workers, visibility)
-    if width < LANES:
+        rows = min(band_rows or min(max(height // 32, 4), 32), height)
+        keys = plane((workers, rows * (width + LANES)), np.int64)
+        _draw_bands(corners, faces, bands(corners, cells, faces, width, height, rows), keys, visibility)
+    if width < columns:
         visibility = Visibility(*(np.ascontiguousarray(plane[:, :width]) for plane in visibility))
     return visibility
 
 
-def scratch(workers: int, vertices: int) -> Scratch:
+def scratch(workers: int, vertices: int, projection: Projection) -> Scratch:
     """Allocate scratch arrays for workers that draw whole maps.
 
-    `workers`: how many run at once. `vertices`: vertices of the geometry.
+    `workers`: how many run at once. `vertices`: vertices of the geometry. `projection`: the maps.
     """
     return Scratch(
         plane((workers, vertices, 4), np.float64),
         plane((workers, vertices, 4), np.int32),
         np.empty((workers, BATCH, 4), np.uint16),
         np.empty((workers, BATCH), np.int32),
+        plane((workers, projection.height * (projection.width + LANES)), np.int64),
     )
 
 
@@ -119,7 +124,9 @@ def bands(corners: Array, cells: Array, faces: Array, width: int, height: int, r
     counts = np.zeros((CHUNKS, band_of[-1] + 1), np.int64)
     _count(corners, cells, faces, (width, height), band_of, boxes, counts)
     ends = np.cumsum(counts.T).reshape(counts.T.shape)  # band by band, chunk by chunk
-    members = plane((int(ends[-1, -1]) + CHUNKS,), np.int32)
+    length = int(ends[-1, -1]) + CHUNKS
+    step = 1 << max(length.bit_length() - 4, 0)  # whole steps: a moved camera finds the memory of the last frame
+    members = plane((-(-length // step) * step,), np.int32)[:length]
     _list(boxes, band_of, np.ascontiguousarray((ends - counts.T).T), members)
     return Bands(boxes, np.concatenate([[0], ends[:, -1]]), members, rows)
 
@@ -170,30 +177,34 @@ def _list(boxes: Array, band_of: Array, cursors: Array, members: Array) -> None:
 
 
 @kernel(parallel=True)
-def _draw_bands(corners: Array, faces: Array, lists: Bands, workers: int, visibility: Visibility) -> None:
+def _draw_bands(corners: Array, faces: Array, lists: Bands, keys: Array, visibility: Visibility) -> None:
+    workers, (height, width) = len(keys), visibility.triangle_id.shape
     for worker in prange(workers):
+        band_keys = keys[worker]
         for band in range(worker, len(lists.starts) - 1, workers):  # interleaved: neighbours cost alike
-            top = band * lists.rows
-            part = Part(
-                lists.members, lists.starts[band], lists.starts[band + 1], lists.boxes, 0, top, top + lists.rows - 1
-            )
-            draw(corners, faces, part, visibility.inverse_depth, visibility.triangle_id)
+            top, bottom = band * lists.rows, min((band + 1) * lists.rows, height) - 1
+            part = Part(lists.members, lists.starts[band], lists.starts[band + 1], lists.boxes, 0, top, bottom)
+            band_keys[:] = EMPTY
+            draw(corners, faces, part, width, band_keys)
+            unpack(band_keys, width, top, bottom, visibility.inverse_depth, visibility.triangle_id)
 
 
 @kernel(parallel=True)
 def _draw_maps(projection: Projection, vertices: Array, faces: Array, scratch: Scratch, visibility: Visibility) -> None:
-    workers, height = len(scratch.corners), projection.height
+    workers, height, width = len(scratch.corners), projection.height, projection.width
     for worker in prange(workers):
-        corners, cells = scratch.corners[worker], scratch.cells[worker]
+        corners, cells, keys = scratch.corners[worker], scratch.cells[worker], scratch.keys[worker]
         boxes, members = scratch.boxes[worker], scratch.members[worker]
         for m in range(worker, len(projection.origin), workers):
             rows = slice(m * height, (m + 1) * height)
             project_vertices(projection, m, vertices, 0, len(vertices), corners, cells)
+            keys[:] = EMPTY
             for base in range(0, len(faces), BATCH):
                 count, last = 0, min(base + BATCH, len(faces))
-                bound_triangles(corners, cells, faces, base, last, (projection.width, height), boxes)
+                bound_triangles(corners, cells, faces, base, last, (width, height), boxes)
                 for face in range(base, last):
                     members[count] = face
                     count += boxes[face - base, 0] <= boxes[face - base, 1]
                 part = Part(members, 0, count, boxes, base, 0, height - 1)
-                draw(corners, faces, part, visibility.inverse_depth[rows], visibility.triangle_id[rows])
+                draw(corners, faces, part, width, keys)
+            unpack(keys, width, 0, height - 1, visibility.inverse_depth[rows], visibility.triangle_id[rows])

@@ -16,7 +16,7 @@ from refgi.scene.files import Contents
 from refgi.scene.gltf.container import Document, accessor
 from refgi.scene.gltf.nodes import node_camera, node_light, scene_nodes
 from refgi.scene.gltf.textures import Look, base_colour, transformed
-from refgi.scene.mesh import expect_memory
+from refgi.scene.mesh import as_float64, expect_memory
 from refgi.scene.model import Array, Camera, Light, Material, Mesh, Rgb
 from refgi.scene.transform import transformed_all
 
@@ -134,7 +134,7 @@ class _Reader:
         if key not in attributes:
             self._pass_over(f"primitive(s)' textures for lack of {key}")
             return dataclasses.replace(mesh, material=dataclasses.replace(mesh.material, texture=None))
-        uv = accessor(self.document, attributes[key], "VEC2", f"{where}.attributes.{key}").astype(np.float64)
+        uv = as_float64(accessor(self.document, attributes[key], "VEC2", f"{where}.attributes.{key}"))
         expect(len(uv) == len(mesh.vertices), f"{self.path}: {where}.attributes.{key}",
                f"{len(mesh.vertices)} elements as POSITION", len(uv))
         mesh = dataclasses.replace(mesh, uv=transformed(uv, look.transform)[mesh.faces])
@@ -146,7 +146,7 @@ class _Reader:
         if key not in attributes:
             return None
         try:
-            uv = accessor(self.document, attributes[key], "VEC2", key).astype(np.float64)
+            uv = as_float64(accessor(self.document, attributes[key], "VEC2", key))
         except InputError:
             return None
         return uv[mesh.faces] if len(uv) == len(mesh.vertices) and np.isfinite(uv).all() else None

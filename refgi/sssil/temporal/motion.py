@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.buffers.gbuffer import GBuffer
-from refgi.rsm.buffers.runs import cross
+from refgi.rsm.buffers.surfaces import cross
 from refgi.rsm.pool import plane
 from refgi.scene.model import Geometry
 from refgi.stages import stage

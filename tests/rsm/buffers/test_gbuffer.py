@@ -7,9 +7,21 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError
+from refgi.jit import threads
 from refgi.rsm import gbuffer
 from refgi.rsm.buffers.attributes import ChannelMask
-from refgi.scene import Camera, Material, material_table
+from refgi.rsm.buffers.gbuffer import GBuffer
+from refgi.rsm.buffers.lines import SIDE
+from refgi.rsm.raster.projection import (
+    ORTHOGRAPHIC,
+    PARABOLOID,
+    camera_projection,
+    cube_projection,
+    directional_projection,
+    paraboloid_projection,
+)
+from refgi.rsm.raster.visibility_buffer import rasterize
+from refgi.scene import Camera, DirectionalLight, Material, material_table
 from tests.naive import raster as naive
 from tests.rsm.shapes import geometry, soup, sphere
 
@@ -59,6 +71,67 @@ def test_channels_equal_those_of_a_literal_twin(name):
             np.testing.assert_array_equal(seen.albedo[:, row, column], MATERIALS[material].diffuse)
             compared += 1
     assert compared > 300
+
+
+RAYS = {ORTHOGRAPHIC: naive.orthographic_ray, PARABOLOID: naive.paraboloid_ray}
+
+
+def maps():
+    light = DirectionalLight((0.3, -0.8, -0.4), (1, 1, 1))
+    return {
+        "orthographic": directional_projection(light, (np.full(3, -1.4), np.full(3, 1.4)), 28),
+        "cube": cube_projection((0.2, 0.1, 0.3), 14),
+        "paraboloid": paraboloid_projection([(0.2, 0.1, 1.9), (0, 0, -2.2)], [(0.1, 0, -1), (0, 0.2, 1)], 22),
+        "wide": camera_projection(dataclasses.replace(CAMERA, width=2 * SIDE + 13, height=19)),
+    }
+
+
+@pytest.mark.parametrize("kind", maps())
+@pytest.mark.parametrize("name", ["flat", "smooth"])
+def test_channels_of_maps_equal_those_of_a_literal_twin(name, kind):
+    """Of lights' maps, several of which are stacked, and of rows that are longer than a tile."""
+    shape, projection = shapes()[name], maps()[kind]
+    seen = GBuffer(shape, material_table(MATERIALS, np.float64), projection, rasterize(shape, projection), np.float64)
+    make, compared = RAYS.get(projection.kind, naive.perspective_ray), set()
+    for row in range(seen.height):
+        m, local = divmod(row, projection.height)
+        for column in range(row % 5, seen.width, 5):
+            ray = make(projection.origin[m], projection.frame[m], projection.half, projection.height,
+                       projection.width, local, column)  # fmt: skip
+            if ray is None:
+                continue
+            hit = naive.nearest(*ray, shape.vertices, shape.faces)
+            if hit[0] < 0 or hit[3] < DOUBT:
+                continue
+            expected = naive.attributes(ray[1], hit, shape.vertices, shape.faces, shape.vertex_normals)
+            position, normal, distance = expected
+            np.testing.assert_allclose(seen.position[:, row, column], position, atol=FLOAT64)
+            np.testing.assert_allclose(seen.normal[:, row, column], normal, atol=1e3 * FLOAT64)
+            np.testing.assert_allclose([seen.distance[row, column], seen.depth[row, column]], [distance, hit[1]],
+                                       rtol=FLOAT64)  # fmt: skip
+            material = shape.material_of_face[hit[0]]
+            np.testing.assert_array_equal(seen.albedo[:, row, column], MATERIALS[material].diffuse)
+            assert seen.material_id[row, column] == material
+            compared.add((m, column // SIDE))
+    assert len(compared) >= {"orthographic": 1, "cube": 4, "paraboloid": 2, "wide": 2}[kind]  # maps and tiles
+
+
+def test_the_same_bits_for_any_threads_and_tiles():
+    """Texels alone, which know of no tile, have the bits of pictures of several tiles a row and a column."""
+    rng = np.random.default_rng(9)
+    for shape in shapes().values():
+        projection = camera_projection(dataclasses.replace(CAMERA, width=SIDE + 61, height=75))
+        visibility, materials = rasterize(shape, projection), material_table(MATERIALS, np.float32)
+        texel = np.sort(rng.choice(projection.width * 75, 2000, replace=False))
+        channels = []
+        for count in (1, 2):
+            with threads(count):
+                whole = GBuffer(shape, materials, projection, visibility, np.float32)
+                channels.append([whole.resolve(name)[0] for name in CHANNELS])
+        some = GBuffer(shape, materials, projection, visibility, np.float32).at(texel, *CHANNELS)
+        for one, two, part in zip(*channels, some, strict=True):
+            np.testing.assert_array_equal(one, two)
+            np.testing.assert_array_equal(one.reshape(*one.shape[:-2], -1)[..., texel], part)
 
 
 def test_positions_lie_on_their_triangles_planes():

@@ -1,0 +1,182 @@
+"""What is computed along a row of a tile: run by run what depends on the triangle, along all texels the rest.
+
+A line is one array, so that the compiler sees that its parts do not overlap; parts lie apart by constants, and runs are
+filled in whole lanes, so that loops over lanes are SIMD code without a rest. What lanes write past the end of a run the
+next run overwrites. All numbers are float64 until they are stored in the buffer's type.
+
+In kernels below `first` (rows, SIDE + 1) and `record` (rows, SIDE) are runs' first texels and records in row `y` of a
+tile, `count` of them; `fixed` (n, COLUMNS) are the records. `row` and `left` say where a line belongs in the planes.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel
+from refgi.rsm.buffers.surfaces import CONSTANT, CORNER, MIXED, NORMAL, PLANE
+from refgi.rsm.buffers.texel_rays import image_ray, texel_ray
+from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection
+
+Array = npt.NDArray[Any]
+
+SIDE = 256  # texels of a line
+LANES = 4  # texels computed at once: runs are short
+LINE = SIDE + LANES
+# where a line holds what varies along it, direction or origin of rays: x, then y, z; then t; then three numbers
+Y, Z, HIT, VALUE, LINES = np.uint64(LINE), np.uint64(2 * LINE), np.uint64(3 * LINE), np.uint64(4 * LINE), 7
+
+
+@kernel
+def write_ray(projection: Projection, row: int, column: int, i: int, line: Array) -> None:
+    """Write a ray's direction, of a parallel one its origin, at place `i` of a line."""
+    ox, oy, oz, dx, dy, dz = texel_ray(projection, row, column)
+    parallel, at = projection.kind == ORTHOGRAPHIC, np.uint64(i)
+    line[at], line[at + Y], line[at + Z] = ox if parallel else dx, oy if parallel else dy, oz if parallel else dz
+
+
+@kernel
+def write_rays(projection: Projection, view: Any, v: float, left: int, columns: int, line: Array) -> None:
+    """Write what varies along a row: directions of rays from one centre, origins of parallel ones."""
+    kind, across, half, middle = projection.kind, 2.0 / projection.width, projection.half[0], left + 0.5
+    for i in range(columns):
+        ox, oy, oz, dx, dy, dz = image_ray(kind, view, ((np.int32(i) + middle) * across - 1.0) * half, v)
+        parallel, at = kind == ORTHOGRAPHIC, np.uint64(i)
+        line[at] = ox if parallel else dx
+        line[at + Y] = oy if parallel else dy
+        line[at + Z] = oz if parallel else dz
+
+
+@kernel
+def write_hits(
+    kind: int, view: Any, y: int, count: int, first: Array, record: Array, fixed: Array, line: Array
+) -> None:
+    """Write t of each texel of a row: inf without surface."""
+    ox, oy, oz, _, _, _, _, _, _, dx, dy, dz = view
+    for run in range(count):
+        start, stop, r = first[y, run], first[y, run + 1], record[y, run]
+        gx, gy, gz = fixed[r, PLANE], fixed[r, PLANE + 1], fixed[r, PLANE + 2]
+        vx, vy, vz = fixed[r, CORNER], fixed[r, CORNER + 1], fixed[r, CORNER + 2]
+        texels = (stop - start + LANES - 1) & -LANES
+        if r == 0:
+            for lane in range(texels):
+                line[np.uint64(start) + np.uint64(lane) + HIT] = np.inf
+        elif kind == ORTHOGRAPHIC:
+            facing = dx * gx + dy * gy + dz * gz
+            for lane in range(texels):
+                at = np.uint64(start) + np.uint64(lane)
+                above = (vx - line[at]) * gx + (vy - line[at + Y]) * gy + (vz - line[at + Z]) * gz
+                line[at + HIT] = above / facing
+        else:
+            above = (vx - ox) * gx + (vy - oy) * gy + (vz - oz) * gz
+            for lane in range(texels):
+                at = np.uint64(start) + np.uint64(lane)
+                line[at + HIT] = above / (line[at] * gx + line[at + Y] * gy + line[at + Z] * gz)
+
+
+@kernel
+def store_depth(row: int, left: int, columns: int, line: Array, depth: Array) -> None:
+    """Round depths of a row to the buffer's type."""
+    to = np.uint64(left)
+    for i in range(columns):
+        at = np.uint64(i)
+        depth[row, to + at] = line[at + HIT]
+
+
+@kernel
+def store_distance(kind: int, view: Any, row: int, left: int, columns: int, line: Array, distance: Array) -> None:
+    """Round the lengths of t d of a row to the buffer's type."""
+    _, _, _, _, _, _, _, _, _, dx, dy, dz = view
+    parallel, to = kind == ORTHOGRAPHIC, np.uint64(left)
+    for i in range(columns):
+        at = np.uint64(i)
+        x, y, z = dx if parallel else line[at], dy if parallel else line[at + Y], dz if parallel else line[at + Z]
+        distance[row, to + at] = line[at + HIT] * math.sqrt(x * x + y * y + z * z)
+
+
+@kernel
+def store_points(kind: int, view: Any, row: int, left: int, columns: int, line: Array, position: Array) -> None:
+    """Round the points o + t d of a row to the buffer's type: 0 without surface."""
+    ox, oy, oz, _, _, _, _, _, _, dx, dy, dz = view
+    parallel, to = kind == ORTHOGRAPHIC, np.uint64(left)
+    for i in range(columns):
+        at = np.uint64(i)
+        t, x, y, z = line[at + HIT], line[at], line[at + Y], line[at + Z]
+        x = x + t * dx if parallel else ox + t * x
+        y = y + t * dy if parallel else oy + t * y
+        z = z + t * dz if parallel else oz + t * z
+        seen = t < np.inf
+        position[0, row, to + at] = x if seen else 0.0
+        position[1, row, to + at] = y if seen else 0.0
+        position[2, row, to + at] = z if seen else 0.0
+
+
+@kernel
+def mix_normals(kind: int, y: int, count: int, first: Array, record: Array, fixed: Array, line: Array) -> None:
+    """Write interpolated normals of a row, of any length, on the side of the face's: 0 without surface."""
+    parallel = kind == ORTHOGRAPHIC
+    for run in range(count):
+        start, stop, r = first[y, run], first[y, run + 1], record[y, run]
+        vx, vy, vz = fixed[r, CORNER], fixed[r, CORNER + 1], fixed[r, CORNER + 2]
+        vx, vy, vz = vx if parallel else 0.0, vy if parallel else 0.0, vz if parallel else 0.0
+        nx, ny, nz = fixed[r, NORMAL], fixed[r, NORMAL + 1], fixed[r, NORMAL + 2]
+        mxx, mxy, mxz, kx = fixed[r, MIXED], fixed[r, MIXED + 1], fixed[r, MIXED + 2], fixed[r, CONSTANT]
+        myx, myy, myz, ky = fixed[r, MIXED + 3], fixed[r, MIXED + 4], fixed[r, MIXED + 5], fixed[r, CONSTANT + 1]
+        mzx, mzy, mzz, kz = fixed[r, MIXED + 6], fixed[r, MIXED + 7], fixed[r, MIXED + 8], fixed[r, CONSTANT + 2]
+        for lane in range((stop - start + LANES - 1) & -LANES):
+            at = np.uint64(start) + np.uint64(lane)
+            qx, qy, qz = line[at] - vx, line[at + Y] - vy, line[at + Z] - vz
+            sx = kx + (qx * mxx + qy * mxy + qz * mxz)
+            sy = ky + (qx * myx + qy * myy + qz * myz)
+            sz = kz + (qx * mzx + qy * mzy + qz * mzz)
+            long = sx * sx + sy * sy + sz * sz > 0.0
+            side = math.copysign(1.0, sx * nx + sy * ny + sz * nz)
+            sx, sy, sz = side * sx, side * sy, side * sz
+            line[at + VALUE] = sx if long else nx
+            line[at + VALUE + Y] = sy if long else ny
+            line[at + VALUE + Z] = sz if long else nz
+
+
+@kernel
+def store_units(row: int, left: int, columns: int, line: Array, normal: Array) -> None:
+    """Round normals of a row, brought to unit length, to the buffer's type."""
+    to = np.uint64(left)
+    for i in range(columns):
+        at = np.uint64(i)
+        x, y, z = line[at + VALUE], line[at + VALUE + Y], line[at + VALUE + Z]
+        square = x * x + y * y + z * z
+        scale = 1.0 / math.sqrt(square) if square > 0.0 else 0.0
+        normal[0, row, to + at], normal[1, row, to + at], normal[2, row, to + at] = x * scale, y * scale, z * scale
+
+
+@kernel
+def spread(column: int, y: int, count: int, first: Array, record: Array, fixed: Array, line: Array) -> None:
+    """Write three numbers of a record, from `column` on, along each of its runs in a row."""
+    for run in range(count):
+        start, stop, r = first[y, run], first[y, run + 1], record[y, run]
+        a, b, c = fixed[r, column], fixed[r, column + 1], fixed[r, column + 2]
+        for lane in range((stop - start + LANES - 1) & -LANES):
+            at = np.uint64(start) + np.uint64(lane)
+            line[at + VALUE], line[at + VALUE + Y], line[at + VALUE + Z] = a, b, c
+
+
+@kernel
+def store(row: int, left: int, columns: int, line: Array, channel: Array) -> None:
+    """Round three numbers of each texel of a row to the buffer's type."""
+    to = np.uint64(left)
+    for i in range(columns):
+        at = np.uint64(i)
+        channel[0, row, to + at], channel[1, row, to + at] = line[at + VALUE], line[at + VALUE + Y]
+        channel[2, row, to + at] = line[at + VALUE + Z]
+
+
+@kernel
+def store_material(
+    row: int, left: int, y: int, count: int, first: Array, record: Array, material: Array, channel: Array
+) -> None:
+    """Store the material of each run of a row."""
+    for run in range(count):
+        value = material[record[y, run]]
+        for i in range(first[y, run], first[y, run + 1]):
+            channel[row, np.uint64(left) + np.uint64(i)] = value

@@ -1,0 +1,178 @@
+"""What the texels of a triangle have in common: its plane, its normal, its albedo, and how its normals are mixed.
+
+With q = v0 - o for the centre of projection o, e1 = v1 - v0, e2 = v2 - v0 and N = e1 x e2, a ray o + t d meets the
+triangle's plane at t = q . N / (d . N). There the barycentric coordinates of v1 and v2 are, times d . N,
+
+    b1 (d . N) = d . (e2 x q),    b2 (d . N) = d . (q x e1),
+
+so the interpolated normal of corner normals n0, n1, n2 is, times d . N, an affine function of what varies over texels:
+
+- rays from one centre:  d . M,           M = N n0 + (e2 x q) (n1 - n0) + (q x e1) (n2 - n0),
+- parallel rays:         K + (o - v0) . M,   M = (e2 x d) (n1 - n0) + (d x e1) (n2 - n0),   K = (d . N) n0.
+
+Corners enter by differences of 1, not of 2 factors of their distance, so small triangles far away keep their digits.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy.typing as npt
+
+from refgi.jit import kernel
+from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection
+
+Array = npt.NDArray[Any]
+
+BATCH = 64  # triangles described at once
+# columns of `Records.fixed`: corner v0; N; unit normal on the visible side; albedo; M by axis; K
+CORNER, PLANE, NORMAL, ALBEDO, MIXED, CONSTANT, COLUMNS = 0, 3, 6, 9, 12, 21, 24
+INPUTS = 18  # rows of a batch: corners and their normals
+
+
+class Surface(NamedTuple):
+    """What the triangles are made of."""
+
+    vertices: Array  # (n, 3) float64, m
+    faces: Array  # (m, 3) int32
+    normals: Array  # (n, 3) float64, or (0, 3): the faces' normals count
+    material_of_face: Array  # (m,) int32
+    diffuse: Array  # (materials, 3)
+
+
+class Records(NamedTuple):
+    """Triangles that some texels of one map see; record 0 is that of texels that see nothing."""
+
+    face: Array  # (n,) int32: triangle; -1: none
+    material: Array  # (n,) int32; -1: none
+    fixed: Array  # (n, COLUMNS) float64
+    batch: Array  # ((INPUTS + COLUMNS) BATCH,) float64: scratch, triangles as lanes
+
+
+@kernel
+def cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
+    """Return a x b."""
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@kernel
+def barycentric_axes(v0: Any, v1: Any, v2: Any, origin: Any) -> Any:
+    """Return e2 x q and q x e1: their products with a ray's direction are b1 and b2, times d . N.
+
+    `v0`, `v1`, `v2`: corners. `origin`: of the ray. All are tuples of 3 floats, world space, m.
+    """
+    (x, y, z), (ox, oy, oz) = v0, origin
+    qx, qy, qz = x - ox, y - oy, z - oz
+    first = cross(v2[0] - x, v2[1] - y, v2[2] - z, qx, qy, qz)
+    return first, cross(qx, qy, qz, v1[0] - x, v1[1] - y, v1[2] - z)
+
+
+@kernel
+def describe(surface: Surface, projection: Projection, m: int, count: int, records: Records) -> None:
+    """Fill the records of triangles that map `m` sees.
+
+    `count`: one past the last record. `records`: `face` is read, all else is written.
+    """
+    batch, fixed = records.batch, records.fixed
+    smooth = len(surface.normals) > 0
+    for base in range(1, count, BATCH):
+        size = min(BATCH, count - base)
+        _gather(surface, records.face, base, size, batch)
+        _orient(projection, m, batch)
+        if smooth and projection.kind == ORTHOGRAPHIC:
+            _mix_parallel(projection, m, batch)
+        elif smooth:
+            _mix_central(projection, m, batch)
+        columns = COLUMNS if smooth else MIXED
+        for b in range(size):
+            face = records.face[base + b]
+            material = surface.material_of_face[face]
+            records.material[base + b] = material
+            for channel in range(3):
+                batch[(INPUTS + ALBEDO + channel) * BATCH + b] = surface.diffuse[material, channel]
+        for b in range(size):
+            for column in range(columns):
+                fixed[base + b, column] = batch[(INPUTS + column) * BATCH + b]
+
+
+@kernel
+def _gather(surface: Surface, face_of: Array, base: int, size: int, batch: Array) -> None:
+    """Write corners and their normals: loads that wait for memory, many under way at once."""
+    vertices, faces, normals = surface.vertices, surface.faces, surface.normals
+    for b in range(size):
+        face = face_of[base + b]
+        for corner in range(3):
+            vertex = faces[face, corner]
+            for axis in range(3):
+                batch[(3 * corner + axis) * BATCH + b] = vertices[vertex, axis]
+    if len(normals) > 0:
+        for b in range(size):
+            face = face_of[base + b]
+            for corner in range(3):
+                vertex = faces[face, corner]
+                for axis in range(3):
+                    batch[(9 + 3 * corner + axis) * BATCH + b] = normals[vertex, axis]
+
+
+@kernel
+def _orient(projection: Projection, m: int, batch: Array) -> None:
+    """Write corner v0, N and the unit normal on the visible side, in SIMD lanes."""
+    ox, oy, oz = projection.origin[m, 0], projection.origin[m, 1], projection.origin[m, 2]
+    dx, dy, dz = projection.frame[m, 2, 0], projection.frame[m, 2, 1], projection.frame[m, 2, 2]
+    central = projection.kind != ORTHOGRAPHIC
+    for b in range(BATCH):
+        x, y, z = batch[b], batch[BATCH + b], batch[2 * BATCH + b]
+        gx, gy, gz = cross(batch[3 * BATCH + b] - x, batch[4 * BATCH + b] - y, batch[5 * BATCH + b] - z,
+                            batch[6 * BATCH + b] - x, batch[7 * BATCH + b] - y, batch[8 * BATCH + b] - z)  # fmt: skip
+        # from the surface to the eye; all of the plane has the eye on the same side
+        tx, ty, tz = (ox - x if central else -dx), (oy - y if central else -dy), (oz - z if central else -dz)
+        square = gx * gx + gy * gy + gz * gz
+        flat = not square > 0.0
+        nx, ny, nz = (tx if flat else gx), (ty if flat else gy), (tz if flat else gz)
+        scale = math.copysign(1.0 / math.sqrt(nx * nx + ny * ny + nz * nz), nx * tx + ny * ty + nz * tz)
+        at = INPUTS + CORNER
+        batch[at * BATCH + b], batch[(at + 1) * BATCH + b], batch[(at + 2) * BATCH + b] = x, y, z
+        at = INPUTS + PLANE
+        batch[at * BATCH + b], batch[(at + 1) * BATCH + b], batch[(at + 2) * BATCH + b] = gx, gy, gz
+        at, nx, ny, nz = INPUTS + NORMAL, nx * scale, ny * scale, nz * scale
+        batch[at * BATCH + b], batch[(at + 1) * BATCH + b], batch[(at + 2) * BATCH + b] = nx, ny, nz
+
+
+@kernel
+def _mix_central(projection: Projection, m: int, batch: Array) -> None:
+    """Write M of rays from one centre, in SIMD lanes."""
+    ox, oy, oz = projection.origin[m, 0], projection.origin[m, 1], projection.origin[m, 2]
+    for b in range(BATCH):
+        x, y, z = batch[b], batch[BATCH + b], batch[2 * BATCH + b]
+        ax, ay, az = batch[3 * BATCH + b], batch[4 * BATCH + b], batch[5 * BATCH + b]
+        bx, by, bz = batch[6 * BATCH + b], batch[7 * BATCH + b], batch[8 * BATCH + b]
+        gx, gy, gz = cross(ax - x, ay - y, az - z, bx - x, by - y, bz - z)
+        (ux, uy, uz), (vx, vy, vz) = barycentric_axes((x, y, z), (ax, ay, az), (bx, by, bz), (ox, oy, oz))
+        for axis in range(3):
+            first = batch[(9 + axis) * BATCH + b]
+            second, third = batch[(12 + axis) * BATCH + b] - first, batch[(15 + axis) * BATCH + b] - first
+            at = INPUTS + MIXED + 3 * axis
+            batch[at * BATCH + b] = gx * first + ux * second + vx * third
+            batch[(at + 1) * BATCH + b] = gy * first + uy * second + vy * third
+            batch[(at + 2) * BATCH + b] = gz * first + uz * second + vz * third
+
+
+@kernel
+def _mix_parallel(projection: Projection, m: int, batch: Array) -> None:
+    """Write M and K of parallel rays, in SIMD lanes."""
+    dx, dy, dz = projection.frame[m, 2, 0], projection.frame[m, 2, 1], projection.frame[m, 2, 2]
+    for b in range(BATCH):
+        x, y, z = batch[b], batch[BATCH + b], batch[2 * BATCH + b]
+        ax, ay, az = batch[3 * BATCH + b] - x, batch[4 * BATCH + b] - y, batch[5 * BATCH + b] - z
+        bx, by, bz = batch[6 * BATCH + b] - x, batch[7 * BATCH + b] - y, batch[8 * BATCH + b] - z
+        ux, uy, uz = cross(bx, by, bz, dx, dy, dz)
+        vx, vy, vz = cross(dx, dy, dz, ax, ay, az)
+        gx, gy, gz = cross(ax, ay, az, bx, by, bz)
+        facing = dx * gx + dy * gy + dz * gz
+        for axis in range(3):
+            first = batch[(9 + axis) * BATCH + b]
+            second, third = batch[(12 + axis) * BATCH + b] - first, batch[(15 + axis) * BATCH + b] - first
+            at = INPUTS + MIXED + 3 * axis
+            batch[at * BATCH + b] = ux * second + vx * third
+            batch[(at + 1) * BATCH + b] = uy * second + vy * third
+            batch[(at + 2) * BATCH + b] = uz * second + vz * third
+            batch[(INPUTS + CONSTANT + axis) * BATCH + b] = facing * first

@@ -94,7 +94,7 @@ def _paint_row(surface: Painted, projection: Projection, triangle_id: Array, row
         scratch.texture[first:column] = texture
         if texture >= 0:
             painted = True
-            _place(surface, projection, face, (row, first, column), first, scratch.place)
+            fill_places(surface, projection, face, (row, first, column), first, scratch.place)
     if painted:
         footprint_means(surface.table, scratch.texture, scratch.place, width, scratch.colour)
         for channel in range(3):
@@ -113,7 +113,7 @@ def _paint_texels(surface: Painted, projection: Projection, triangle_id: Array, 
         texture = surface.table.of_material[surface.material_of_face[face]] if face >= 0 else -1
         scratch.texture[k] = texture
         if texture >= 0:
-            _place(surface, projection, face, (row, column, column + 1), k, scratch.place)
+            fill_places(surface, projection, face, (row, column, column + 1), k, scratch.place)
     footprint_means(surface.table, scratch.texture, scratch.place, len(texel), scratch.colour)
     for k in range(len(texel)):
         if scratch.texture[k] >= 0:
@@ -123,8 +123,8 @@ def _paint_texels(surface: Painted, projection: Projection, triangle_id: Array, 
 
 
 @kernel
-def _place(surface: Painted, projection: Projection, face: int, run: tuple[int, int, int], at: int,
-           place: Array) -> None:
+def fill_places(surface: Painted, projection: Projection, face: int, run: tuple[int, int, int], at: int,
+                place: Array) -> None:
     """Fill the coordinates, and their changes, of a run of texels of a row that see one triangle.
 
     `run`: its row, first column and one past the last. `at`: where the first one's stand in `place`.

@@ -1,0 +1,84 @@
+"""Textures at the hits of rays: colour that a wall throws, by paths, by pixel lights and by hand."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from refgi.frame import Frame
+from refgi.lights.walk import walk_lights
+from refgi.rays import Tracer
+from refgi.scene import Image, light_table, material_table
+from refgi.settings import of
+from refgi.truth import TruthSettings
+from refgi.truth.surfaces import surfaces
+from refgi.truth.truth import trace_truth
+from refgi.truth.vpl import VplSettings, vpl
+from tests.naive import textures as naive
+from tests.textured import room
+
+DEVIATIONS = 4.0  # standard errors of a mean
+MAP = 4e-3  # of a map of 160 texels a side: its texels and their means
+SUM = 1e-12  # float64
+
+
+@pytest.mark.feature("REF-24")
+@pytest.mark.parametrize("chosen", ["nearest", "bilinear", "trilinear"])
+def test_colour_bleeds_as_every_texel_of_the_map_says(chosen: str, evidence: Callable[[str], None]) -> None:
+    """Means of six parts of the picture: left and right thirds see one colour of the wall more."""
+    frame = Frame(room(chosen), rsm_resolution=160)
+    found = trace_truth(frame, TruthSettings(samples=96))
+    lights = vpl(frame, of(VplSettings, pattern="grid", lights=6400, filtered=True))
+    worst = share = 0.0
+    for part in (slice(0, 13), slice(13, 27), slice(27, 40)):
+        mean, error = found.mean[:, :, part].mean(axis=(1, 2)), np.sqrt(
+            found.variance[:, :, part].sum(axis=(1, 2))) / found.mean[0, :, part].size
+        away = np.abs(lights[:, :, part].mean(axis=(1, 2)) - mean)
+        assert (away <= DEVIATIONS * error + MAP * mean).all()
+        worst, share = max(worst, float((away / mean).max())), max(share, float((error / mean).max()))
+    left, right = (found.mean[:, 30:, part].mean(axis=(1, 2)) for part in (slice(0, 13), slice(27, 40)))
+    assert left[0] > 1.3 * left[2]
+    assert right[2] > 1.3 * right[0]
+    evidence(f"{chosen}: off by {worst:.2%} of the mean at most, standard error {share:.2%}")
+
+
+@pytest.mark.feature("REF-24")
+def test_both_estimators_and_several_bounces_see_the_texture() -> None:
+    """A texture of one colour is that colour as the material's, to the bit of float64 reflectances."""
+    grey = Image(np.full((3, 5, 3), 0.5, np.float32))
+    scene = room(image=grey)
+    paint = scene.materials[1]
+    plain = dataclasses.replace(scene, materials=(scene.materials[0], dataclasses.replace(
+        paint, diffuse=(0.5, 0.5, 0.5), texture=None)))
+    for options in ({"samples": 16}, {"samples": 16, "bounces": 3}):
+        one, other = (trace_truth(Frame(each, width=16, height=16), TruthSettings(**options)).mean
+                      for each in (scene, plain))
+        np.testing.assert_allclose(one, other, rtol=1e-6)
+
+
+def test_light_paths_take_the_colour_of_the_point_they_meet(evidence: Callable[[str], None]) -> None:
+    picture = np.random.default_rng(2).random((6, 9, 3)).astype(np.float32)
+    scene = room("trilinear", Image(picture))
+    lights = walk_lights(Tracer(scene.geometry), scene.geometry, material_table(scene.materials),
+                         light_table(scene.lights), 64)
+    white = walk_lights(Tracer(scene.geometry), scene.geometry, material_table([
+        dataclasses.replace(one, texture=None) for one in scene.materials]), light_table(scene.lights), 64)
+    on_wall = np.flatnonzero(lights.position[2] < -1 + 1e-5)
+    assert len(on_wall) > 40
+    for k in on_wall:
+        x, y = lights.position[:2, k]
+        expected = white.flux[:, k] * naive.bilinear(picture, ("clamp", "clamp"), (x + 1) / 2, 1 - y / 2)
+        np.testing.assert_allclose(lights.flux[:, k], expected, rtol=1e-6)
+    others = np.setdiff1d(np.arange(64), on_wall)
+    np.testing.assert_array_equal(lights.flux[:, others], white.flux[:, others])
+
+
+def test_scenes_without_textures_have_none_in_their_kernels() -> None:
+    scene = room()
+    assert surfaces(scene).textures is not None
+    plain = dataclasses.replace(scene, materials=tuple(
+        dataclasses.replace(one, texture=None) for one in scene.materials))
+    assert surfaces(plain).textures is None
+    assert surfaces(plain).uv is None
+    assert Frame(plain).materials.textures is None

@@ -43,7 +43,7 @@ def _box_projection(scene: Scene) -> Array:
     u = np.take_along_axis(corner, ACROSS[axis][:, None, None], axis=2)[..., 0]
     v = np.take_along_axis(corner, DOWN[axis][:, None, None], axis=2)[..., 0]
     v = np.where((axis == 1)[:, None], v, -v)
-    return np.stack([u, v], axis=-1) / size[:, None, None]
+    return np.asarray(np.stack([u, v], axis=-1) / size[:, None, None])
 
 
 def _painted(material: Material, texels: int, seed: int) -> Material:

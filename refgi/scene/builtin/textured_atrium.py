@@ -13,8 +13,9 @@ from refgi.scene.builtin.atrium import atrium
 from refgi.scene.model import Array, Material, Scene
 from refgi.scene.texture import Image, Texture
 
+# of a picture, m
 SIZES = {"stone": 2.4, "column": 1.6, "plaster": 3.0, "dado": 1.2, "ceiling": 2.0, "pale_tile": 1.0, "dark_tile": 1.0,
-         "terracotta": 0.9, "leaf": 0.5, "red_cloth": 0.6, "green_cloth": 0.6, "blue_cloth": 0.6, "gold_cloth": 0.6}  # m
+         "terracotta": 0.9, "leaf": 0.5, "red_cloth": 0.6, "green_cloth": 0.6, "blue_cloth": 0.6, "gold_cloth": 0.6}
 ACROSS = np.array([2, 0, 0])  # axis of u for normals along x, y, z
 DOWN = np.array([1, 2, 1])  # axis of v; heights count downwards
 SMALLEST, LARGEST = 16, 8192  # texels along a side

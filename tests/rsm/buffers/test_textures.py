@@ -1,4 +1,4 @@
-"""Textures on maps: coordinates in perspective, footprints, the mean over a pixel of a checkered floor, flux of texels."""
+"""Textures on maps: coordinates in perspective, the mean over pixels of a checkered floor, flux of a light's texels."""
 
 import dataclasses
 import math
@@ -143,8 +143,9 @@ def test_a_checkered_floor_is_the_mean_over_each_pixel(evidence: Callable[[str],
         error[chosen] = (buffer.albedo[0] - exact)[seen]
     size = {chosen: float(np.sqrt((one**2).mean())) for chosen, one in error.items()}
     off = np.abs(error["trilinear"])
-    evidence(f"root mean square {size['trilinear']:.2%} (bilinear {size['bilinear']:.0%}, nearest {size['nearest']:.0%})"
-             f", mean {off.mean():.2%}, over 2 % in {(off > WITHIN).mean():.1%} of pixels, worst {off.max():.1%}")
+    evidence(f"root mean square {size['trilinear']:.2%} (bilinear {size['bilinear']:.0%}, nearest "
+             f"{size['nearest']:.0%}), mean {off.mean():.2%}, over 2 % in {(off > WITHIN).mean():.1%} of pixels, "
+             f"worst {off.max():.1%}")
     assert size["trilinear"] <= CHECKER
     assert (off > WITHIN).mean() <= RARE
     assert abs(error["trilinear"].mean()) <= 1e-3

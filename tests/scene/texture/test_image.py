@@ -79,7 +79,7 @@ def test_grey_and_palettes_of_few_bits() -> None:
     palette.putdata((grey % 4).ravel().tolist())
     for options in ({}, {"transparency": 1}, {"bits": 2}):
         assert np.array_equal(decoded(encoded(palette, **options), "c").pixels, colours[grey % 4])
-    bits = Pictures.fromarray((grey > 127))
+    bits = Pictures.fromarray(grey > 127)
     assert np.array_equal(decoded(encoded(bits), "d").pixels[..., 1], (grey > 127) * 255)
 
 

@@ -323,3 +323,12 @@ def test_a_textured_wall_absorbs_what_its_texels_leave():
     np.testing.assert_allclose(terms.absorbed, expected, rtol=1e-12)
     np.testing.assert_allclose(terms.absorbed + terms.reflected + terms.missed, terms.emitted, rtol=1e-6)
     assert rsm.albedo[0][seen].std() > 0.2
+
+
+def test_glass_beside_a_texture_absorbs_nothing():
+    scene = room()
+    glass = dataclasses.replace(scene, materials=(Material("glass", (0.0, 0.0, 0.0), ior=1.5), scene.materials[1]))
+    frame = Frame(glass, rsm_resolution=48, dtype=np.float64)
+    terms = light_terms(frame.rsms[0], frame.scene.geometry, frame.materials)
+    assert terms.glass.min() > 0.1
+    np.testing.assert_allclose(terms.absorbed + terms.glass + terms.reflected + terms.missed, terms.emitted, rtol=1e-6)

@@ -231,3 +231,26 @@ def test_errors_name_what_is_wrong():
         buffer(shape).resolve("colour")
     with pytest.raises(InputError, match="dtype: expected float32 or float64, got 'float16'"):
         buffer(shape, np.float16)
+
+
+@pytest.mark.parametrize("kind", ["camera", "paraboloid"])
+def test_triangles_seen_edge_on_lie_between_their_corners(kind):
+    """With the eye in a triangle's plane d . N is rounding or 0; its points must still have a depth of the triangle."""
+    rng, covered = np.random.default_rng(5), 0
+    for _ in range(600):
+        corners = rng.uniform(-1, 1, (3, 3))
+        eye, target = (3 * rng.dirichlet((1, 1, 1)) - 2 / 3) @ corners, rng.dirichlet((1, 1, 1)) @ corners
+        if kind == "camera":
+            view = camera_projection(Camera(tuple(eye), tuple(target), vfov=math.radians(40), width=7, height=3))
+            reach = (corners - eye) @ view.frame[0, 2]
+        else:
+            view = paraboloid_projection(eye[None], (target - eye)[None], 7)
+            reach = np.linalg.norm(corners - eye, axis=1)
+        shape = geometry(corners, np.array([[0, 1, 2]], np.int32))
+        seen = GBuffer(shape, material_table(MATERIALS), view, rasterize(shape, view), np.float64)
+        here = seen.covered
+        covered += np.count_nonzero(here)
+        least = max(reach.min(), 0) if kind == "camera" else 0
+        assert ((seen.depth[here] >= least - 1e-15) & (seen.depth[here] <= reach.max() + 1e-15)).all()
+        assert np.isfinite(seen.position).all()
+    assert covered > 100

@@ -237,7 +237,7 @@ def test_errors_name_what_is_wrong():
 def test_triangles_seen_edge_on_lie_between_their_corners(kind):
     """With the eye in a triangle's plane d . N is rounding or 0; its points must still have a depth of the triangle."""
     rng, covered = np.random.default_rng(5), 0
-    for _ in range(600):
+    for _ in range(150):
         corners = rng.uniform(-1, 1, (3, 3))
         eye, target = (3 * rng.dirichlet((1, 1, 1)) - 2 / 3) @ corners, rng.dirichlet((1, 1, 1)) @ corners
         if kind == "camera":
@@ -253,4 +253,4 @@ def test_triangles_seen_edge_on_lie_between_their_corners(kind):
         least = max(reach.min(), 0) if kind == "camera" else 0
         assert ((seen.depth[here] >= least - 1e-15) & (seen.depth[here] <= reach.max() + 1e-15)).all()
         assert np.isfinite(seen.position).all()
-    assert covered > 100
+    assert covered > 25

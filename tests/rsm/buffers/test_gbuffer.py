@@ -116,6 +116,19 @@ def test_channels_of_maps_equal_those_of_a_literal_twin(name, kind):
     assert len(compared) >= {"orthographic": 1, "cube": 4, "paraboloid": 2, "wide": 2}[kind]  # maps and tiles
 
 
+@pytest.mark.parametrize("order", ["sorted", "as drawn"])
+def test_texels_of_several_maps_are_those_of_the_whole(order):
+    """Maps with centres of their own."""
+    shape, projection = shapes()["smooth"], maps()["paraboloid"]
+    visibility, materials = rasterize(shape, projection), material_table(MATERIALS, np.float64)
+    texel = np.random.default_rng(2).choice(2 * 22 * 22, 120, replace=False)
+    texel = np.sort(texel) if order == "sorted" else texel
+    some = GBuffer(shape, materials, projection, visibility, np.float64).at(texel, *CHANNELS)
+    whole = GBuffer(shape, materials, projection, visibility, np.float64).resolve(*CHANNELS)
+    for part, full in zip(some, whole, strict=True):
+        np.testing.assert_array_equal(part, full.reshape(*full.shape[:-2], -1)[..., texel])
+
+
 def test_the_same_bits_for_any_threads_and_tiles():
     """Texels alone, which know of no tile, have the bits of pictures of several tiles a row and a column."""
     rng = np.random.default_rng(9)

@@ -80,7 +80,7 @@ def fill_errors(bound: Array, count: int, group: Array, least: Any, most: Any, e
     `group` is of `bound_group`, `least` (m^2) and `most` (1/m^2) those of `Clamp`.
     """
     real = bound.dtype.type
-    zero, half, one, tiny = real(0.0), real(0.5), real(1.0), real(LEAST_SQUARE)
+    zero, half, one, two, tiny = real(0.0), real(0.5), real(1.0), real(2.0), real(LEAST_SQUARE)
     rounding, inflation = real(ROUNDING) * real(np.finfo(bound.dtype).eps), real(INFLATION)
     curvature, slope, four, eight = real(CURVATURE), real(SLOPE), real(4.0), real(8.0)
     x, y, z, gx, gy, gz = group[0], group[1], group[2], group[3], group[4], group[5]
@@ -120,7 +120,13 @@ def fill_errors(bound: Array, count: int, group: Array, least: Any, most: Any, e
         bend = half * (bend if bend < curvature else curvature)
         smooth = (bound[TILT, k] * b + (slope * bound[SHIFT, k] + (bend * bound[SPREAD, k] + bound[UNEVEN, k]) * root)
                   * root) * inverse
-        steady = (along - swing > margin) & (over - tilt > margin) & (square >= least) & (term <= most)
-        error = inflation * (smooth if steady & (smooth < whole) else whole)
+        # what a plane through the cluster leaves of one cosine, where it may pass through it
+        bent, sunk = height + bound[TURN, k] * reach + margin, c * height + (s + turned) * radius + margin
+        kink_a, kink_b = bent * two * root, sunk * two * root
+        kink_a = (kink_a if kink_a < a else a) * b if along - swing < bent else zero
+        kink_b = (kink_b if kink_b < b else b) * a if over - tilt < sunk else zero
+        kink = bound[WEIGHT, k] * inverse * (kink_a if kink_a > kink_b else kink_b)
+        smooth = smooth if smooth > kink else kink
+        error = inflation * (smooth if (square >= least) & (term <= most) & (smooth < whole) else whole)
         error = error if error >= zero else real(np.inf)  # not a number: beyond the range of these
         errors[k] = error if reached else zero

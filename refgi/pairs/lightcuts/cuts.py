@@ -81,7 +81,7 @@ def _sum_group(tile: Array, size: int, tree: LightTree, pairs: Array, g: int, P:
             for i in range(found):
                 nodes.node[i], nodes.level[i] = left[depth - 1, i], left_level[depth - 1, i]
             _evaluate(tree, nodes, found, group)
-        splits = end - begin > LANES and depth < DEPTHS - 1
+        splits = end - begin > P[5] and depth < DEPTHS - 1
         if allowed == 0.0:
             threshold, before = np.inf, 0
             while found < LOOKN:

@@ -5,6 +5,7 @@ the widest side of their box, until a part fits a tile of the kernels: a group. 
 half, quarter and so on of a group is compact by itself.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ Array = npt.NDArray[Any]
 
 STRETCH = 16 * TILE  # receivers that follow each other in a call, among which groups are formed
 LANES = 8  # the least part of a group; all but a group's last part are multiples of it
+THICK = 0.2  # height over the widest side, likewise: surfaces behind each other
 TURNED = 0.5  # range of a component of the normals from which on they are told apart first
 
 
@@ -44,6 +46,7 @@ def _form(position: Array, normal: Array, order: Array, starts: Array) -> None:
             waiting -= 1
             begin, end, inside = begins[waiting], ends[waiting], grouped[waiting]
             row, turned = _widest(keys, begin, end)
+            turned = turned or (not inside and _thick(keys, begin, end, row))
             if not inside and end - begin <= TILE and not turned:
                 inside = starts[first + begin] = True
             if end - begin <= LANES:
@@ -78,6 +81,23 @@ def _widest(keys: Array, begin: int, end: int) -> Any:
     row = 3 + np.argmax(ranges[3:])
     turned = ranges[row] > keys.dtype.type(TURNED)
     return (row, turned) if turned else (np.argmax(ranges[:3]), turned)
+
+
+@kernel
+def _thick(keys: Array, begin: int, end: int, row: int) -> bool:
+    """Return whether receivers are far off the plane through the first of them, beside their widest side."""
+    real = keys.dtype.type
+    nx, ny, nz = real(0.0), real(0.0), real(0.0)
+    low = high = keys[row, begin]
+    for i in range(begin, end):
+        nx, ny, nz = nx + keys[3, i], ny + keys[4, i], nz + keys[5, i]
+        low, high = min(low, keys[row, i]), max(high, keys[row, i])
+    least = most = real(0.0)
+    for i in range(begin, end):
+        height = (nx * (keys[0, i] - keys[0, begin]) + ny * (keys[1, i] - keys[1, begin])
+                  + nz * (keys[2, i] - keys[2, begin]))
+        least, most = min(least, height), max(most, height)
+    return bool(most - least > real(THICK) * (high - low) * math.sqrt(nx * nx + ny * ny + nz * nz))
 
 
 @kernel

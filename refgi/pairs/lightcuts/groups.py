@@ -19,7 +19,7 @@ Array = npt.NDArray[Any]
 STRETCH = 16 * TILE  # receivers that follow each other in a call, among which groups are formed
 LANES = 8  # the least part of a group; all but a group's last part are multiples of it
 THICK = 0.2  # height over the widest side, likewise: surfaces behind each other
-TURNED = 0.5  # range of a component of the normals from which on they are told apart first
+TURNED = 0.3  # range of a component of the normals from which on they are told apart first
 
 
 def group_receivers(position: Array, normal: Array) -> tuple[Array, Array]:

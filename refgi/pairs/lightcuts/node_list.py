@@ -66,14 +66,14 @@ def evaluate(tree: LightTree, nodes: Nodes, count: int, group: Array) -> None:
 
 @kernel
 def refine(tree: LightTree, nodes: Nodes, count: int, threshold: float, group: Array, radius: float) -> int:
-    """Replace nodes by their children, and these by theirs, whose bound and radius are above these; return how many."""
+    """Replace nodes by their children, and these by theirs, whose bound is above and radius at least these; return how many."""
     real = tree.nodes.dtype.type
     limit, width = real(threshold), real(radius)
     at, size = 0, count
     while at < size:
         taken = 0
         while at < size and taken < len(nodes.opened):
-            if nodes.error[at] > limit and nodes.radius[at] > width:
+            if nodes.error[at] > limit and nodes.radius[at] >= width:
                 nodes.opened[taken] = at
                 taken += 1
             at += 1

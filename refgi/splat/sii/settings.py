@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 from refgi.errors import expect
 from refgi.lights.settings import LightSettings, MapLights, clamped_pairs, expect_footprints
-from refgi.pairs.settings import LAST_SEED, PairSettings
+from refgi.pairs.settings import LAST_SEED, Lightcuts, PairSettings, SphereClamp
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
 
@@ -109,11 +109,16 @@ class SiiSettings(Settings):
     lights: LightSettings = setting(LightSettings(), "pixel lights")
     pairs: PairSettings = setting(PairSettings(), "how one light lights one receiver")
     reach: ReachSettings = setting(ReachSettings(), "how far a light reaches")
+    lightcuts: Lightcuts | None = setting(None, "diffuse lights are summed by clusters, to an error")
     half_resolution: bool = setting(False, "evaluate one pixel of 2 x 2 and upsample by a joint bilateral filter")
 
     def check(self) -> None:
         """Check what fields ask of each other."""
         expect_footprints(self.lights, self.pairs)
+        expect(self.lightcuts is None or self.reach.cut is None, "reach.cut", "none with lightcuts", self.reach.cut
+               and self.reach.cut.name())
+        expect(self.lightcuts is None or not isinstance(self.pairs.clamp, SphereClamp), "pairs.clamp",
+               "another one with lightcuts, which bound no spheres", "sphere")
         expect(not (self.half_resolution and self.reach.on_screen), "reach.bound",
                "one in space, not on the screen, at half resolution", self.reach.bound.name())
 

@@ -44,6 +44,7 @@ def test_clusters_are_summed():
     """Far from the lights a few clusters do, at an error that is seen; near to what is asked nearly all lights do."""
     lights, _, points = scene("floor", 20000, 512, dtype=np.float64)
     points.position[1] += 3.0
+    points.normal[:] = [[[0.0]], [[-1.0]], [[0.0]]]
     full = irradiance(points, lights, PairSettings(clamp=None))
     found = []
     for error in (1e-6, 1e-3, 0.1):
@@ -51,8 +52,8 @@ def test_clusters_are_summed():
             got = irradiance(points, lights, PairSettings(clamp=None), None, Lightcuts(error))
         found.append((log.counts["pairs"], off_by(got, full)))
     (many, least), (some, little), (few, most) = found
-    assert few < some < many
-    assert few < 0.02 * 20000 * 512
+    assert few <= some < many
+    assert few < 0.03 * 20000 * 512
     assert least <= little <= most <= 0.1
     assert most > 1e-7
 

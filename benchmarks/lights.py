@@ -27,7 +27,7 @@ from refgi.settings import of
 from refgi.splat import MultiresSettings, SiiSettings, multires
 
 SCENES = ("cornell_box", "stage", "ring", "metaballs", "sponza", "kitchen")
-COUNTS = tuple(4**power for power in range(4, 11))
+COUNTS = tuple(16**power for power in range(2, 6))
 TILES = 12  # of the full sum
 ERRORS = (0.02, 0.1)
 
@@ -47,7 +47,7 @@ def rows(quick: bool) -> Iterator[Row]:
         if path is None and name in ("sponza", "kitchen"):
             continue
         frame = Frame(load_scene(path or name), width=size, height=size, rsm_resolution=1024)
-        for count in COUNTS[:4] if quick else COUNTS:
+        for count in COUNTS[:2] if quick else COUNTS:
             yield from _of_count(name, frame, count, repeats)
 
 
@@ -66,7 +66,7 @@ def _of_count(name: str, frame: Frame, count: int, repeats: int) -> Iterator[Row
     some = (tiles[:, None] + np.arange(TILE)).reshape(-1)
     here, facing = np.ascontiguousarray(points[:, some]), np.ascontiguousarray(normals[:, some])
     share = len(places) / len(some)
-    for error in ERRORS:
+    for error in ERRORS if count == COUNTS[-1] else ERRORS[:1]:
         def clustered(error: float = error) -> Any:
             return _sums(points, normals, with_tree(packed, Lightcuts(error)))
 
@@ -123,7 +123,7 @@ def draw(folder: Path) -> Path:
 
     found = json.loads((folder / "results.json").read_text())
     figure, axes = plt.subplots(1, 2, figsize=(11, 4.5))
-    for row in found["topics"]["lights"]:
+    for row in found["results"]["lights"]:
         name, _, what = row["name"].partition(": ")
         if what != "time":
             continue

@@ -33,7 +33,7 @@ from refgi.stages import stage, tally
 Array = npt.NDArray[Any]
 
 DEPTHS = 4  # of halving
-UNDIVIDED = 48  # receivers of a group that is not halved
+UNDIVIDED = 96  # receivers of a group that is not halved
 LOOK = 96  # nodes of a cut whose sum is the first estimate of a group's irradiance
 SHARE = 512.0  # a group with halves accepts what may be off by 1 / SHARE of what is allowed to the sum
 FEW = 24  # nodes for whose sake no group is halved
@@ -41,6 +41,8 @@ NEAR = 4.0  # a node this many times as wide as a group is opened, a smaller one
 CONTRAST = 4.0  # of a group's estimated irradiance, above which halves look for themselves
 SPENT = 0.9  # of what is allowed: if so much was accepted before, a half begins anew
 FIRST = 3.0  # of a first threshold, in what is allowed to each node
+STEPS = 0.05, 0.8  # of a threshold, where the next may lie
+LARGER = 2.0  # than the last threshold of a half, the first of the next
 LOWER = 0.7  # of the largest bound, at which a threshold lies at most
 
 
@@ -104,7 +106,7 @@ def _sum_group(tile: Array, size: int, tree: LightTree) -> int:
     halves = Halves(np.zeros((DEPTHS + 2, 3), np.int64), np.empty((DEPTHS, most), np.int32),
                     np.empty((DEPTHS, most), np.int8), np.zeros(DEPTHS, np.int64), np.zeros(DEPTHS), np.zeros(DEPTHS))
     nodes, group, kept = empty_list(tree), np.zeros(9, tile.dtype), np.empty((6, TILE), tile.dtype)
-    halves.span[0, 1], waiting, pairs = size, 1, 0
+    halves.span[0, 1], waiting, pairs, guess = size, 1, 0, np.zeros(1)
     while waiting > 0:
         waiting -= 1
         begin, end, depth = halves.span[waiting, 0], halves.span[waiting, 1], halves.span[waiting, 2]
@@ -140,7 +142,7 @@ def _sum_group(tile: Array, size: int, tree: LightTree) -> int:
             halves.allowed[depth] = allowed if is_even else 0.0
             waiting = _halve(halves, waiting)
         else:
-            pairs += _finish(tile, begin, end, tree, nodes, count, group, spent, allowed, kept)
+            pairs += _finish(tile, begin, end, tree, nodes, count, group, spent, allowed, kept, guess)
     return pairs
 
 
@@ -185,14 +187,17 @@ def _halve(halves: Halves, waiting: int) -> int:
 @kernel
 def _finish(
     tile: Array, begin: int, end: int, tree: LightTree, nodes: Nodes, count: int, group: Array, spent: float,
-    allowed: float, kept: Array,
+    allowed: float, kept: Array, guess: Array,
 ) -> int:
     """Refine a list until its bounds suffice for receivers begin to end - 1, and add it; return the pairs it took.
 
-    `spent` are the bounds of what they have, `allowed` is an estimate of the largest sum of all.
+    `spent` are the bounds of what they have, `allowed` is an estimate of the largest sum of all, and `guess` (1,)
+    the first threshold over it, which is set for the next half; 0: not known.
     """
-    pairs, factor = 0, FIRST
+    pairs, first = 0, FIRST * (allowed - spent) / max(count, LOOK)
+    threshold = max(guess[0] * allowed, 0.0) if guess[0] > 0.0 else first
     copy_totals(tile, begin, end, kept)
+    count = refine(tree, nodes, count, threshold, group, 0.0)
     while True:
         total = spent + sum_of_errors(nodes, count)
         if total <= allowed:
@@ -201,14 +206,17 @@ def _finish(
             least, _ = extremes(tile, begin, end)
             allowed = tree.error * least / (1.0 + tree.error)
             if total <= allowed:
+                guess[0] = LARGER * threshold / allowed if allowed > 0.0 else 0.0
                 return pairs
             restore_totals(tile, begin, end, kept)
         if spent > SPENT * allowed:  # what was accepted before is too much
             kept[:], spent = 0, 0.0
             restore_totals(tile, begin, end, kept)
             count = list_top(tree, nodes, group)
+            threshold = min(threshold, allowed)
         else:
-            largest = largest_error(nodes, count)
-            if largest == 0.0:  # all that is left are lights: their sum is what it is
-                allowed = np.inf
-            count = refine(tree, nodes, count, min(factor * (allowed - spent) / count, LOWER * largest), group, 0.0)
+            # the sum of bounds goes about with the root of the threshold
+            share = (allowed - spent) / (total - spent)
+            threshold *= min(max(share * share, STEPS[0]), STEPS[1])
+            threshold = min(threshold, LOWER * largest_error(nodes, count))
+        count = refine(tree, nodes, count, threshold, group, 0.0)

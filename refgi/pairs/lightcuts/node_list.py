@@ -82,8 +82,17 @@ def refine(tree: LightTree, nodes: Nodes, count: int, threshold: float, group: A
         fill_errors(nodes.bound, taken * FAN, group, tree.least, tree.most, nodes.found)
         for t in range(taken):
             size = _append_children(tree, nodes, t, size)
-    kept = 0
-    for i in range(size):
+    return _close_up(nodes, size)
+
+
+@kernel
+def _close_up(nodes: Nodes, size: int) -> int:
+    """Drop the places marked by -1; return how many nodes are left."""
+    first = 0
+    while first < size and nodes.node[first] >= 0:
+        first += 1
+    kept = first
+    for i in range(first, size):
         if nodes.node[i] >= 0:
             nodes.node[kept], nodes.level[kept] = nodes.node[i], nodes.level[i]
             nodes.error[kept], nodes.radius[kept] = nodes.error[i], nodes.radius[i]
@@ -96,10 +105,11 @@ def _load_children(tree: LightTree, nodes: Nodes, t: int) -> None:
     i = nodes.opened[t]
     level = np.int64(nodes.level[i])
     if level > 1:
-        block = block_of(tree.starts, level - 1, np.int64(nodes.node[i]) - tree.starts[level])
-        for row in range(BOUND_ROWS):
-            for k in range(FAN):
-                nodes.bound[row, FAN * t + k] = tree.bounds[block, row, k]
+        block = tree.bounds[block_of(tree.starts, level - 1, np.int64(nodes.node[i]) - tree.starts[level])]
+        first = np.uint64(FAN * t)  # unsigned, which needs no check for places counted from the end
+        for row in range(np.uint64(BOUND_ROWS)):
+            for k in range(np.uint64(FAN)):
+                nodes.bound[row, first + k] = block[row, k]
 
 
 @kernel
@@ -123,16 +133,24 @@ def _append_children(tree: LightTree, nodes: Nodes, t: int, size: int) -> int:
 @kernel
 def sum_of_errors(nodes: Nodes, count: int) -> float:
     """Return the sum of the first `count` bounds, W/m^2."""
-    total = 0.0
-    for i in range(count):
-        total += nodes.error[i]
-    return total
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0  # four at a time, so that one addition need not wait for another
+    rest = count // 4 * 4
+    for i in range(0, rest, 4):
+        a, b = a + nodes.error[i], b + nodes.error[i + 1]
+        c, d = c + nodes.error[i + 2], d + nodes.error[i + 3]
+    for i in range(rest, count):
+        a += nodes.error[i]
+    return (a + b) + (c + d)
 
 
 @kernel
 def largest_error(nodes: Nodes, count: int) -> float:
     """Return the largest of the first `count` bounds, W/m^2."""
-    largest = 0.0
-    for i in range(count):
-        largest = max(largest, np.float64(nodes.error[i]))
-    return largest
+    a = b = c = d = nodes.error.dtype.type(0.0)
+    rest = count // 4 * 4
+    for i in range(0, rest, 4):
+        p, q, r, s = nodes.error[i], nodes.error[i + 1], nodes.error[i + 2], nodes.error[i + 3]
+        a, b, c, d = p if p > a else a, q if q > b else b, r if r > c else c, s if s > d else d
+    for i in range(rest, count):
+        a = nodes.error[i] if nodes.error[i] > a else a
+    return np.float64(max(max(a, b), max(c, d)))

@@ -66,7 +66,7 @@ def sample_for(receivers: Receivers, lights: "PixelLights", *, least: int = LEAS
 def thinned(lights: "PixelLights", footprint: Array | None) -> tuple["PixelLights", Array | None]:
     """Return one of every few lights, THINNED or more, and their areas: enough for the share of a loss."""
     step = max(1, lights.flux.shape[1] // THINNED)
-    some = {name: None if value is None else value[..., ::step] for name, value in lights._asdict().items()
+    some: dict[str, Any] = {name: None if value is None else value[..., ::step] for name, value in lights._asdict().items()
             if name != "drawn"}
     return lights._replace(**some), None if footprint is None else footprint[::step]
 

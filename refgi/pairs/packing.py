@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
-from refgi.pairs.lobe_shape import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
 from refgi.pairs.lightcuts.tree import LightTree, light_tree
+from refgi.pairs.lobe_shape import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
 from refgi.pairs.pair_sum import Clamp
 from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, Lightcuts, PairSettings, SphereClamp
 from refgi.skips import left_out

@@ -52,7 +52,7 @@ class Halves(NamedTuple):
     span: Array  # (DEPTHS + 2, 3) int64: first receiver, one past the last, and depth
     node: Array  # (DEPTHS, n) int32
     level: Array  # (DEPTHS, n) int8
-    count: Array  # (DEPTHS,) int64
+    number: Array  # (DEPTHS,) int64
     spent: Array  # (DEPTHS,) bounds of what was accepted so far, W/m^2
     allowed: Array  # (DEPTHS,) estimated largest sum of bounds, W/m^2; 0: not known
 
@@ -115,7 +115,7 @@ def _sum_group(tile: Array, size: int, tree: LightTree) -> int:
         if depth == 0:
             count = list_top(tree, nodes, group)
         else:
-            count, spent, allowed = halves.count[depth - 1], halves.spent[depth - 1], halves.allowed[depth - 1]
+            count, spent, allowed = halves.number[depth - 1], halves.spent[depth - 1], halves.allowed[depth - 1]
             for i in range(count):
                 nodes.node[i], nodes.level[i] = halves.node[depth - 1, i], halves.level[depth - 1, i]
             evaluate(tree, nodes, count, group)
@@ -138,7 +138,7 @@ def _sum_group(tile: Array, size: int, tree: LightTree) -> int:
             pairs += (count - left) * (end - begin)
             halves.node[depth, :left], halves.level[depth, :left] = nodes.node[count - left : count], nodes.level[
                 count - left : count]
-            halves.count[depth], halves.spent[depth] = left, spent
+            halves.number[depth], halves.spent[depth] = left, spent
             halves.allowed[depth] = allowed if is_even else 0.0
             waiting = _halve(halves, waiting)
         else:

@@ -23,7 +23,7 @@ TURNED = 0.3  # range of a component of the normals from which on they are told 
 
 
 def group_receivers(position: Array, normal: Array) -> tuple[Array, Array]:
-    """Return the receivers (3, n), in the order of groups, (n,) int64, and the first of each group, with n at the end."""
+    """Return the order of receivers (3, n) by groups, (n,) int64, and the first of each group, with n at the end."""
     count = position.shape[1]
     order, starts = np.arange(count), np.zeros(count, np.bool_)
     _form(position, normal, order, starts)
@@ -78,9 +78,9 @@ def _widest(keys: Array, begin: int, end: int) -> Any:
             value = keys[row, i]
             least, most = value if value < least else least, value if value > most else most
         ranges[row] = most - least
-    row = 3 + np.argmax(ranges[3:])
-    turned = ranges[row] > keys.dtype.type(TURNED)
-    return (row, turned) if turned else (np.argmax(ranges[:3]), turned)
+    widest = 3 + np.argmax(ranges[3:])
+    turned = ranges[widest] > keys.dtype.type(TURNED)
+    return (widest, turned) if turned else (np.argmax(ranges[:3]), turned)
 
 
 @kernel

@@ -66,7 +66,7 @@ def evaluate(tree: LightTree, nodes: Nodes, count: int, group: Array) -> None:
 
 @kernel
 def refine(tree: LightTree, nodes: Nodes, count: int, threshold: float, group: Array, radius: float) -> int:
-    """Replace nodes by their children, and these by theirs, whose bound is above and radius at least these; return how many."""
+    """Replace nodes of a bound above and a radius of at least these by their children, and so on; return how many."""
     real = tree.nodes.dtype.type
     limit, width = real(threshold), real(radius)
     at, size = 0, count

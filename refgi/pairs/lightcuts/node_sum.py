@@ -35,7 +35,7 @@ def add_nodes(tile: Array, begin: int, end: int, tree: LightTree, chosen: Array,
 
 
 @kernel
-def _load(nodes: Array, k: int) -> Any:
+def _load(nodes: Array, k: Any) -> Any:
     return (nodes[k, 0], nodes[k, 1], nodes[k, 2], nodes[k, 3], nodes[k, 4], nodes[k, 5], nodes[k, 6], nodes[k, 7],
             nodes[k, 8])
 

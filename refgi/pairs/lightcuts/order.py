@@ -20,7 +20,7 @@ SHARED = 7  # levels of halving at which threads share the sets of one level; be
 
 
 def compact_order(lights: Array, count: int) -> Array:
-    """Return the order of the first `count` packed lights (rows 0 to 5 position and reversed normal), (count,) int32."""
+    """Return the order of the first `count` packed lights (rows 0 to 5: position, reversed normal), (count,) int32."""
     keys, order = np.empty((count, 6), np.float32), np.arange(count, dtype=np.int32)
     if count == 0:
         return order

@@ -88,8 +88,16 @@ def level_starts(count: int) -> Array:
     return np.array(starts, np.int64)
 
 
+def tree_bytes(count: int, float_bytes: int, threads: int) -> int:
+    """Return the memory of a tree over `count` lights, of its build and of the lists of each thread, at most, bytes."""
+    nodes = 4 * count // 3 + 64
+    of_lists = 2 * nodes * (5 + 2 * float_bytes) + 4 * count * 5
+    return nodes * COLUMNS * float_bytes + (nodes - count) * (BOUND_ROWS * float_bytes + 16) + count * 28 + (
+        threads * of_lists)
+
+
 @kernel
-def block_of(starts: Array, level: int, parent: int) -> int:
+def block_of(starts: Array, level: Any, parent: Any) -> Any:
     """Return the block of bounds of the children, of level `level` >= 1, of their level's parent number `parent`."""
     return (starts[level] - starts[1]) // FAN + level - 1 + parent
 

@@ -38,7 +38,8 @@ def sii_ledger(frame: "Frame", settings: SiiSettings) -> Ledger:
 
     Notes
     -----
-    Lights are summed in full, without lightcuts. On the Cornell box at 512 x 512 it takes six times as long as the picture.
+    Lights are summed in full, without lightcuts.
+    On the Cornell box at 512 x 512 it takes six times as long as the picture.
     """
     settings = dataclasses.replace(with_clamp(settings), lightcuts=None)
     footprint = footprints(frame, settings.lights, settings.pairs)

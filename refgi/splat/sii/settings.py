@@ -7,7 +7,10 @@ import dataclasses
 from typing import ClassVar, Literal
 
 from refgi.errors import expect
-from refgi.lights.settings import LightSettings, MapLights, clamped_pairs, expect_footprints
+from refgi.jit import most_threads
+from refgi.lights.settings import LightSettings, MapLights, clamped_pairs, expect_footprints, most_lights
+from refgi.method import Extent
+from refgi.pairs.lightcuts.tree import tree_bytes
 from refgi.pairs.settings import LAST_SEED, Lightcuts, PairSettings, SphereClamp
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
@@ -131,6 +134,26 @@ class SiiSettings(Settings):
     def effective_pairs(self) -> PairSettings:
         """The pairs in use: the clamp "auto" is "disc", and none where lights have no footprints."""
         return clamped_pairs(self.lights, self.pairs)
+
+
+def extra_bytes(settings: SiiSettings, extent: Extent) -> int:
+    """Estimate the memory that lightcuts add to a picture.
+
+    Parameters
+    ----------
+    settings : SiiSettings
+        Whether there are any, and of how many lights.
+    extent : Extent
+        Of the picture and the maps.
+
+    Returns
+    -------
+    int
+        Bytes, rather too many than too few.
+    """
+    if settings.lightcuts is None:
+        return 0
+    return tree_bytes(most_lights(settings.lights, extent.maps, extent.texels), extent.float_bytes, most_threads())
 
 
 # 768 lights by a filtered look-up of the flux (Sec. 4), a cut of 5 % (Fig. 12), the ellipsoids of the appendix

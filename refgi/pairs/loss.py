@@ -66,8 +66,8 @@ def sample_for(receivers: Receivers, lights: "PixelLights", *, least: int = LEAS
 def thinned(lights: "PixelLights", footprint: Array | None) -> tuple["PixelLights", Array | None]:
     """Return one of every few lights, THINNED or more, and their areas: enough for the share of a loss."""
     step = max(1, lights.flux.shape[1] // THINNED)
-    some: dict[str, Any] = {name: None if value is None else value[..., ::step] for name, value in lights._asdict().items()
-            if name != "drawn"}
+    every = {name: value for name, value in lights._asdict().items() if name != "drawn" and value is not None}
+    some: dict[str, Any] = {name: value[..., ::step] for name, value in every.items()}
     return lights._replace(**some), None if footprint is None else footprint[::step]
 
 

@@ -193,12 +193,12 @@ class MultiresSettings(Settings):
 
     lights: LightSettings = setting(LightSettings(count=256, source=MapLights(pattern="grid")), "pixel lights")
     pairs: PairSettings = setting(PairSettings(), "how one light lights one subsplat")
-    lightcuts: AutoLightcuts | Lightcuts | None = setting(
-        AutoLightcuts(), "diffuse lights are summed by clusters, to an error; auto: with subsplats 'error' and many")
     subsplats: ByGeometry | ByIrradiance | ByError = setting(ByGeometry(), "what subsplats are refined by")
     detail: float = setting(0.0, "a of Eq. 3: darkens what turns away from the camera", least=0.0, most=1.0, study=True)
     supersampled: bool = setting(False, "rendered at twice the width and height (Sec. 4)")
     as_published: frozenset[str] = setting(frozenset(), "forms of the method to use as printed", study=True)
+    lightcuts: AutoLightcuts | Lightcuts | None = setting(
+        AutoLightcuts(), "diffuse lights are summed by clusters, to an error; auto: with subsplats 'error' and many")
 
     def check(self) -> None:
         """Check what lights, pairs and subsplats ask of each other."""

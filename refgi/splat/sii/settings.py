@@ -112,8 +112,8 @@ class SiiSettings(Settings):
     lights: LightSettings = setting(LightSettings(), "pixel lights")
     pairs: PairSettings = setting(PairSettings(), "how one light lights one receiver")
     reach: ReachSettings = setting(ReachSettings(), "how far a light reaches")
-    lightcuts: Lightcuts | None = setting(None, "diffuse lights are summed by clusters, to an error")
     half_resolution: bool = setting(False, "evaluate one pixel of 2 x 2 and upsample by a joint bilateral filter")
+    lightcuts: Lightcuts | None = setting(None, "diffuse lights are summed by clusters, to an error")
 
     def check(self) -> None:
         """Check what fields ask of each other."""

@@ -244,7 +244,8 @@ def _largest_ratio(samples: ErrorSamples, sampled: Array) -> float:
     """Return what the RMSE over the mean is at most of an error that each receiver's sum of channels bounds.
 
     The squares of three channels' errors add up to at most the square of their sum, so the RMSE is at most sqrt(3)
-    times the error times the root mean square of light over its mean, at its upper bound from samples; infinite in the dark.
+    times the error times the root mean square of light over its mean, at its upper bound from samples; infinite
+    in the dark.
     """
     light = sampled.mean(axis=0, dtype=np.float64)
     average, uncertainty = estimate_mean(samples, sampled)

@@ -73,6 +73,8 @@ def _of_count(name: str, frame: Frame, count: int, repeats: int) -> Iterator[Row
         def full() -> Any:
             return _sums(here, facing, packed)
 
+        if count == COUNTS[0]:
+            clustered()  # compiles
         (of_full, expected), (of_cuts, got) = _in_turn(full, clustered, repeats)
         off = got[:, some].astype(np.float64) - expected
         total = expected.sum(axis=0, dtype=np.float64)
@@ -102,7 +104,7 @@ def _sums(points: Any, normals: Any, packed: Packed) -> Any:
 
 
 def _in_turn(a: Callable[[], Any], b: Callable[[], Any], repeats: int) -> list[tuple[Cost, Any]]:
-    """Run A and B in turn, after one warm-up each where that is short, and return their times and results."""
+    """Run A and B in turn and return their times and results."""
     times: list[list[float]] = [[], []]
     results: list[Any] = [None, None]
     for _ in range(repeats):

@@ -295,11 +295,11 @@ def test_lightcuts_are_part_of_an_error(monkeypatch):
     auto = Case({}).settings(MultiresSettings, {"lights.count": 3000, **keys})
     with observe() as log:
         picture = multires(frame, auto)[:, covered]
-    assert "pairs.lightcuts" in {run.stage for run in log.runs}
+    assert "pairs.lightcuts" in {run.name for run in log.runs}
     assert np.sqrt(((picture - full) ** 2).mean()) < 0.05 * full.mean()
     with observe() as log:
         multires(frame, cut(**keys))
-    assert "pairs.lightcuts" not in {run.stage for run in log.runs}
+    assert "pairs.lightcuts" not in {run.name for run in log.runs}
 
 
 def test_lightcuts_refuse_what_they_do_not_know():

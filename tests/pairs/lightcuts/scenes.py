@@ -37,7 +37,8 @@ def scene(name, lights, receivers, seed=0, dtype=np.float32):
         position, place = position + 300.0, place + 300.0
     if name == "wide":
         place *= np.exp(rng.normal(size=receivers) * 3.0)
-    if name == "colours":
+    if name == "colours":  # of one channel each, on ground that is a little rough
+        normal = unit(normal + 0.05 * rng.normal(size=(3, lights)))
         flux = np.eye(3)[:, rng.integers(3, size=lights)] * rng.random(lights)
     if name == "uneven":
         flux = flux * np.exp(6.0 * rng.normal(size=lights))

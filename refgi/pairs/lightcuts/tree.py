@@ -6,9 +6,9 @@ the flux of all: means are weighted by the sum over the channels. Nodes lie leve
 
 Symbols of a cluster: w_i = sum over channels of Phi_i / pi, p and m its mean position and the direction of its mean
 reversed normal, s^2 and v^2 the mean squared distance of positions to p and of normals to their mean, D = sum over
-channels of |sum_i (Phi_i / pi) (y_i - p)| and N the same of normals: 0 but for colours that change within the cluster,
-and rounding; A areas. All its lights lie within a radius of p and a height of the plane through p across m, and their
-normals within a turn of m.
+channels of ``|sum_i (Phi_i / pi) (y_i - p)|`` and N the same of normals: 0 but for colours that change within the
+cluster, and rounding; A areas. All its lights lie within a radius of p and a height of the plane through p across m,
+and their normals within a turn of m.
 """
 
 import math

@@ -111,7 +111,7 @@ def fill_errors(bound: Array, count: int, group: Array, least: Any, most: Any, e
         cl, cx = along + swing, over + tilt
         a, b = (cl + margin) * root, (cx + margin) * root
         a, b = (a if a < one else one), (b if b < one else one)
-        reached = (cl > margin) & (cx > margin)
+        out_of_sight = (cl <= margin) | (cx <= margin)
         term = a * b / ((square if square > least else least) + bound[SOFTEST, k])
         whole = bound[WEIGHT, k] * (term if term < most else most)
         # the smooth part
@@ -129,4 +129,4 @@ def fill_errors(bound: Array, count: int, group: Array, least: Any, most: Any, e
         smooth = smooth if smooth > kink else kink
         error = inflation * (smooth if (square >= least) & (term <= most) & (smooth < whole) else whole)
         error = error if error >= zero else real(np.inf)  # not a number: beyond the range of these
-        errors[k] = error if reached else zero
+        errors[k] = zero if out_of_sight else error

@@ -126,13 +126,17 @@ def _fill_node(nodes: Array, starts: Array, level: int, place: int, bounds: Arra
     bound = bounds[block_of(starts, level, place // FAN)]
     lane, total, mean = place % FAN, 0.0, np.zeros(COLUMNS)
     for k in range(first, last):
-        weight = np.float64(nodes[k, 6]) + nodes[k, 7] + nodes[k, 8]
-        total += weight
+        total += np.float64(nodes[k, 6]) + nodes[k, 7] + nodes[k, 8]
+    dark = total == 0.0  # fluxes that round to 0: all count alike
+    for k in range(first, last):
+        weight = 1.0 if dark else np.float64(nodes[k, 6]) + nodes[k, 7] + nodes[k, 8]
         for row in range(6):
             mean[row] += weight * nodes[k, row]
         mean[SOFT] += weight * nodes[k, SOFT]
         for c in range(6, 9):
             nodes[node, c] += nodes[k, c]
+    if dark:
+        total = np.float64(last - first)
     length = math.sqrt(mean[3] ** 2 + mean[4] ** 2 + mean[5] ** 2)
     for row in range(6):
         nodes[node, row] = mean[row] / total

@@ -7,7 +7,7 @@ from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp
 
 CLAMPS = {"none": None, "disc": DiscClamp(), "distance": DistanceClamp(0.15), "geometry": GeometryClamp(8.0)}
-NAMES = ("cube", "floor", "corner", "ball", "coincident", "tiny", "far", "wide", "colours", "uneven")
+NAMES = ("cube", "floor", "corner", "ball", "coincident", "tiny", "far", "wide", "colours", "uneven", "dim")
 
 
 def unit(vectors):
@@ -42,6 +42,8 @@ def scene(name, lights, receivers, seed=0, dtype=np.float32):
         flux = np.eye(3)[:, rng.integers(3, size=lights)] * rng.random(lights)
     if name == "uneven":
         flux = flux * np.exp(6.0 * rng.normal(size=lights))
+    if name == "dim":  # on one side, to 0 in float32
+        flux = flux * np.where(position[0] < 0.5, 1e-47, 1.0)
     found = PixelLights(position, normal, flux, None, None, None, lights)
     points = Receivers(*(np.ascontiguousarray(part[:, None].astype(dtype)) for part in (place, facing)),
                        np.ones((1, receivers), np.bool_))

@@ -139,6 +139,27 @@ class LightSettings(Settings):
         return isinstance(self.source, MapLights) and self.openness.flux != "roulette"
 
 
+def most_lights(lights: LightSettings, maps: int, texels: int) -> int:
+    """Return how many pixel lights there may be.
+
+    Parameters
+    ----------
+    lights : LightSettings
+        Which.
+    maps : int
+        Shadow maps of all lamps.
+    texels : int
+        Of a map.
+
+    Returns
+    -------
+    int
+        At most.
+    """
+    every = isinstance(lights.source, MapLights) and lights.source.pattern == "all"
+    return maps * (texels if every else lights.count)
+
+
 def clamped_pairs(lights: LightSettings, pairs: PairSettings) -> PairSettings:
     """Return pairs with the clamp that "auto" stands for.
 

@@ -12,10 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.pairs.lightcuts.cuts import add_cuts
 from refgi.pairs.lobe_sum import add_lobes
-from refgi.pairs.packing import Packed, PackedLobes, pack
+from refgi.pairs.packing import Packed, PackedLobes, pack, with_tree
 from refgi.pairs.pair_sum import TILE, sum_pairs
-from refgi.pairs.settings import PairSettings, SphereClamp
+from refgi.pairs.settings import Lightcuts, PairSettings, SphereClamp
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.pairs.tile_counts import lobe_tiles, tiles_behind
 from refgi.pairs.tiles import block_by_block, clear, put, receiving, taken
@@ -40,7 +41,8 @@ class Receivers(NamedTuple):
 
 @stage("pairs.sum")
 def irradiance(
-    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None
+    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None,
+    lightcuts: Lightcuts | None = None,
 ) -> Array:
     """Sum the irradiance of every pixel light at every receiver (SII Eq. 2).
 
@@ -54,6 +56,8 @@ def irradiance(
         How one light lights one receiver.
     footprint : (N,) ndarray, optional
         Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+    lightcuts : Lightcuts, optional
+        Sum diffuse lights by clusters, to an error; lobes are summed in full.
 
     Returns
     -------
@@ -71,9 +75,10 @@ def irradiance(
     -----
     E = sum (Phi / pi) <n_l . w> <n_x . -w> / r^2 (Eq. 1 prints no 1/pi: `sii_no_pi`), plus the lobes of Eq. 3. A
     light that coincides with a receiver adds 0. Results do not depend on the number of threads, on how receivers
-    are split into calls or on where a pixel stands in the picture, to the bit.
+    are split into calls or on where a pixel stands in the picture, to the bit. With `lightcuts` they depend on which
+    receivers follow each other, within the error.
     """
-    packed = checked(receivers, lights, settings, footprint)
+    packed = checked(receivers, lights, settings, footprint, lightcuts)
 
     def add(here: Array, facing: Array, _: Array, sums: Array) -> None:
         add_lights(here, facing, packed, sums)
@@ -86,8 +91,11 @@ def add_lights(position: Array, normal: Array, packed: Packed, irradiance: Array
 
     `irradiance` (3, n), W/m^2, holds zeros before.
     """
-    tally("pairs", lambda: position.shape[1] * packed.terms)
-    if packed.diffuse.shape[1] > 1 and packed.spheres is not None:
+    if packed.tree is None:
+        tally("pairs", lambda: position.shape[1] * packed.terms)
+    if packed.tree is not None:
+        add_cuts(position, normal, packed.tree, irradiance)
+    elif packed.diffuse.shape[1] > 1 and packed.spheres is not None:
         sum_spheres(position, normal, packed.diffuse, packed.spheres, None, irradiance)
     elif packed.diffuse.shape[1] > 1:
         culls = left_out("pairs.tiles", lambda: tiles_behind(position, normal, packed.diffuse))
@@ -104,7 +112,8 @@ def _listed_lobes(position: Array, normal: Array, lobes: PackedLobes) -> Array |
 
 
 def checked(
-    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None
+    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None,
+    lightcuts: Lightcuts | None = None,
 ) -> Packed:
     """Check the arguments of a sum over pairs and pack its lights.
 
@@ -118,6 +127,8 @@ def checked(
         How one light lights one receiver.
     footprint : (N,) ndarray or None
         Surface area each light stands for, m^2.
+    lightcuts : Lightcuts, optional
+        Clusters to sum diffuse lights by.
 
     Returns
     -------
@@ -133,7 +144,7 @@ def checked(
     packed = pack(lights, settings, footprint, receivers.position.dtype)
     if packed.lobes is None:
         skip("pairs.lobes", "no pixel light is glossy")
-    return packed
+    return packed if lightcuts is None else with_tree(packed, lightcuts)
 
 
 def over_receivers(receivers: Receivers, packed: Packed, add: Callable[[Array, Array, Array, Array], None]) -> Array:

@@ -26,6 +26,7 @@ Array = npt.NDArray[Any]
 
 PAIRS = 1 << 20  # about as many are summed: a millisecond's work
 LEAST_SAMPLED = 2048  # pixels, however many lights there are
+THINNED = 2048  # lights, where there are too many to sum in full
 LEAST_LOSS = 0.02  # share of the light below which a loss gives no warning
 
 
@@ -60,6 +61,14 @@ def _van_der_corput(count: int) -> Array:
 def sample_for(receivers: Receivers, lights: "PixelLights", *, least: int = LEAST_SAMPLED) -> Sample:
     """Sample about PAIRS / N pixels for N lights, at least `least`: few lights cost little and have high peaks."""
     return sample_pixels(receivers, max(least, PAIRS // max(1, lights.flux.shape[1])))
+
+
+def thinned(lights: "PixelLights", footprint: Array | None) -> tuple["PixelLights", Array | None]:
+    """Return one of every few lights, THINNED or more, and their areas: enough for the share of a loss."""
+    step = max(1, lights.flux.shape[1] // THINNED)
+    every = {name: value for name, value in lights._asdict().items() if name != "drawn" and value is not None}
+    some: dict[str, Any] = {name: value[..., ::step] for name, value in every.items()}
+    return lights._replace(**some), None if footprint is None else footprint[::step]
 
 
 def light_at(

@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
+from refgi.pairs.lightcuts.tree import LightTree, light_tree
 from refgi.pairs.lobe_shape import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
 from refgi.pairs.pair_sum import Clamp
-from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, PairSettings, SphereClamp
+from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, Lightcuts, PairSettings, SphereClamp
 from refgi.skips import left_out
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ class Packed(NamedTuple):
     lobes: PackedLobes | None  # None: no light is glossy
     shines: Array  # (N,) bool: which lights are among the M
     glossy: Array  # (N,) bool: which are among the K
+    tree: LightTree | None = None  # of the diffuse lights, where they may be summed by clusters
 
     @property
     def terms(self) -> int:
@@ -67,6 +69,34 @@ def pack(lights: "PixelLights", settings: PairSettings, footprint: Array | None,
         lobe_clamp = pack_clamp(settings, footprint, glossy, packed.shape[1], dtype)
         lobes = PackedLobes(packed, lobe_clamp, pack_widening(lights, settings, dtype, glossy))
     return Packed(diffuse, clamp, spheres, lobes, shines, glossy)
+
+
+def with_tree(packed: Packed, lightcuts: Lightcuts) -> Packed:
+    """Return packed lights with a light tree over the diffuse ones.
+
+    Parameters
+    ----------
+    packed : Packed
+        The lights.
+    lightcuts : Lightcuts
+        The error of their sums.
+
+    Returns
+    -------
+    Packed
+        With `tree`, unless there is no diffuse light.
+
+    Raises
+    ------
+    InputError
+        If a light has a flux below 0, or lights are spheres.
+    """
+    expect(packed.spheres is None, "clamp", "another one with lightcuts, which bound no spheres", "sphere")
+    expect(bool((packed.diffuse[6:] >= 0).all()), "lights.flux", "numbers >= 0 with lightcuts",
+           packed.diffuse[6:].min(initial=0.0))
+    if packed.diffuse.shape[1] == 1:
+        return packed
+    return packed._replace(tree=light_tree(packed.diffuse, packed.clamp, lightcuts.error))
 
 
 def with_dark_lobes(lights: "PixelLights") -> "PixelLights":

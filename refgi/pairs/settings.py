@@ -56,6 +56,24 @@ Clamp = AutoClamp | DistanceClamp | GeometryClamp | DiscClamp | SphereClamp
 
 
 @dataclasses.dataclass(frozen=True)
+class AutoLightcuts(Settings):
+    """Bounded lightcuts where a method works to an error and has many lights; else none."""
+
+    NAME = "auto"
+
+
+@dataclasses.dataclass(frozen=True)
+class Lightcuts(Settings):
+    """Clusters of lights stand for their lights where a bound on the sum's error allows it (Walter et al. 2005)."""
+
+    NAME = "bounded"
+    PRINCIPAL = "error"
+
+    error: float = setting(0.02, "largest error of a receiver's sum over channels, as a share of it", least=1e-6,
+                           most=1.0)
+
+
+@dataclasses.dataclass(frozen=True)
 class LobeSettings(Settings):
     """The Phong lobe of a glossy pixel light (SII Sec. 3.3)."""
 

@@ -1,12 +1,14 @@
 """Every setting of `multires` reaches the picture: against the twin of the whole method, and against its default."""
 
 import dataclasses
+import sys
 from functools import cache, partial
 
 import numpy as np
 import pytest
 
 from refgi.cluster.settings import ValSettings
+from refgi.errors import InputError
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import LightSettings
 from refgi.pairs.settings import DistanceClamp
@@ -38,6 +40,7 @@ SHADOWS = {"subsplats.visibility": "val", "subsplats.visibility.maps": 16, "ligh
            "lights.source.pattern": "halton"}
 FEW_SHADOWS = SHADOWS | {"subsplats.visibility.clusters.count": 4}
 UNCLAMPED = SHADOWS | {"pairs.clamp": None}  # as in val, whose cases these are
+STRICT = "so small an error leaves no cluster of a few lights: what larger ones do is told in tests/pairs/lightcuts"
 SAME_LIST = "both ways find the same subsplats"
 
 CASES = {
@@ -109,6 +112,8 @@ CASES = {
     "seed": Case({"lights.seed": 7, "lights.source.pattern": "random"}),
     "auto of paths": Case({"lights.source": "walk"}),
     "auto of roulette": Case({"lights.openness.flux": "roulette", "lights.openness.radius": 2.0}),
+    "clusters": Case({"lightcuts": "bounded", "lightcuts.error": 1e-6}, same=STRICT),
+    "no clusters": Case({"lightcuts": None}, same="few lights are summed in full in any case"),
     **under("pairs", PAIR_CASES),
 }
 # pictures of so many pixels that not all are samples of the error
@@ -124,7 +129,7 @@ PROMISES = {
 ALL = CASES | PROMISES
 FEATURES = {"chord": "AMS-05", "rate": "AMS-05", "detail": "AMS-14", "demo": "AMS-11", "nearest": "AMS-11",
             "naive bilinear": "AMS-11", "ams_filter_all": "AMS-11", "ams_all_corners": "AMS-11"}
-TOLERANCE = {"rays": RAYS, "spheres": SPHERES, "maps by rays": SHADOWS_OF_RAYS}
+TOLERANCE = {"clusters": ROUNDING, "rays": RAYS, "spheres": SPHERES, "maps by rays": SHADOWS_OF_RAYS}
 
 
 def frame_of(name, scale=1):
@@ -261,3 +266,44 @@ def test_each_key_counts(name):
     for key, other in case.without(MultiresSettings, BASE):
         change = np.abs(render(other) - light).max() / light.max()
         assert change <= TOLERANCE.get(name, 0.0) if case.same else change > LEAST, (key, change)
+
+
+def cut(error=None, **keys):
+    """Return settings with lightcuts of an error, or without."""
+    how = {"lightcuts": None} if error is None else {"lightcuts": "bounded", "lightcuts.error": error}
+    return Case(how).settings(MultiresSettings, {"lights.count": 3000, "subsplats.coarsest": 3, **keys})
+
+
+def test_lightcuts_reach_the_subsplats():
+    """Clusters change the picture, by less than their error, and less for a smaller one."""
+    frame = Case({}, frame={"rsm_resolution": 64}).seen()
+    full, changes = multires(frame, cut()), []
+    for error in (0.5, 0.02):
+        got = multires(frame, cut(error))
+        changes.append((np.abs(got - full).sum(axis=0) / np.maximum(full.sum(axis=0), 1e-300)).max())
+        assert changes[-1] < error
+    assert changes[0] > 2 * changes[1] > 1e-6
+
+
+def test_lightcuts_are_part_of_an_error(monkeypatch):
+    """Pixels are summed by clusters where lights are many; the promise holds, and what clusters may take is in it."""
+    frame = Case({}, frame={"rsm_resolution": 64, **WIDE}).seen()
+    keys = {"subsplats": "error", "subsplats.target": 0.05, "subsplats.coarsest": 16}
+    covered = frame.gbuffer.covered
+    full = multires(frame, cut(**{"subsplats.coarsest": 65536}))[:, covered]
+    monkeypatch.setattr(sys.modules["refgi.splat.multires.error_target.error_driven"], "MANY", 1000)
+    auto = Case({}).settings(MultiresSettings, {"lights.count": 3000, **keys})
+    with observe() as log:
+        picture = multires(frame, auto)[:, covered]
+    assert "pairs.lightcuts" in {run.name for run in log.runs}
+    assert np.sqrt(((picture - full) ** 2).mean()) < 0.05 * full.mean()
+    with observe() as log:
+        multires(frame, cut(**keys))
+    assert "pairs.lightcuts" not in {run.name for run in log.runs}
+
+
+def test_lightcuts_refuse_what_they_do_not_know():
+    for keys in ({"subsplats": "irradiance"}, {"subsplats.visibility": "rays"}, {"subsplats.visibility": "val"},
+                 {"pairs.clamp": "sphere"}):
+        with pytest.raises(InputError, match="lightcuts"):
+            cut(0.02, **keys)

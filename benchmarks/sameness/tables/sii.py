@@ -26,6 +26,8 @@ TABLE = Table({"lights": 96, "clamp": "none"}, [
     vary("as_published", "per_light_ilow", **CUT),
     vary("as_published", "per_light_ilow", stochastic_range=True, **CUT),
     vary("widening", 0.3, on=("stage", "ring"), **CUT),
+    vary("lightcuts", "bounded", lights=500),
+    vary("lightcuts.error", 0.3, lights=500, lightcuts="bounded"),
     vary("half_resolution", True),
     vary("half_resolution", True, **CUT),
 ])

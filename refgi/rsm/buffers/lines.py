@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.rsm.buffers.surfaces import CONSTANT, CORNER, MIXED, NORMAL, PLANE
+from refgi.rsm.buffers.surfaces import CONSTANT, CORNER, MIXED, NORMAL, PLANE, RANGE
 from refgi.rsm.buffers.texel_rays import image_ray, texel_ray
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection
 
@@ -58,6 +58,7 @@ def write_hits(
         start, stop, r = first[y, run], first[y, run + 1], record[y, run]
         gx, gy, gz = fixed[r, PLANE], fixed[r, PLANE + 1], fixed[r, PLANE + 2]
         vx, vy, vz = fixed[r, CORNER], fixed[r, CORNER + 1], fixed[r, CORNER + 2]
+        least, greatest = fixed[r, RANGE], fixed[r, RANGE + 1]
         texels = (stop - start + LANES - 1) & -LANES
         if r == 0:
             for lane in range(texels):
@@ -67,12 +68,16 @@ def write_hits(
             for lane in range(texels):
                 at = np.uint64(start) + np.uint64(lane)
                 above = (vx - line[at]) * gx + (vy - line[at + Y]) * gy + (vz - line[at + Z]) * gz
-                line[at + HIT] = above / facing
+                t = above / facing
+                t = t if t > least else least  # not a number where 0 is divided by 0
+                line[at + HIT] = t if t < greatest else greatest
         else:
             above = (vx - ox) * gx + (vy - oy) * gy + (vz - oz) * gz
             for lane in range(texels):
                 at = np.uint64(start) + np.uint64(lane)
-                line[at + HIT] = above / (line[at] * gx + line[at + Y] * gy + line[at + Z] * gz)
+                t = above / (line[at] * gx + line[at + Y] * gy + line[at + Z] * gz)
+                t = t if t > least else least
+                line[at + HIT] = t if t < greatest else greatest
 
 
 @kernel

@@ -11,21 +11,24 @@ so the interpolated normal of corner normals n0, n1, n2 is, times d . N, an affi
 - parallel rays:         K + (o - v0) . M,   M = (e2 x d) (n1 - n0) + (d x e1) (n2 - n0),   K = (d . N) n0.
 
 Corners enter by differences of 1, not of 2 factors of their distance, so small triangles far away keep their digits.
+
+Seen edge-on, d . N is rounding and t anything, so t is kept within what the corners have.
 """
 
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection
+from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
 
 Array = npt.NDArray[Any]
 
 BATCH = 64  # triangles described at once
-# columns of `Records.fixed`: corner v0; N; unit normal on the visible side; albedo; M by axis; K
-CORNER, PLANE, NORMAL, ALBEDO, MIXED, CONSTANT, COLUMNS = 0, 3, 6, 9, 12, 21, 24
+# columns of `Records.fixed`: corner v0; N; unit normal on the visible side; albedo; least and greatest t; M by axis; K
+CORNER, PLANE, NORMAL, ALBEDO, RANGE, MIXED, CONSTANT, COLUMNS = 0, 3, 6, 9, 12, 14, 23, 26
 INPUTS = 18  # rows of a batch: corners and their normals
 
 
@@ -135,6 +138,21 @@ def _orient(projection: Projection, m: int, batch: Array) -> None:
         batch[at * BATCH + b], batch[(at + 1) * BATCH + b], batch[(at + 2) * BATCH + b] = gx, gy, gz
         at, nx, ny, nz = INPUTS + NORMAL, nx * scale, ny * scale, nz * scale
         batch[at * BATCH + b], batch[(at + 1) * BATCH + b], batch[(at + 2) * BATCH + b] = nx, ny, nz
+        _bound(projection.kind == PARABOLOID, b, (ox, oy, oz), (dx, dy, dz), batch)
+
+
+@kernel
+def _bound(by_distance: bool, b: int, origin: Any, forward: Any, batch: Array) -> None:
+    """Write the least and greatest t of a triangle's points ahead: of its corners, or 0 where rays have unit length."""
+    least, greatest = np.inf, 0.0
+    for corner in range(3):
+        at = 3 * corner * BATCH + b
+        x, y, z = batch[at] - origin[0], batch[at + BATCH] - origin[1], batch[at + 2 * BATCH] - origin[2]
+        along = x * forward[0] + y * forward[1] + z * forward[2]
+        t = math.sqrt(x * x + y * y + z * z) if by_distance else along
+        least, greatest = min(least, t), max(greatest, t)
+    batch[(INPUTS + RANGE) * BATCH + b] = 0.0 if by_distance else max(least, 0.0)
+    batch[(INPUTS + RANGE + 1) * BATCH + b] = greatest
 
 
 @kernel

@@ -35,6 +35,10 @@ def _every_pixel(settings: MultiresSettings, _: Mapping[str, Any]) -> MultiresSe
     return dataclasses.replace(settings, subsplats=subsplats)
 
 
+def _every_pair(settings: MultiresSettings, _: Mapping[str, Any]) -> MultiresSettings:
+    return dataclasses.replace(settings, lightcuts=None) if settings.bounded is not None else settings
+
+
 def _undarkened(settings: MultiresSettings, _: Mapping[str, Any]) -> MultiresSettings:
     return dataclasses.replace(settings, detail=0.0)
 
@@ -50,5 +54,6 @@ APPROXIMATIONS = (
     LIGHT_SAMPLING._replace(from_truth=lambda settings: settings.visibility is not None),
     OPENNESS, CLAMP._replace(off=_unclamped),
     Approximation("subsplats", "cells of many pixels are evaluated at one and upsampled", _every_pixel),
+    Approximation("lightcuts", "clusters stand for their lights where the sum's error is bounded", _every_pair),
     Approximation("detail", "surfaces that turn away from the camera are darkened (Eq. 3)", _undarkened),
     Approximation("supersampling", "a pixel is the mean of four, not its centre", _at_pixels))

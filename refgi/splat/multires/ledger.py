@@ -36,10 +36,12 @@ def multires_ledger(frame: "Frame", settings: MultiresSettings) -> Ledger:
 
     Notes
     -----
+    Lights are summed in full, without lightcuts.
     `interpolated` is every pixel's sum less the picture before Eq. 3, and so holds twice the size and the printed
     forms of subsplats as well. It sums all lights at every pixel three times or more: on the Cornell box at 512 x 512
     it takes 17 times as long as the picture.
     """
+    settings = dataclasses.replace(settings, lightcuts=None)
     lights, pairs = choose_lights(frame, settings.lights), settings.effective_pairs
     footprint = light_areas(frame, lights, settings)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))

@@ -6,12 +6,15 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.val import extra_bytes as bytes_of_shadows
+from refgi.jit import most_threads
 from refgi.lights.footprints import demo_footprints
 from refgi.lights.selection import choose_lights, drawn_from_maps, footprints
+from refgi.lights.settings import most_lights
 from refgi.method import Extent
 from refgi.pairs.irradiance import Receivers
-from refgi.pairs.loss import warn_of_clamp
-from refgi.splat.multires.error_target.error_driven import error_driven
+from refgi.pairs.lightcuts.tree import tree_bytes
+from refgi.pairs.loss import thinned, warn_of_clamp
+from refgi.splat.multires.error_target.error_driven import MANY, clusters, error_driven
 from refgi.splat.multires.light_lists.per_light import per_light
 from refgi.splat.multires.refinement.criteria import discontinuities
 from refgi.splat.multires.refinement.grid import Subsplats, top_level
@@ -65,9 +68,12 @@ def _irradiance(
     printed: dict[str, bool] = {"filter_all": "ams_filter_all" in settings.as_published,
                                 "corner_rule": "ams_all_corners" not in settings.as_published}
     _resolve_channels(buffer, subsplats)
-    warn_of_clamp(Receivers(buffer.position, buffer.normal, buffer.covered), lights, pairs, footprint, "multires")
+    few = isinstance(subsplats, ByError) and clusters(lights, settings.lightcuts)
+    some = thinned(lights, footprint) if few or settings.bounded is not None else (lights, footprint)
+    warn_of_clamp(Receivers(buffer.position, buffer.normal, buffer.covered), some[0], pairs, some[1], "multires")
     if isinstance(subsplats, ByError):
-        irradiance = error_driven(buffer, lights, subsplats, pairs, footprint, settings.lights.seed).irradiance
+        irradiance = error_driven(buffer, lights, subsplats, pairs, footprint, settings.lights.seed,
+                                  settings.lightcuts).irradiance
     elif isinstance(subsplats, ByIrradiance):
         start = None if subsplats.start is None else shared_subsplats(buffer, subsplats.start)  # Sec. 6
         irradiance = per_light(buffer, lights, subsplats, pairs, footprint, start, **printed)  # Sec. 3.3.1
@@ -124,7 +130,7 @@ def _evaluated(
         values = evaluate_shadowed(frame, buffer, shared, lights, settings.shadows, footprint)
     else:
         points = representative_points(buffer, shared, subsplats.representative)
-        values = evaluate(*points, lights, settings.effective_pairs, footprint)
+        values = evaluate(*points, lights, settings.effective_pairs, footprint, settings.bounded)
     if "ams_rho_in_splat" in settings.as_published:
         values = values * buffer.albedo.reshape(3, -1)[:, shared.pixel]
     return values
@@ -176,12 +182,12 @@ def halved(irradiance: Array, fine: Array, covered: Array) -> Array:
 
 
 def extra_bytes(settings: MultiresSettings, extent: Extent) -> int:
-    """Estimate the memory that shadows add to a picture.
+    """Estimate the memory that shadows and lightcuts add to a picture.
 
     Parameters
     ----------
     settings : MultiresSettings
-        Whether there are shadows, and of what.
+        Whether there are shadows or lightcuts, and of what.
     extent : Extent
         Of the picture.
 
@@ -190,4 +196,7 @@ def extra_bytes(settings: MultiresSettings, extent: Extent) -> int:
     int
         Bytes, rather too many than too few: as if every pixel were a subsplat.
     """
-    return 0 if settings.shadows is None else bytes_of_shadows(settings.shadows, extent)
+    count = most_lights(settings.lights, extent.maps, extent.texels)
+    by_error = isinstance(settings.subsplats, ByError) and settings.lightcuts is not None and count >= MANY
+    cuts = tree_bytes(count, extent.float_bytes, most_threads()) if settings.bounded is not None or by_error else 0
+    return cuts + (0 if settings.shadows is None else bytes_of_shadows(settings.shadows, extent))

@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 from refgi.cluster.settings import ClusteredShadows, ValSettings
 from refgi.errors import expect
 from refgi.lights.settings import LightSettings, MapLights, clamped_pairs, expect_footprints
-from refgi.pairs.settings import AutoClamp, DiscClamp, PairSettings, SphereClamp
+from refgi.pairs.settings import AutoClamp, AutoLightcuts, DiscClamp, Lightcuts, PairSettings, SphereClamp
 from refgi.scene.values import BRIGHTEST
 from refgi.settings import Settings, of, setting
 
@@ -197,6 +197,8 @@ class MultiresSettings(Settings):
     detail: float = setting(0.0, "a of Eq. 3: darkens what turns away from the camera", least=0.0, most=1.0, study=True)
     supersampled: bool = setting(False, "rendered at twice the width and height (Sec. 4)")
     as_published: frozenset[str] = setting(frozenset(), "forms of the method to use as printed", study=True)
+    lightcuts: AutoLightcuts | Lightcuts | None = setting(
+        AutoLightcuts(), "diffuse lights are summed by clusters, to an error; auto: with subsplats 'error' and many")
 
     def check(self) -> None:
         """Check what lights, pairs and subsplats ask of each other."""
@@ -209,6 +211,12 @@ class MultiresSettings(Settings):
             expect(clamp is None, "pairs.clamp", "none with visibility 'rays'", chosen)
         _ = self.shadows  # refuses what shadows cannot be made of
         by_error = isinstance(self.subsplats, ByError)
+        if isinstance(self.lightcuts, Lightcuts):
+            expect(not isinstance(clamp, SphereClamp), "pairs.clamp",
+                   "another one with lightcuts, which bound no spheres", chosen)
+            expect(not isinstance(self.subsplats, ByIrradiance), "lightcuts",
+                   "none with subsplats 'irradiance', which are of each light's own", self.lightcuts.name())
+            expect(self.visibility is None, "lightcuts", "none where subsplats have shadows", self.lightcuts.name())
         expect(not (by_error and isinstance(clamp, SphereClamp)), "pairs.clamp",
                "another one with subsplats 'error', which splits the peaks of points off", chosen)
         allowed = {"ams_disc": isinstance(clamp, DiscClamp), "ams_filter_all": not by_error,
@@ -218,6 +226,11 @@ class MultiresSettings(Settings):
         expect(not wrong, "as_published",
                f"no {' or '.join(wrong)} with the clamp {chosen!r}, subsplats {self.subsplats.name()!r} and the "
                f"upsampling {getattr(self.subsplats, 'upsampling', None)!r}", sorted(self.as_published))
+
+    @property
+    def bounded(self) -> Lightcuts | None:
+        """The lightcuts that were asked for by name, if any."""
+        return self.lightcuts if isinstance(self.lightcuts, Lightcuts) else None
 
     @property
     def traces_rays(self) -> bool:

@@ -21,6 +21,7 @@ from refgi.splat.sii.settings import (
     RelativeCut,
     SiiSettings,
     TangentBound,
+    extra_bytes,
 )
 from refgi.splat.sii.sii import cut_irradiance, sii, splat
 
@@ -42,4 +43,4 @@ __all__ = [
 
 METHOD = Method(
     "sii", "Splatting Indirect Illumination (2006): pixel lights shine where they are significant", sii, SiiSettings,
-    visibility=False, ledger=sii_ledger, presets=PRESETS, approximations=APPROXIMATIONS)
+    visibility=False, ledger=sii_ledger, memory=extra_bytes, presets=PRESETS, approximations=APPROXIMATIONS)

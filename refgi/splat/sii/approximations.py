@@ -24,7 +24,12 @@ def _full_resolution(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings
     return dataclasses.replace(settings, half_resolution=False)
 
 
+def _every_pair(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
+    return dataclasses.replace(settings, lightcuts=None)
+
+
 APPROXIMATIONS = (
     VISIBILITY, RSM_RESOLUTION, LIGHT_SAMPLING._replace(off=_sampled), OPENNESS, CLAMP,
     Approximation("cut", "pairs whose irradiance is below a threshold are left out", _uncut),
+    Approximation("lightcuts", "clusters stand for their lights where the sum's error is bounded", _every_pair),
     Approximation("upsampling", "one pixel of 2 x 2 is evaluated, the others are upsampled", _full_resolution))

@@ -7,8 +7,11 @@ import dataclasses
 from typing import ClassVar, Literal
 
 from refgi.errors import expect
-from refgi.lights.settings import LightSettings, MapLights, clamped_pairs, expect_footprints
-from refgi.pairs.settings import LAST_SEED, PairSettings
+from refgi.jit import most_threads
+from refgi.lights.settings import LightSettings, MapLights, clamped_pairs, expect_footprints, most_lights
+from refgi.method import Extent
+from refgi.pairs.lightcuts.tree import tree_bytes
+from refgi.pairs.settings import LAST_SEED, Lightcuts, PairSettings, SphereClamp
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
 
@@ -110,10 +113,15 @@ class SiiSettings(Settings):
     pairs: PairSettings = setting(PairSettings(), "how one light lights one receiver")
     reach: ReachSettings = setting(ReachSettings(), "how far a light reaches")
     half_resolution: bool = setting(False, "evaluate one pixel of 2 x 2 and upsample by a joint bilateral filter")
+    lightcuts: Lightcuts | None = setting(None, "diffuse lights are summed by clusters, to an error")
 
     def check(self) -> None:
         """Check what fields ask of each other."""
         expect_footprints(self.lights, self.pairs)
+        expect(self.lightcuts is None or self.reach.cut is None, "reach.cut", "none with lightcuts", self.reach.cut
+               and self.reach.cut.name())
+        expect(self.lightcuts is None or not isinstance(self.pairs.clamp, SphereClamp), "pairs.clamp",
+               "another one with lightcuts, which bound no spheres", "sphere")
         expect(not (self.half_resolution and self.reach.on_screen), "reach.bound",
                "one in space, not on the screen, at half resolution", self.reach.bound.name())
 
@@ -126,6 +134,26 @@ class SiiSettings(Settings):
     def effective_pairs(self) -> PairSettings:
         """The pairs in use: the clamp "auto" is "disc", and none where lights have no footprints."""
         return clamped_pairs(self.lights, self.pairs)
+
+
+def extra_bytes(settings: SiiSettings, extent: Extent) -> int:
+    """Estimate the memory that lightcuts add to a picture.
+
+    Parameters
+    ----------
+    settings : SiiSettings
+        Whether there are any, and of how many lights.
+    extent : Extent
+        Of the picture and the maps.
+
+    Returns
+    -------
+    int
+        Bytes, rather too many than too few.
+    """
+    if settings.lightcuts is None:
+        return 0
+    return tree_bytes(most_lights(settings.lights, extent.maps, extent.texels), extent.float_bytes, most_threads())
 
 
 # 768 lights by a filtered look-up of the flux (Sec. 4), a cut of 5 % (Fig. 12), the ellipsoids of the appendix

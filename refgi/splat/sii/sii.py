@@ -17,7 +17,7 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import with_clamp
 from refgi.pairs.irradiance import Receivers, checked, irradiance, over_receivers
 from refgi.pairs.lobe_sum import add_lobes
-from refgi.pairs.loss import warn_of_clamp
+from refgi.pairs.loss import thinned, warn_of_clamp
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.ranged_sum import LANES, sum_pairs_in_range, sum_weighted_pairs
 from refgi.pairs.sphere_sum import sum_spheres
@@ -62,7 +62,8 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
         return splat(points, lights, resolved, footprint, frame.gbuffer.projection)  # Eq. (2), Sec. 3.4
 
     light = half_resolution(receivers, evaluate) if settings.half_resolution else evaluate(receivers)
-    warn_of_clamp(receivers, lights, settings.pairs, footprint, "sii")
+    some = (lights, footprint) if settings.lightcuts is None else thinned(lights, footprint)
+    warn_of_clamp(receivers, some[0], settings.pairs, some[1], "sii")
     warn_of_cut(light, receivers, lights, resolved, footprint)
     return light
 
@@ -90,7 +91,7 @@ def splat(
     -------
     (3, h, w) ndarray
         Irradiance, W/m^2, linear RGB, as that of `irradiance`, of the pairs with B >= I_low. Without a threshold it
-        is that of `irradiance` to the bit.
+        is that of `irradiance` to the bit, by lightcuts where the settings have them.
 
     Raises
     ------
@@ -99,7 +100,7 @@ def splat(
     """
     if settings.reach.cut is None:
         skip("sii.bins", "no cut: every light reaches every pixel")
-        return irradiance(receivers, lights, settings.pairs, footprint)
+        return irradiance(receivers, lights, settings.pairs, footprint, settings.lightcuts)
     return _splat(receivers, lights, settings, footprint, projection)
 
 

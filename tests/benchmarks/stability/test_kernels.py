@@ -59,7 +59,7 @@ def test_references_agree_with_closed_forms():
     assert formula("val.filter_width", 1, 2, 1) == pytest.approx([0.25, math.tan(math.atan(0.5) / 2), 0.25])
     assert formula("map.paraboloid_ray", 1, 0) == [1, 0, 0]
     assert formula("map.cube", 2.0, 0, 0) == [512, 512, 2]
-    assert formula("map.barycentric", 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 1, 0) == [1]
+    assert formula("map.barycentric", 0, 0, 0, 0.25, 0.5, 1, 0, 0, 1, 1, 0, 1, 0, 1, 1) == [0.25, 0.5]  # of v1, v2
     assert formula("ray.offset", 1, -2, 4, 1) == [2.0**-19, 4 * 7 * 2.0**-24]
     assert formula("frame.basis", 0, 0, 1) == [1, 0, 0, 0, 1, 0]
     assert formula("val.z_avg", 0.9, *means_of(0.4)) == pytest.approx([0.4])

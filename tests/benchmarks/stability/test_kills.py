@@ -113,7 +113,7 @@ def test_a_command_that_heeds_a_signal_and_those_that_do_not(number):
     with prepared("fake", DEAF) as victim:
         assert asked(victim, number, 3, 1)  # one of them in the second third of its work
     with prepared("fake", SPEAKS) as victim:
-        said = asked(victim, number, 3, 1)
+        said = asked(victim, number, 6, 1)
     assert said
     assert "by the way" in said[0]
 
@@ -129,7 +129,7 @@ def test_rows_fail_where_files_are_torn_lost_other_or_left():
 
 def test_full_and_short_runs_have_their_kills():
     assert sum(kills.TIMES.values()) + kills.BATCH_TIMES == 200
-    assert sum(kills.SHORT_TIMES.values()) == 6
+    assert sum(kills.SHORT_TIMES.values()) == 4
     assert {task.name for task in kills.tasks(False)} == {*VICTIMS, "batch"} - {"fake"} == {*kills.TIMES, "batch"}
     assert [task.name for task in kills.tasks(True)] == list(kills.SHORT_TIMES)
 

@@ -116,6 +116,19 @@ def test_channels_of_maps_equal_those_of_a_literal_twin(name, kind):
     assert len(compared) >= {"orthographic": 1, "cube": 4, "paraboloid": 2, "wide": 2}[kind]  # maps and tiles
 
 
+@pytest.mark.parametrize("order", ["sorted", "as drawn"])
+def test_texels_of_several_maps_are_those_of_the_whole(order):
+    """Maps with centres of their own."""
+    shape, projection = shapes()["smooth"], maps()["paraboloid"]
+    visibility, materials = rasterize(shape, projection), material_table(MATERIALS, np.float64)
+    texel = np.random.default_rng(2).choice(2 * 22 * 22, 120, replace=False)
+    texel = np.sort(texel) if order == "sorted" else texel
+    some = GBuffer(shape, materials, projection, visibility, np.float64).at(texel, *CHANNELS)
+    whole = GBuffer(shape, materials, projection, visibility, np.float64).resolve(*CHANNELS)
+    for part, full in zip(some, whole, strict=True):
+        np.testing.assert_array_equal(part, full.reshape(*full.shape[:-2], -1)[..., texel])
+
+
 def test_the_same_bits_for_any_threads_and_tiles():
     """Texels alone, which know of no tile, have the bits of pictures of several tiles a row and a column."""
     rng = np.random.default_rng(9)
@@ -231,3 +244,26 @@ def test_errors_name_what_is_wrong():
         buffer(shape).resolve("colour")
     with pytest.raises(InputError, match="dtype: expected float32 or float64, got 'float16'"):
         buffer(shape, np.float16)
+
+
+@pytest.mark.parametrize("kind", ["camera", "paraboloid"])
+def test_triangles_seen_edge_on_lie_between_their_corners(kind):
+    """With the eye in a triangle's plane d . N is rounding or 0; its points must still have a depth of the triangle."""
+    rng, covered = np.random.default_rng(5), 0
+    for _ in range(150):
+        corners = rng.uniform(-1, 1, (3, 3))
+        eye, target = (3 * rng.dirichlet((1, 1, 1)) - 2 / 3) @ corners, rng.dirichlet((1, 1, 1)) @ corners
+        if kind == "camera":
+            view = camera_projection(Camera(tuple(eye), tuple(target), vfov=math.radians(40), width=7, height=3))
+            reach = (corners - eye) @ view.frame[0, 2]
+        else:
+            view = paraboloid_projection(eye[None], (target - eye)[None], 7)
+            reach = np.linalg.norm(corners - eye, axis=1)
+        shape = geometry(corners, np.array([[0, 1, 2]], np.int32))
+        seen = GBuffer(shape, material_table(MATERIALS), view, rasterize(shape, view), np.float64)
+        here = seen.covered
+        covered += np.count_nonzero(here)
+        least = max(reach.min(), 0) if kind == "camera" else 0
+        assert ((seen.depth[here] >= least - 1e-15) & (seen.depth[here] <= reach.max() + 1e-15)).all()
+        assert np.isfinite(seen.position).all()
+    assert covered > 25

@@ -21,6 +21,8 @@ import numpy.typing as npt
 from refgi.draws import ERROR_SAMPLES, draws
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers, checked
+from refgi.pairs.packing import Packed
+from refgi.pairs.settings import AutoLightcuts, Lightcuts
 from refgi.splat.multires.error_target.interpolate import surface_levels
 from refgi.splat.multires.error_target.near import near_light
 from refgi.splat.multires.error_target.trial import ExactIrradiance, Trials
@@ -48,6 +50,9 @@ SLOPES = 0.5, 1.2  # what they may tell
 AIM = 0.95  # of the target, where the next trial is to end
 STEPS = 0.3, 0.9  # of a threshold, where the next may lie
 ENOUGH = 0.75  # of the pixels evaluated: then the rest are as well
+MANY = 65536  # lights, from which on "auto" sums them by clusters
+CLUSTERED = 0.1  # of the target, the error of those sums
+LEAST_ERROR = 1e-6  # that lightcuts know
 LAST = 16  # trial, after which every pixel is evaluated: cells of which nothing bright is known may never be split
 
 
@@ -149,7 +154,7 @@ class ErrorDriven(NamedTuple):
 @stage("multires.error_driven")
 def error_driven(
     buffer: "GBuffer", lights: "PixelLights", settings: "ByError", pairs: "PairSettings",
-    footprint: Array | None = None, seed: int = 0,
+    footprint: Array | None = None, seed: int = 0, lightcuts: AutoLightcuts | Lightcuts | None = None,
 ) -> ErrorDriven:
     """Evaluate a picture to a relative error, `settings.target`.
 
@@ -167,6 +172,9 @@ def error_driven(
         Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
     seed : int
         Of the samples that estimate the error.
+    lightcuts : AutoLightcuts, Lightcuts or None
+        Whether lights may be summed by clusters: "auto" takes a share of the target for it where they are many; by
+        name, with an error of its own that counts against the target.
 
     Returns
     -------
@@ -184,17 +192,17 @@ def error_driven(
     irradiance changes across them by position and normal alone.
     """
     receivers = Receivers(*map(np.ascontiguousarray, buffer.resolve("position", "normal", "covered")))
-    packed = checked(receivers, lights, pairs, footprint)
     samples = draw_samples(receivers.covered, seed)
-    exact = ExactIrradiance(receivers, packed)
-    exact.evaluate(samples.pixel)
+    packed, exact, clustered = _evaluated_samples(receivers, lights, pairs, footprint, samples, settings.target,
+                                                  lightcuts)
     sampled = exact.at(samples.pixel)
     typical, mean = _mean_without_brightest(sampled), estimate_mean(samples, sampled)
     near = near_light(receivers, packed, NEAR * typical)
     tally("pairs", lambda: near.pairs)
     top = max(1, top_level(buffer.height, buffer.width, settings.coarsest))
     trials = Trials(exact, near, surface_levels(*receivers, top))
-    found, threshold, count = _search(trials, samples, mean, typical, settings.target)
+    found, threshold, count = _search(trials, samples, mean, typical, settings.target - clustered)
+    found = Estimate(found.error, max(0.0, found.low - clustered), found.high + clustered)
     picture = trials.picture()
     number = lights.flux.shape[1]
     evaluated = np.count_nonzero(exact.is_known) * number + near.pairs
@@ -202,6 +210,49 @@ def error_driven(
     skip("multires.full_sum", f"{evaluated / max(1, full_pairs):.1%} of its pairs, {count} trials: the error is at "
                               f"most {found.high:.2%} of the mean")
     return ErrorDriven(picture, tuple(trials.split), receivers.covered, *found, threshold, count, evaluated, full_pairs)
+
+
+def clusters(lights: "PixelLights", lightcuts: AutoLightcuts | Lightcuts | None) -> bool:
+    """Return whether lights are summed by clusters."""
+    return isinstance(lightcuts, Lightcuts) or (isinstance(lightcuts, AutoLightcuts) and lights.flux.shape[1] >= MANY)
+
+
+def _evaluated_samples(
+    receivers: Receivers, lights: "PixelLights", pairs: "PairSettings", footprint: Array | None, samples: ErrorSamples,
+    target: float, lightcuts: AutoLightcuts | Lightcuts | None,
+) -> tuple[Packed, ExactIrradiance, float]:
+    """Return the packed lights, the samples' irradiance, and what clusters may take of the error, over the mean.
+
+    Where that is more than half of the target, lights are summed in full.
+    """
+    if clusters(lights, lightcuts):
+        error = lightcuts.error if isinstance(lightcuts, Lightcuts) else CLUSTERED * target
+        packed = checked(receivers, lights, pairs, footprint, Lightcuts(min(max(error, LEAST_ERROR), 1.0)))
+        exact = ExactIrradiance(receivers, packed)
+        exact.evaluate(samples.pixel)
+        taken = 0.0 if packed.tree is None else packed.tree.error * _largest_ratio(samples, exact.at(samples.pixel))
+        if taken <= target / 2:
+            return packed, exact, taken
+        skip("pairs.lightcuts", f"bounds of {taken:.2%} of the mean are too much for the target")
+    packed = checked(receivers, lights, pairs, footprint)
+    exact = ExactIrradiance(receivers, packed)
+    exact.evaluate(samples.pixel)
+    return packed, exact, 0.0
+
+
+def _largest_ratio(samples: ErrorSamples, sampled: Array) -> float:
+    """Return what the RMSE over the mean is at most of an error that each receiver's sum of channels bounds.
+
+    The squares of three channels' errors add up to at most the square of their sum, so the RMSE is at most sqrt(3)
+    times the error times the root mean square of light over its mean, at its upper bound from samples; infinite
+    in the dark.
+    """
+    light = sampled.mean(axis=0, dtype=np.float64)
+    average, uncertainty = estimate_mean(samples, sampled)
+    square, spread = estimate_mean(samples, sampled.astype(np.float64).mean(axis=0, keepdims=True) ** 2)
+    if average <= uncertainty or not light.any():
+        return math.inf
+    return math.sqrt(3.0 * (square + spread)) / (average - uncertainty)
 
 
 def _mean_without_brightest(irradiance: Array) -> float:

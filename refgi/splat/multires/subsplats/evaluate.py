@@ -16,7 +16,7 @@ from refgi.cluster.val import cluster_lights
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import PAIRS_AT_ONCE, Receivers, add_lights, checked
 from refgi.pairs.pair_sum import TILE
-from refgi.pairs.settings import PairSettings
+from refgi.pairs.settings import Lightcuts, PairSettings
 from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.pairs.tiles import taken
 from refgi.rsm import facing_normals
@@ -72,7 +72,8 @@ def points_of(
 
 @stage("multires.evaluate")
 def evaluate(
-    points: Array, normals: Array, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None
+    points: Array, normals: Array, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None,
+    lightcuts: Lightcuts | None = None,
 ) -> Array:
     """Sum the irradiance of every pixel light at some points (Eq. 2).
 
@@ -86,11 +87,14 @@ def evaluate(
         Clamp, offset and lobes of a pair of light and receiver.
     footprint : (N,) ndarray, optional
         Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+    lightcuts : Lightcuts, optional
+        Sum diffuse lights by clusters, to an error.
 
     Returns
     -------
     (3, n) ndarray
-        Irradiance, W/m^2, linear RGB: that of `irradiance` at the same points, to the bit.
+        Irradiance, W/m^2, linear RGB: that of `irradiance` at the same points, to the bit; with lightcuts within their
+        error.
 
     Raises
     ------
@@ -104,7 +108,7 @@ def evaluate(
     """
     count = points.shape[1]
     receivers = Receivers(points[:, None], normals[:, None], np.ones((1, count), np.bool_))
-    packed = checked(receivers, lights, settings, footprint)
+    packed = checked(receivers, lights, settings, footprint, lightcuts)
     result = np.zeros_like(points)
     step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(packed.shines)) // TILE * TILE)
     for first in range(0, count, step):

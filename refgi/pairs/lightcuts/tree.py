@@ -1,0 +1,208 @@
+"""The light tree: clusters of clusters of lights, each with a representative and what its bound needs.
+
+Level 0 are the lights in the order of `order`; a node of level l joins FAN neighbours of level l - 1. A node's
+representative is a light at the mean position, with the mean normal, which is shorter than 1 where normals differ, and
+the flux of all: means are weighted by the sum over the channels. Nodes lie level by level in one array.
+
+Symbols of a cluster: w_i = sum over channels of Phi_i / pi, p and m its mean position and the direction of its mean
+reversed normal, s^2 and v^2 the mean squared distance of positions to p and of normals to their mean, D = sum over
+channels of ``|sum_i (Phi_i / pi) (y_i - p)|`` and N the same of normals: 0 but for colours that change within the
+cluster, and rounding; A areas. All its lights lie within a radius of p and a height of the plane through p across m,
+and their normals within a turn of m.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.pairs.lightcuts.order import compact_order
+from refgi.pairs.pair_sum import Clamp
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+FAN = 4  # children of a node
+ROUNDING = 4.0  # units of rounding that the mean of a node may be off, twice
+INFLATION = 1.0 + 1e-3  # of bounds, for the rounding of what they are computed from
+SOFT, COLUMNS = 9, 10  # of a node: position, reversed normal, flux / pi, softness
+# rows of a node's bound: p, m, turn, height and radius; w, N, D + w s v, w s^2, w |A - mean A| / pi, the least A / pi
+MIDDLE, FACING = 0, 3
+TURN, HEIGHT, RADIUS, WEIGHT, TILT, SHIFT, SPREAD, UNEVEN, SOFTEST, BOUND_ROWS = range(6, 16)
+# rows of what only the build needs: w v^2 and D
+FANNED, MOVED, BUILD_ROWS = range(3)
+
+
+class LightTree(NamedTuple):
+    """A tree over packed diffuse lights."""
+
+    nodes: Array  # (T + 1, COLUMNS): representatives of level 0, 1, ...; the last is black
+    bounds: Array  # (blocks, BOUND_ROWS, FAN): of the children of each node above level 1, and of the highest level
+    starts: Array  # (levels + 1,) int64: first node of each level; the last entry is T
+    clamped: bool  # whether pairs are clamped
+    least: Any  # of the clamp: square of the minimum distance, m^2
+    most: Any  # largest geometry term, 1/m^2
+    error: float  # of a receiver's sum over channels, as a share of it
+
+
+@stage("pairs.light_tree")
+def light_tree(lights: Array, clamp: Clamp | None, error: float) -> LightTree:
+    """Build the light tree of packed diffuse lights.
+
+    Parameters
+    ----------
+    lights : (9, M + 1) ndarray
+        Packed lights: position, reversed normal, flux / pi >= 0; the last one is black.
+    clamp : Clamp or None
+        Their clamp.
+    error : float
+        Largest error of a sum.
+
+    Returns
+    -------
+    LightTree
+        Of as many levels as leave at most FAN nodes on the highest.
+    """
+    count = lights.shape[1] - 1
+    starts = level_starts(count)
+    total = int(starts[-1])
+    nodes = np.zeros((total + 1, COLUMNS), lights.dtype)
+    blocks = -(-(total - count) // FAN) + len(starts)
+    bounds, build = np.zeros((blocks, BOUND_ROWS, FAN), lights.dtype), np.empty((total - count, BUILD_ROWS))
+    _fill_leaves(lights, None if clamp is None else clamp.softness, compact_order(lights, count), nodes)
+    for level in range(1, len(starts) - 1):
+        _fill_level(nodes, starts, level, bounds, build)
+    real = lights.dtype.type
+    least, most = (real(0.0), real(np.inf)) if clamp is None else (clamp.least, clamp.bound)
+    return LightTree(nodes, bounds, starts, clamp is not None, least, most, error)
+
+
+def level_starts(count: int) -> Array:
+    """Return the first node of each level of a tree over `count` lights, and how many nodes there are, int64."""
+    starts, size = [0, count], count
+    while size > FAN:
+        size = -(-size // FAN)
+        starts.append(starts[-1] + size)
+    return np.array(starts, np.int64)
+
+
+def tree_bytes(count: int, float_bytes: int, threads: int) -> int:
+    """Return the memory of a tree over `count` lights, of its build and of the lists of each thread, at most, bytes."""
+    nodes = 4 * count // 3 + 64
+    of_lists = 2 * nodes * (5 + 2 * float_bytes) + 4 * count * 5
+    return nodes * COLUMNS * float_bytes + (nodes - count) * (BOUND_ROWS * float_bytes + 16) + count * 28 + (
+        threads * of_lists)
+
+
+@kernel
+def block_of(starts: Array, level: Any, parent: Any) -> Any:
+    """Return the block of bounds of the children, of level `level` >= 1, of their level's parent number `parent`."""
+    return (starts[level] - starts[1]) // FAN + level - 1 + parent
+
+
+@kernel(parallel=True)
+def _fill_leaves(lights: Array, softness: Array | None, order: Array, nodes: Array) -> None:
+    for k in prange(len(order)):
+        for row in range(9):
+            nodes[k, row] = lights[row, order[k]]
+        if softness is not None:
+            nodes[k, SOFT] = softness[order[k]]
+
+
+@kernel(parallel=True)
+def _fill_level(nodes: Array, starts: Array, level: int, bounds: Array, build: Array) -> None:
+    for k in prange(starts[level + 1] - starts[level]):
+        _fill_node(nodes, starts, level, k, bounds, build)
+
+
+@kernel
+def _fill_node(nodes: Array, starts: Array, level: int, place: int, bounds: Array, build: Array) -> None:
+    """Join the children of node number `place` of a level."""
+    first = starts[level - 1] + FAN * place
+    last, node = min(first + FAN, starts[level]), starts[level] + place
+    of_children = bounds[block_of(starts, level - 1, place) if level > 1 else 0]
+    bound = bounds[block_of(starts, level, place // FAN)]
+    lane, total, mean = place % FAN, 0.0, np.zeros(COLUMNS)
+    for k in range(first, last):
+        total += np.float64(nodes[k, 6]) + nodes[k, 7] + nodes[k, 8]
+    dark = total == 0.0  # fluxes that round to 0: all count alike
+    for k in range(first, last):
+        weight = 1.0 if dark else np.float64(nodes[k, 6]) + nodes[k, 7] + nodes[k, 8]
+        for row in range(6):
+            mean[row] += weight * nodes[k, row]
+        mean[SOFT] += weight * nodes[k, SOFT]
+        for c in range(6, 9):
+            nodes[node, c] += nodes[k, c]
+    if dark:
+        total = np.float64(last - first)
+    length = math.sqrt(mean[3] ** 2 + mean[4] ** 2 + mean[5] ** 2)
+    for row in range(6):
+        nodes[node, row] = mean[row] / total
+    for axis in range(3):
+        bound[MIDDLE + axis, lane] = nodes[node, axis]
+        bound[FACING + axis, lane] = mean[3 + axis] / length if length > 0.0 else nodes[first, 3 + axis]
+    nodes[node, SOFT] = mean[SOFT] / total
+    _fill_extent(nodes, first, last, level, of_children, bound, lane)
+    _fill_terms(nodes, starts, first, last, node, level, of_children, bound, lane, build)
+
+
+@kernel
+def _fill_extent(nodes: Array, first: int, last: int, level: int, of_children: Array, bound: Array, lane: int) -> None:
+    """Fill turn, height and radius from the children's."""
+    turn, height, radius = 0.0, 0.0, 0.0
+    for k in range(first, last):
+        child = k - first
+        away, bent, over = 0.0, 0.0, 0.0
+        for axis in range(3):
+            facing = np.float64(of_children[FACING + axis, child] if level > 1 else nodes[k, 3 + axis])
+            step = np.float64(nodes[k, axis]) - bound[MIDDLE + axis, lane]
+            away += step * step
+            bent += (facing - bound[FACING + axis, lane]) ** 2
+            over += step * bound[FACING + axis, lane]
+        away, bent, over = math.sqrt(away), math.sqrt(bent), abs(over)
+        if level > 1:
+            over += of_children[HEIGHT, child] + bent * of_children[RADIUS, child]
+            away, bent = away + of_children[RADIUS, child], bent + of_children[TURN, child]
+        turn, height, radius = max(turn, bent), max(height, over), max(radius, away)
+    bound[TURN, lane], bound[HEIGHT, lane], bound[RADIUS, lane] = turn, height, radius * INFLATION
+
+
+@kernel
+def _fill_terms(
+    nodes: Array, starts: Array, first: int, last: int, node: int, level: int, of_children: Array, bound: Array,
+    lane: int, build: Array,
+) -> None:
+    eps = np.float64(np.finfo(nodes.dtype).eps)
+    spread, fanned, moved, tilt, uneven, total = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    softest = np.inf
+    moment, turned = np.zeros((3, 3)), np.zeros((3, 3))
+    for k in range(first, last):
+        distance, angle, weight, size = 0.0, 0.0, np.float64(nodes[k, 6]) + nodes[k, 7] + nodes[k, 8], 0.0
+        for axis in range(3):
+            away = np.float64(nodes[k, axis]) - nodes[node, axis]
+            turn = np.float64(nodes[k, 3 + axis]) - nodes[node, 3 + axis]
+            distance, angle, size = distance + away * away, angle + turn * turn, size + abs(nodes[k, axis])
+            for c in range(3):
+                moment[c, axis] += nodes[k, 6 + c] * away
+                turned[c, axis] += nodes[k, 6 + c] * turn
+        slack = ROUNDING * eps * size * math.sqrt(distance)  # a child's own mean is rounded
+        spread, fanned = spread + weight * (distance + slack), fanned + weight * (angle + ROUNDING * eps)
+        uneven += weight * abs(np.float64(nodes[k, SOFT]) - nodes[node, SOFT])
+        total += weight
+        if level > 1:
+            below = k - starts[1]
+            spread, tilt = spread + of_children[SPREAD, k - first], tilt + of_children[TILT, k - first]
+            fanned, moved = fanned + build[below, FANNED], moved + build[below, MOVED]
+            uneven += of_children[UNEVEN, k - first]
+            softest = min(softest, np.float64(of_children[SOFTEST, k - first]))
+        else:
+            softest = min(softest, np.float64(nodes[k, SOFT]))
+    for c in range(3):
+        moved += math.sqrt(moment[c, 0] ** 2 + moment[c, 1] ** 2 + moment[c, 2] ** 2)
+        tilt += math.sqrt(turned[c, 0] ** 2 + turned[c, 1] ** 2 + turned[c, 2] ** 2)
+    build[node - starts[1], FANNED], build[node - starts[1], MOVED] = fanned, moved
+    bound[WEIGHT, lane], bound[TILT, lane], bound[SPREAD, lane] = total, tilt, spread
+    bound[SHIFT, lane], bound[UNEVEN, lane] = moved + math.sqrt(spread * fanned), uneven
+    bound[SOFTEST, lane] = softest

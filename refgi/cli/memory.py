@@ -16,6 +16,7 @@ TRUTH_PIXEL_BYTES = 250  # receivers, moments, results
 COMPARED_PIXEL_BYTES = 90  # a method's or reference's pictures, maps and figures
 TEXEL_FLOATS = 36
 FACE_BYTES = 400  # vertices, faces, Embree's tree
+TEXEL_BYTES = 28  # of an image: float32 with mip levels, and what these are made from
 
 
 def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4, rsm_resolution: int = 512,
@@ -44,7 +45,9 @@ def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4,
     """
     pixel = PIXEL_FLOATS * float_bytes + traced * TRUTH_PIXEL_BYTES + compared * COMPARED_PIXEL_BYTES
     texels = map_count(scene) * rsm_resolution**2 * TEXEL_FLOATS * float_bytes
-    return width * height * pixel + texels + scene.face_count * FACE_BYTES
+    images = {one.texture.image for one in scene.materials if one.texture is not None}
+    painted = sum(image.width * image.height for image in images) * TEXEL_BYTES
+    return width * height * pixel + texels + scene.face_count * FACE_BYTES + painted
 
 
 def map_count(scene: Scene) -> int:

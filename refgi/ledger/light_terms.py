@@ -40,11 +40,14 @@ def light_terms(rsm: "Rsm", geometry: "Geometry", materials: "MaterialTable") ->
     glass = np.asarray(materials.ior) > 0
     absorption = 1.0 - np.asarray(materials.diffuse, np.float64) - materials.specular
     met, missed = _shares(rsm, geometry, len(glass))
+    absorbed = met[~glass] @ absorption[~glass]
+    if materials.textures is not None:
+        absorbed = _absorbed_by_texels(rsm, geometry, materials)
     refracted, reflected = _refracted_and_reflected(rsm, geometry, glass)
     return LightTerms(
         emitted=emitted_power(rsm.light, rsm.projection),
         missed=missed * strength,
-        absorbed=(met[~glass] @ absorption[~glass]) * strength,
+        absorbed=absorbed * strength,
         glass=met[glass].sum() * strength - refracted,
         reflected=reflected,
         refracted=refracted,
@@ -80,6 +83,17 @@ def _shares(rsm: "Rsm", geometry: "Geometry", materials: int) -> tuple[Array, fl
     met, share = rsm.covered, texel_shares(rsm.light, rsm.projection)
     material = geometry.material_of_face[rsm.triangle_id[met]]
     return np.bincount(material, share[met], minlength=materials), float(share[~met].sum())
+
+
+def _absorbed_by_texels(rsm: "Rsm", geometry: "Geometry", materials: "MaterialTable") -> Array:
+    """Return what opaque surfaces absorb of a light's share of power, (3,), where reflectances vary over a surface."""
+    from refgi.rsm import texel_shares
+
+    met, share = rsm.covered, texel_shares(rsm.light, rsm.projection)
+    material = geometry.material_of_face[rsm.triangle_id[met]]
+    opaque = np.asarray(materials.ior)[material] == 0
+    reflectance = rsm.albedo[:, met].astype(np.float64) + np.asarray(materials.specular, np.float64)[material].T
+    return np.asarray(((1.0 - reflectance) * (share[met] * opaque)).sum(axis=1))
 
 
 def _refracted_and_reflected(rsm: "Rsm", geometry: "Geometry", glass: Array) -> tuple[Array, Array]:

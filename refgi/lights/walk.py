@@ -119,7 +119,8 @@ def _paths(
         opaque = (materials.ior[material] == 0)[:, None]
         power = np.where(opaque, rays.power, 0)
         mirror = rays.direction - 2 * (rays.direction * normal).sum(axis=1, keepdims=True) * normal
-        vertices.append(PathVertices(position, normal, power * materials.diffuse[material],
+        diffuse = _diffuse(geometry, materials, hits.triangle_id[met], material, position)
+        vertices.append(PathVertices(position, normal, power * diffuse,
                                      power * materials.specular[material], mirror, materials.exponent[material]))
         u, v = rays.numbers[:, 2 + 2 * bounce], rays.numbers[:, 3 + 2 * bounce]
         start = position + tracer.offsets(position)[:, None] * normal
@@ -193,6 +194,19 @@ def _surface(geometry: "Geometry", triangle: Array, distance: Array, rays: PathR
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     normal *= np.where((normal * facing).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     return position, normal, geometry.material_of_face[triangle]
+
+
+def _diffuse(geometry: "Geometry", materials: "MaterialTable", triangle: Array, material: Array,
+             position: Array) -> Array:
+    """Return the diffuse reflectance of each hit: its material's, times the texture at that very point."""
+    diffuse = materials.diffuse[material]
+    if materials.textures is not None and geometry.uv is not None:
+        from refgi.scene.texture.lookup import multiply_at
+
+        diffuse = np.array(diffuse)
+        multiply_at(materials.textures.table, geometry.vertices, geometry.faces, geometry.uv, triangle,
+                    material, position, diffuse)
+    return diffuse
 
 
 def _pixel_lights(vertices: list[PathVertices], drawn: int) -> "PixelLights":

@@ -13,7 +13,7 @@ import numpy as np
 
 from refgi.errors import InputError
 from refgi.image import canonical_json
-from refgi.scene import Camera, DirectionalLight, Light, PointLight, Scene, SpotLight
+from refgi.scene import Camera, DirectionalLight, Light, Material, PointLight, Scene, SpotLight
 from refgi.settings import Settings, flat
 
 LIGHTS: dict[str, type[SpotLight] | type[PointLight] | type[DirectionalLight]] = {
@@ -51,7 +51,7 @@ def plain(value: Any) -> Any:
 
 
 def geometry_digest(scene: Scene) -> str:
-    """Return SHA-256 over all triangles, their normals and which material each has.
+    """Return SHA-256 over all triangles, their normals, texture coordinates and which material each has.
 
     Parameters
     ----------
@@ -68,11 +68,14 @@ def geometry_digest(scene: Scene) -> str:
                         (shape.vertex_normals, "<f8")):
         plane = np.zeros(0, kind) if array is None else np.ascontiguousarray(array, kind)
         digest.update(f"{plane.shape}\0".encode() + plane.tobytes())
+    if shape.uv is not None:  # absent, the digest is that of earlier versions
+        uv = np.ascontiguousarray(shape.uv, "<f8")
+        digest.update(f"uv {uv.shape}\0".encode() + uv.tobytes())
     return digest.hexdigest()
 
 
 def materials_digest(scene: Scene) -> str:
-    """Return SHA-256 over all materials, their names and their order.
+    """Return SHA-256 over all materials, their names and their order, and every texel of their images.
 
     Parameters
     ----------
@@ -84,7 +87,17 @@ def materials_digest(scene: Scene) -> str:
     str
         Equal on every machine.
     """
-    return hashlib.sha256(canonical_json(plain(scene.materials)).encode()).hexdigest()
+    return hashlib.sha256(canonical_json([_material_json(one) for one in scene.materials]).encode()).hexdigest()
+
+
+def _material_json(material: Material) -> dict[str, Any]:
+    """Return a material as JSON values; its texture only where it has one, the image by its digest."""
+    texture = material.texture
+    fields: dict[str, Any] = plain(dataclasses.replace(material, texture=None))
+    del fields["texture"]
+    if texture is not None:
+        fields["texture"] = {"image": texture.image.digest, "wrap": list(texture.wrap), "filter": texture.filter}
+    return fields
 
 
 def light_json(light: Light) -> dict[str, Any]:

@@ -18,12 +18,14 @@ from refgi.scene.model import (
     material_table,
     merge,
 )
+from refgi.scene.texture import Image, Texture
 
 __all__ = [
     "BuiltinScene",
     "Camera",
     "DirectionalLight",
     "Geometry",
+    "Image",
     "Light",
     "LightTable",
     "Material",
@@ -32,6 +34,7 @@ __all__ = [
     "PointLight",
     "Scene",
     "SpotLight",
+    "Texture",
     "builtin_scenes",
     "light_table",
     "load_scene",

@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.scene.texture.table import Textures, textures_of
+from refgi.scene.texture.texture import Texture
 from refgi.scene.values import BLACK, BRIGHTEST, Array, Rgb, as_float_tuples, is_number, is_vector
 
 SHARPEST = 1e20  # Phong exponent; far within float32
@@ -22,6 +24,7 @@ class Material:
     `diffuse` and `specular` are reflectances (1), `exponent` is the Phong exponent of the lobe around the mirror
     direction (normalised so that `specular` is its reflectance), `ior` the index of refraction of a dielectric (0:
     opaque), `emission` the radiance the surface emits by itself (W/m^2/sr; seen by the camera, not a light source).
+    `texture` multiplies `diffuse` where a surface has texture coordinates.
     """
 
     name: str = "default"
@@ -30,6 +33,7 @@ class Material:
     exponent: float = 0.0
     ior: float = 0.0
     emission: Rgb = BLACK
+    texture: Texture | None = None
 
     def __post_init__(self) -> None:
         for key in ("diffuse", "specular"):
@@ -45,6 +49,8 @@ class Material:
         possible = self.is_dielectric or not reflects_too_much(self.diffuse, self.specular)
         expect(possible, f"material {self.name!r}: diffuse + specular", "at most 1 in each channel",
                [round(d + s, 6) for d, s in zip(self.diffuse, self.specular, strict=True)])
+        expect(self.texture is None or isinstance(self.texture, Texture), f"material {self.name!r}: texture",
+               "a Texture or None", type(self.texture).__name__)
         as_float_tuples(self, "diffuse", "specular", "emission")
 
     @property
@@ -85,6 +91,7 @@ class MaterialTable(NamedTuple):
     exponent: Array  # (m,) Phong exponent
     ior: Array  # (m,) index of refraction, 0 where opaque
     emission: Array  # (m, 3) radiance, W/m^2/sr
+    textures: Textures | None = None  # that multiply `diffuse`; None where no material has one
 
 
 def material_table(materials: Sequence[Material], dtype: npt.DTypeLike = np.float64) -> MaterialTable:
@@ -107,4 +114,4 @@ def material_table(materials: Sequence[Material], dtype: npt.DTypeLike = np.floa
         return values.reshape((-1, width) if width > 1 else -1)
 
     return MaterialTable(column("diffuse", 3), column("specular", 3), column("exponent", 1), column("ior", 1),
-                         column("emission", 3))
+                         column("emission", 3), textures_of([material.texture for material in materials]))

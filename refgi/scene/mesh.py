@@ -22,18 +22,24 @@ BATCH = 1 << 18  # vertices and faces in a batch: some megabytes
 SHORTEST, LONGEST = 1e-100, 1e100  # of a normal: its square neither vanishes nor overflows
 # A vertex is 24 bytes, a face 12 and its material 4; joining the meshes holds them twice for a moment.
 BYTES_OF_VERTEX, BYTES_OF_FACE = 2 * 24, 2 * (12 + 4)
+BYTES_OF_COORDINATES = 2 * 48  # of a face's texture coordinates
+BYTES_OF_TEXEL = 6 + 16 + 12  # its codes, the table's float32 with mip levels, and what these are made from
 MOST_VERTICES = 2**31 - 1  # corner indices are int32
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles of one material in world space: vertices (n, 3) m, faces (m, 3), optional vertex normals (n, 3)."""
+    """Triangles of one material in world space: vertices (n, 3) m, faces (m, 3), optional vertex normals (n, 3).
+
+    `uv` (m, 3, 2): texture coordinates of each face's corners, v = 0 at the top of the picture, or None.
+    """
 
     vertices: Array
     faces: Array
     normals: Array | None = None
     material: Material = UNPAINTED
     name: str = "mesh"
+    uv: Array | None = None
 
     def expect_sound(self, where: str) -> None:
         """Raise `InputError` naming `where` unless shapes, coordinates and indices make a mesh."""
@@ -53,6 +59,8 @@ class Mesh:
         if self.normals is not None:
             expect(np.shape(self.normals) == vertices.shape, f"{where}: normals", f"shape {vertices.shape}",
                    np.shape(self.normals))
+        if self.uv is not None:
+            expect_coordinates(self.uv, len(faces), where)
 
 
 class Batch(NamedTuple):
@@ -114,6 +122,14 @@ def expect_all_sound(meshes: Sequence[Mesh], name: Callable[[int], str]) -> None
         meshes[number].expect_sound(name(number))
 
 
+def expect_coordinates(uv: Array, faces: int, where: str) -> None:
+    """Raise `InputError` naming `where` unless there is a finite pair of texture coordinates for each corner."""
+    expect(np.shape(uv) == (faces, 3, 2), f"{where}: uv", f"shape {(faces, 3, 2)}", np.shape(uv))
+    if not (uv.min(initial=0) >= -LARGEST and uv.max(initial=0) <= LARGEST):  # so that NaN fails as well
+        row = int(np.argmin((np.abs(uv) <= LARGEST).all(axis=(1, 2))))
+        expect(False, f"{where}: uv of face {row}", f"finite texture coordinates up to {LARGEST:g}", uv[row].tolist())
+
+
 def as_float64(values: Array) -> Array:
     """Return values as float64; a signalling NaN of float32 becomes a quiet one without a word."""
     with np.errstate(invalid="ignore"):
@@ -158,18 +174,21 @@ def _rows_of_three(array: Array, kinds: str) -> bool:
     return array.ndim == 2 and array.shape[1] == 3 and array.dtype.kind in kinds
 
 
-def expect_memory(vertices: int, faces: int, where: str) -> None:
-    """Raise `InputError` unless indices and memory suffice for a scene's geometry.
+def expect_memory(vertices: int, faces: int, where: str, *, texels: int = 0, textured: bool = False) -> None:
+    """Raise `InputError` unless indices and memory suffice for a scene's geometry and images.
 
-    `vertices`, `faces`: of the whole scene, instances counted each. `where`: file and key, for the error's text. Raises
-    `InputError` if there are more vertices than an int32 can count, or more bytes than the machine has.
+    `vertices`, `faces`: of the whole scene, instances counted each. `where`: file and key, for the error's text.
+    `texels`: of all images, each counted once. `textured`: faces have texture coordinates. Raises `InputError` if there
+    are more vertices than an int32 can count, or more bytes than the machine has.
     """
     expect(vertices <= MOST_VERTICES, where, f"at most {MOST_VERTICES} vertices in all", vertices)
-    needed = vertices * BYTES_OF_VERTEX + faces * BYTES_OF_FACE
+    needed = vertices * BYTES_OF_VERTEX + faces * (BYTES_OF_FACE + BYTES_OF_COORDINATES * textured)
+    needed += texels * BYTES_OF_TEXEL
     present = physical_memory()
     if needed > present:  # called for every object of a file; the text is made once
+        images = f" and {texels} texels" if texels else ""
         expect(False, where, f"a scene that fits in {present / 2**30:.1f} GiB of memory",
-               f"{vertices} vertices and {faces} faces ({needed / 2**30:.1f} GiB)")
+               f"{vertices} vertices and {faces} faces{images} ({needed / 2**30:.1f} GiB)")
 
 
 def physical_memory() -> float:

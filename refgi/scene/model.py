@@ -27,7 +27,7 @@ from refgi.scene.light import (
     light_table,
 )
 from refgi.scene.material import Material, MaterialTable, material_table
-from refgi.scene.mesh import Mesh, expect_all_sound, expect_memory
+from refgi.scene.mesh import Mesh, expect_all_sound, expect_coordinates, expect_memory
 from refgi.scene.source import Source
 from refgi.scene.values import (
     BLACK,
@@ -74,19 +74,23 @@ class Geometry:
     """All triangles of a scene in world space, in mesh order.
 
     `vertices` (n, 3) float64, m; `faces` (m, 3) int32; `material_of_face` (m,) int32, index into the scene's
-    materials; `vertex_normals` (n, 3) float64 unit vectors, or None where the scene shades with face normals.
+    materials; `vertex_normals` (n, 3) float64 unit vectors, or None where the scene shades with face normals; `uv`
+    (m, 3, 2) float64 texture coordinates of each face's corners, or None where no material has a texture.
     """
 
     vertices: Array
     faces: Array
     material_of_face: Array
     vertex_normals: Array | None = None
+    uv: Array | None = None
 
     def __post_init__(self) -> None:
         if len(self.faces):
             Mesh(self.vertices, self.faces, self.vertex_normals).expect_sound("geometry")
         expect(np.shape(self.material_of_face) == (len(self.faces),), "geometry: material_of_face",
                f"one index a face, shape {(len(self.faces),)}", np.shape(self.material_of_face))
+        if self.uv is not None:
+            expect_coordinates(self.uv, len(self.faces), "geometry")
 
     @cached_property
     def materials_needed(self) -> int:
@@ -155,6 +159,9 @@ class Scene:
         expect(is_number(self.exposure) and self.exposure > 0, "exposure", "a finite number > 0", self.exposure)
         expect(self.geometry.materials_needed <= len(self.materials), "materials",
                f"the {self.geometry.materials_needed} that the geometry names", len(self.materials))
+        textured = [material.name for material in self.materials if material.texture is not None]
+        expect(not textured or self.geometry.uv is not None, "geometry: uv", "texture coordinates for the textures of "
+               f"{len(textured)} material(s)", None)
         for light in self.lights:
             expect(isinstance(light, Light), "lights", "spot, point or directional lights", light)
 
@@ -195,7 +202,9 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
         If a mesh has a coordinate that is not finite or an index out of range, or all do not fit in memory.
     """
     expect_all_sound(meshes, lambda number: f"mesh {number} ({meshes[number].name})")
-    expect_memory(sum(len(mesh.vertices) for mesh in meshes), sum(len(mesh.faces) for mesh in meshes), "meshes")
+    textured = any(mesh.material.texture is not None for mesh in meshes)
+    expect_memory(sum(len(mesh.vertices) for mesh in meshes), sum(len(mesh.faces) for mesh in meshes), "meshes",
+                  texels=_texels(meshes), textured=textured)
     index_of: dict[Material, int] = {}
     index = [index_of.setdefault(mesh.material, len(index_of)) for mesh in meshes]
     smooth = smooth and any(mesh.normals is not None for mesh in meshes)
@@ -209,7 +218,24 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
         np.concatenate(faces) if faces else np.zeros((0, 3), np.int32),
         np.repeat(np.array(index, np.int32), np.array([len(part) for part in faces], np.int64)),
         np.concatenate([np.asarray(m.normals, np.float64) for m in meshes]) if smooth else None,
+        np.concatenate([_coordinates(mesh) for mesh in meshes]) if textured else None,
     ), tuple(index_of)
+
+
+def _texels(meshes: Sequence[Mesh]) -> int:
+    """Return the number of texels of all images, each counted once."""
+    textures = dict.fromkeys(mesh.material.texture for mesh in meshes if mesh.material.texture is not None)
+    images = dict.fromkeys(texture.image for texture in textures)
+    return sum(image.width * image.height for image in images)
+
+
+def _coordinates(mesh: Mesh) -> Array:
+    """Return texture coordinates of a mesh's corners, (m, 3, 2); 0 where it needs none."""
+    if mesh.uv is None:
+        expect(mesh.material.texture is None, f"mesh {mesh.name}: uv",
+               f"texture coordinates for the texture of material {mesh.material.name!r}", None)
+        return np.zeros((len(mesh.faces), 3, 2))
+    return np.asarray(mesh.uv, np.float64)
 
 
 def _with_face_normals(mesh: Mesh) -> Mesh:
@@ -219,4 +245,4 @@ def _with_face_normals(mesh: Mesh) -> Mesh:
     normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
     vertices = corners.reshape(-1, 3)
     return Mesh(vertices, np.arange(len(vertices)).reshape(-1, 3), np.repeat(normals, 3, axis=0), mesh.material,
-                mesh.name)
+                mesh.name, mesh.uv)

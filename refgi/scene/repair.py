@@ -72,7 +72,7 @@ def repaired(mesh: Mesh, where: str) -> tuple[Mesh, int]:
     dropped = int(np.count_nonzero(flat))
     expect(dropped < len(mesh.faces), f"{where}: faces", "at least one with an area", f"{dropped} of zero area")
     if dropped:
-        mesh = dataclasses.replace(mesh, faces=mesh.faces[~flat])
+        mesh = dataclasses.replace(mesh, faces=mesh.faces[~flat], uv=None if mesh.uv is None else mesh.uv[~flat])
     if mesh.normals is not None:
         mesh = dataclasses.replace(mesh, normals=unit_normals(mesh))
     return mesh, dropped

@@ -18,6 +18,8 @@ from refgi.scene.model import Camera, Light, Material, Mesh, Scene, merge
 from refgi.scene.obj import read_obj
 from refgi.scene.ply import read_ply
 from refgi.scene.repair import lights_with_power, repaired_all, warn_of_flat_faces, warn_of_unit
+from refgi.scene.texture.image import image_file
+from refgi.scene.texture.texture import Texture
 from refgi.scene.transform import transformed_all
 
 READERS: dict[str, Callable[[Path], Contents]] = {
@@ -26,10 +28,10 @@ READERS: dict[str, Callable[[Path], Contents]] = {
 PLAINER = {"missing": "expected a value, nothing given", "extra_forbidden": "unknown key",
            "union_tag_invalid": "type: expected one of {expected_tags}",
            "union_tag_not_found": "expected a type"}
-KINDS = ("diffuse", "phong", "dielectric", "spot", "point", "directional", "name", "inline")
+KINDS = ("diffuse", "phong", "dielectric", "spot", "point", "directional", "name", "inline", "rgb", "image")
 
 if TYPE_CHECKING:
-    from refgi.scene.schema import Object, SceneFile
+    from refgi.scene.schema import MaterialEntry, Object, SceneFile
 
 
 def read_scene_file(path: Path, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
@@ -40,8 +42,7 @@ def read_scene_file(path: Path, camera: Camera | None, lights: Sequence[Light] |
     """
     content = read_bytes(path).removeprefix(codecs.BOM_UTF8)
     entry = _validated(content, path, need_camera=camera is None, need_lights=lights is None)
-    materials = {name: material.built(name) for name, material in entry.materials.items()}
-    meshes = _meshes(entry, materials, path)
+    meshes = _meshes(entry, _materials(entry, path), path)
     geometry, used = merge(meshes, smooth=any(mesh.normals is not None for mesh in meshes))
     warn_of_unit(geometry, str(path))
     if camera is None and entry.camera is not None:
@@ -50,6 +51,32 @@ def read_scene_file(path: Path, camera: Camera | None, lights: Sequence[Light] |
     assert camera is not None  # by _validated
     return Scene(entry.name, geometry, used, camera, lights_with_power(chosen, f"{path}: lights"), entry.description,
                  entry.preview_exposure)
+
+
+def _materials(entry: "SceneFile", path: Path) -> dict[str, Material]:
+    """Return the named materials with their images, or raise one error with all that cannot be read."""
+    faults: list[str] = []
+    materials: dict[str, Material] = {}
+    for name, material in entry.materials.items():
+        try:
+            materials[name] = _built(material, name, path.parent)
+        except InputError as error:
+            faults.append(f"{path}: materials.{shortened(name)}.diffuse.texture: {error}")
+    _raise_if_any(faults)
+    return materials
+
+
+def _built(entry: "MaterialEntry", name: str, folder: Path) -> Material:
+    """Return a material with its texture decoded; raises `InputError` if the image cannot be read."""
+    from refgi.scene.schema import TextureEntry
+
+    material: Material = entry.built(name)
+    reflectance = getattr(entry, "diffuse", None)
+    if not isinstance(reflectance, TextureEntry):
+        return material
+    wrap = reflectance.wrap if isinstance(reflectance.wrap, tuple) else (reflectance.wrap, reflectance.wrap)
+    texture = Texture(image_file(folder / reflectance.texture), wrap, reflectance.filter)
+    return dataclasses.replace(material, texture=texture)
 
 
 def _validated(content: bytes, path: Path, *, need_camera: bool, need_lights: bool) -> "SceneFile":
@@ -165,7 +192,12 @@ def _object_meshes(
         except InputError as error:
             faults.append(f"{path}: objects[{number}].mesh: {error}")
             continue
-        meshes += [_with_material(mesh, item, materials, entry.smooth_normals) for mesh in found.meshes]
+        try:
+            meshes += [_with_material(mesh, item, materials, entry.smooth_normals, path.parent)
+                       for mesh in found.meshes]
+        except InputError as error:
+            faults.append(f"{path}: objects[{number}].material: {error}")
+            continue
         owner += [number] * len(found.meshes)
     return meshes, owner
 
@@ -185,14 +217,19 @@ def _read_once(contents: dict[str, Contents | InputError], name: str, folder: Pa
     return found
 
 
-def _with_material(mesh: Mesh, item: "Object", materials: dict[str, Material], smooth: bool) -> Mesh:
-    """Return the mesh with its material, and with normals only where the scene enables them."""
+def _with_material(mesh: Mesh, item: "Object", materials: dict[str, Material], smooth: bool, folder: Path) -> Mesh:
+    """Return the mesh with its material, and with normals only where the scene enables them.
+
+    Raises `InputError` if the material's texture cannot be read, or the mesh has no coordinates for it.
+    """
     if isinstance(item.material, str):
         material = materials[item.material]
     elif item.material is not None:
-        material = item.material.built(item.name or mesh.name)
+        material = _built(item.material, item.name or mesh.name, folder)
     else:
         material = materials.get(mesh.material.name, mesh.material)
+    expect(material.texture is None or mesh.uv is not None, item.mesh,
+           f"texture coordinates for the texture of material {material.name!r}", "none")
     has_normals = smooth if item.smooth_normals is None else item.smooth_normals
     return dataclasses.replace(mesh, material=material, normals=mesh.normals if has_normals else None)
 

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, Validatio
 from refgi.errors import MOST_FAULTS, shortened
 from refgi.scene import model
 from refgi.scene.files import did_you_mean
+from refgi.scene.texture.texture import Filter, Wrap
 from refgi.scene.transform import affine
 
 
@@ -57,30 +58,52 @@ class Entry(BaseModel):
         """Return the counterpart in `refgi.scene.model`."""
 
 
+class TextureEntry(Entry):
+    """A reflectance that an image varies."""
+
+    texture: Annotated[str, Field(min_length=1)]
+    factor: Triple = (1.0, 1.0, 1.0)
+    wrap: Wrap | tuple[Wrap, Wrap] = "repeat"
+    filter: Filter = "trilinear"
+
+
+def _form_of_reflectance(value: Any) -> str:
+    return "image" if isinstance(value, dict | TextureEntry) else "rgb"
+
+
+Reflectance = Annotated[
+    Annotated[Triple, Tag("rgb")] | Annotated[TextureEntry, Tag("image")], Discriminator(_form_of_reflectance)]
+
+
+def factor_of(reflectance: Triple | TextureEntry) -> Triple:
+    """Return a reflectance's colour, that of a texture its factor."""
+    return reflectance.factor if isinstance(reflectance, TextureEntry) else reflectance
+
+
 class Diffuse(Entry):
     """A diffuse surface."""
 
     type: Literal["diffuse"]
-    diffuse: Triple
+    diffuse: Reflectance
     emission: Triple = model.BLACK
 
     def built(self, name: str) -> model.Material:
-        """Return the material under this name."""
-        return model.Material(name, self.diffuse, emission=self.emission)
+        """Return the material under this name, without its texture's image."""
+        return model.Material(name, factor_of(self.diffuse), emission=self.emission)
 
 
 class Phong(Entry):
     """A diffuse surface with a Phong lobe."""
 
     type: Literal["phong"]
-    diffuse: Triple
+    diffuse: Reflectance
     specular: Triple
     exponent: Number
     emission: Triple = model.BLACK
 
     def built(self, name: str) -> model.Material:
-        """Return the material under this name."""
-        return model.Material(name, self.diffuse, self.specular, self.exponent, emission=self.emission)
+        """Return the material under this name, without its texture's image."""
+        return model.Material(name, factor_of(self.diffuse), self.specular, self.exponent, emission=self.emission)
 
 
 class Dielectric(Entry):

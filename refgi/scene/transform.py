@@ -83,5 +83,7 @@ def _moved(mesh: Mesh, matrix: Array, inverse: Array, mirrors: bool) -> Mesh:
         normals = np.where(missing_normals(normals)[:, None], 0.0, normals) @ inverse
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
-    faces = mesh.faces[:, ::-1] if mirrors else mesh.faces
-    return dataclasses.replace(mesh, vertices=vertices, faces=faces, normals=normals)
+    faces, uv = mesh.faces, mesh.uv
+    if mirrors:
+        faces, uv = faces[:, ::-1], None if uv is None else uv[:, ::-1]
+    return dataclasses.replace(mesh, vertices=vertices, faces=faces, normals=normals, uv=uv)

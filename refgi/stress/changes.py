@@ -153,7 +153,8 @@ def _remeshed(remesh: Callable[[Geometry], Geometry]) -> Callable[[Scene, int, i
 
 def _permuted(shape: Geometry) -> Geometry:
     order = np.random.default_rng(SHUFFLE).permutation(len(shape.faces))
-    return dataclasses.replace(shape, faces=shape.faces[order], material_of_face=shape.material_of_face[order])
+    return dataclasses.replace(shape, faces=shape.faces[order], material_of_face=shape.material_of_face[order],
+                               uv=None if shape.uv is None else shape.uv[order])
 
 
 def _unwelded(shape: Geometry) -> Geometry:
@@ -165,7 +166,8 @@ def _unwelded(shape: Geometry) -> Geometry:
 
 def _doubled(shape: Geometry) -> Geometry:
     return dataclasses.replace(shape, faces=np.concatenate([shape.faces] * 2),
-                               material_of_face=np.concatenate([shape.material_of_face] * 2))
+                               material_of_face=np.concatenate([shape.material_of_face] * 2),
+                               uv=None if shape.uv is None else np.concatenate([shape.uv] * 2))
 
 
 def _split(shape: Geometry) -> Geometry:
@@ -180,7 +182,15 @@ def _split(shape: Geometry) -> Geometry:
     return Geometry(with_middles(np.asarray(shape.vertices, np.float64)),
                     np.concatenate([np.stack(quarter, axis=1) for quarter in quarters]).astype(np.int32),
                     np.concatenate([shape.material_of_face] * 4),
-                    None if shape.vertex_normals is None else with_middles(shape.vertex_normals))
+                    None if shape.vertex_normals is None else with_middles(shape.vertex_normals),
+                    None if shape.uv is None else _split_coordinates(shape.uv))
+
+
+def _split_coordinates(uv: Array) -> Array:
+    a, b, c = np.moveaxis(uv, 1, 0)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    quarters = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return np.concatenate([np.stack(quarter, axis=1) for quarter in quarters])
 
 
 def _two_lamps(scene: Scene, _: int, __: int) -> Changed:
@@ -211,7 +221,8 @@ def _with_plane(scene: Scene, axis: int, place: float, half: float) -> Scene:
     return dataclasses.replace(scene, geometry=Geometry(
         np.concatenate([shape.vertices, corners]), np.concatenate([shape.faces, faces]).astype(np.int32),
         np.append(shape.material_of_face, [0, 0]).astype(np.int32),
-        None if normals is None else np.concatenate([normals, np.tile(np.eye(3)[axis], (4, 1))])))
+        None if normals is None else np.concatenate([normals, np.tile(np.eye(3)[axis], (4, 1))]),
+        None if shape.uv is None else np.concatenate([shape.uv, np.zeros((2, 3, 2))])))
 
 
 def _is_hidden(scene: Scene, faces: int, width: int, height: int) -> bool:

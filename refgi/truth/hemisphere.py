@@ -21,6 +21,7 @@ from refgi.sampling import hash_bits, sobol_owen
 from refgi.scene import LightTable
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point, row
 from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_pattern, shading_normal
+from refgi.truth.textured import diffuse_at
 
 Array = npt.NDArray[Any]
 
@@ -128,7 +129,7 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         side, side_out = dot(cross, toward), dot(cross, w)
         if side * side_out <= 0:
             continue
-        rho, glossy = row(surfaces.diffuse, material), row(surfaces.specular, material)
+        glossy = row(surfaces.specular, material)
         has_lobe = max(glossy[0], glossy[1], glossy[2]) > 0
         least = 0.0  # pattern that the light side covers: b r^2 / <n_x.w>, as G = pattern <n_x.w> / r^2
         if bound > 0:
@@ -141,6 +142,7 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         if max(red, green, blue) <= 0:
             continue
         light, irradiance = (lx, ly, lz), (red, green, blue)
+        rho = diffuse_at(surfaces.textures, surfaces, triangle, y)
         scale = math.copysign(1 / math.sqrt(dot(cross, cross)), side)
         g = (cross[0] * scale, cross[1] * scale, cross[2] * scale)
         n = shading_normal(surfaces, triangle, y, g)

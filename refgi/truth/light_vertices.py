@@ -16,8 +16,9 @@ from refgi.radiometry import DIRECTIONAL, radiant_intensity
 from refgi.rays import MISS, Tracer
 from refgi.scene import LightTable
 from refgi.truth.light_grid import LightRays
-from refgi.truth.paths import CHUNK
+from refgi.truth.paths import CHUNK, row
 from refgi.truth.surfaces import Surfaces, face_normal, height_above, shading_normal
+from refgi.truth.textured import diffuse_at
 
 Array = npt.NDArray[Any]
 
@@ -144,7 +145,8 @@ def _fill_span(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array
         else:
             light, area = radiant_intensity(lights, k, d[0], d[1], d[2]), measure * t * t
         for part in range(len(points.power) // len(triangle_id)):
-            rho = surfaces.diffuse[material] if part == 0 else surfaces.specular[material]
+            rho = (diffuse_at(surfaces.textures, surfaces, triangle, y) if part == 0
+                   else row(surfaces.specular, material))
             # Phi / pi, Phi = rho I(l) Omega
             share = measure * weights[i] / np.pi
             flux = (rho[0] * light[0] * share, rho[1] * light[1] * share, rho[2] * light[2] * share)

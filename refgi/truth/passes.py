@@ -21,6 +21,7 @@ from refgi.truth.light_pass import add_light_side
 from refgi.truth.paths import Paths, dot, hit_point, row
 from refgi.truth.surfaces import Surfaces, around, face_normal, lift, shading_normal
 from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
+from refgi.truth.textured import diffuse_at
 
 Array = npt.NDArray[Any]
 # A lobe may point below an interpolated horizon: K is 1/2 no more, but <r.w>^P / K stays below 18 for K >= 1e-12.
@@ -79,13 +80,13 @@ def _scatter(surfaces: Surfaces, grain: float, word: Any, paths: Paths, ray: int
     if triangle == MISS:
         return
     material = surfaces.material_of_face[triangle]
-    rho, glossy = row(surfaces.diffuse, material), row(surfaces.specular, material)
+    back, y = hit_point(paths, ray)
+    rho, glossy = diffuse_at(surfaces.textures, surfaces, triangle, y), row(surfaces.specular, material)
     most, most_glossy = max(rho[0], rho[1], rho[2]), max(glossy[0], glossy[1], glossy[2])
     if most + most_glossy <= 0:
         return
     u, v = _uniform(word ^ np.uint32(0x68E31DA4)), _uniform(word ^ np.uint32(0xB5297A4D))
     chance = most / (most + most_glossy)
-    back, y = hit_point(paths, ray)
     g = face_normal(surfaces, triangle, -back[0], -back[1], -back[2])
     n = shading_normal(surfaces, triangle, y, g)
     cos_g, cos_n = dot(g, back), dot(n, back)

@@ -21,6 +21,7 @@ from refgi.lobes import lobe_gap, lobe_norm, lobe_power
 from refgi.radiometry import orthonormal_basis
 from refgi.rays import ray_offset
 from refgi.scene import LightTable, Scene, light_table, material_table
+from refgi.scene.texture.table import TextureTable
 
 Array = npt.NDArray[Any]
 
@@ -35,6 +36,8 @@ class Surfaces(NamedTuple):
     diffuse: Array  # (k, 3) float64 reflectances by material; dielectrics are black
     specular: Array  # (k, 3) float64
     exponent: Array  # (k,) float64
+    uv: Array | None = None  # (m, 3, 2) float64 texture coordinates, where there are textures
+    textures: TextureTable | None = None  # that multiply `diffuse`: `refgi.truth.textured.diffuse_at`
 
 
 def surfaces(scene: Scene, mirror_exponent: float = math.inf) -> Surfaces:
@@ -46,10 +49,12 @@ def surfaces(scene: Scene, mirror_exponent: float = math.inf) -> Surfaces:
     table.diffuse[table.ior > 0] = 0
     table.specular[(table.ior > 0) | (table.exponent >= mirror_exponent)] = 0
     normals = geometry.vertex_normals
+    textured = None if table.textures is None else table.textures.table
     return Surfaces(np.ascontiguousarray(geometry.vertices, np.float64), np.ascontiguousarray(geometry.faces, np.int32),
                     np.zeros((0, 3)) if normals is None else np.ascontiguousarray(normals, np.float64),
                     np.ascontiguousarray(geometry.material_of_face, np.int32), table.diffuse, table.specular,
-                    table.exponent)
+                    table.exponent, None if textured is None else np.ascontiguousarray(geometry.uv, np.float64),
+                    textured)
 
 
 def lights_of(scene: Scene) -> LightTable:

@@ -8,7 +8,9 @@ import pytest
 
 from refgi.frame import Frame
 from refgi.ledger import pixel_areas
+from refgi.ledger.light_terms import light_terms
 from refgi.lights.selection import choose_lights
+from refgi.rsm import texel_shares
 from refgi.rsm.raster.projection import CUBE_FORWARD, CUBE_UP
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
 from refgi.settings import of, replaced
@@ -18,6 +20,7 @@ from refgi.stages import observe
 from tests.form_factors import polygon_form_factor
 from tests.naive import ledger as naive
 from tests.naive.radiometry import lobe_fraction
+from tests.textured import room
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
@@ -297,3 +300,35 @@ def test_who_does_not_ask_does_not_pay(frames):
     with observe() as log:
         sii(frame, of(SiiSettings, lights=32, cut_irradiance=0.1))
     assert not {"sii.ledger", "sii.cut_irradiance"} & {run.name for run in log.runs}
+
+
+@pytest.mark.feature("REF-22")
+@pytest.mark.parametrize("chosen", ["nearest", "trilinear"])
+@pytest.mark.parametrize("settings", [{}, {"filtered": True, "pattern": "grid", "lights": 64}, {"source": "walk"}])
+def test_lines_sum_to_the_whole_with_textures(chosen, settings, evidence):
+    frame = Frame(room(chosen), rsm_resolution=96)
+    ledger = sii_ledger(frame, of(SiiSettings, **settings))
+    evidence(f"{chosen}: {balance(ledger):.1e} of the emitted power is missing")
+    assert balance(ledger) <= WHOLE
+
+
+def test_a_textured_wall_absorbs_what_its_texels_leave():
+    """In float64, texel by texel: shares of the light's power times 1 - albedo."""
+    frame = Frame(room(), rsm_resolution=48, dtype=np.float64)
+    terms, rsm = light_terms(frame.rsms[0], frame.scene.geometry, frame.materials), frame.rsms[0]
+    power = np.array(frame.scene.lights[0].intensity)
+    share = texel_shares(rsm.light, rsm.projection)
+    seen = rsm.covered
+    expected = [(share * (1 - rsm.albedo[c]))[seen].sum() * power[c] for c in range(3)]
+    np.testing.assert_allclose(terms.absorbed, expected, rtol=1e-12)
+    np.testing.assert_allclose(terms.absorbed + terms.reflected + terms.missed, terms.emitted, rtol=1e-6)
+    assert rsm.albedo[0][seen].std() > 0.2
+
+
+def test_glass_beside_a_texture_absorbs_nothing():
+    scene = room()
+    glass = dataclasses.replace(scene, materials=(Material("glass", (0.0, 0.0, 0.0), ior=1.5), scene.materials[1]))
+    frame = Frame(glass, rsm_resolution=48, dtype=np.float64)
+    terms = light_terms(frame.rsms[0], frame.scene.geometry, frame.materials)
+    assert terms.glass.min() > 0.1
+    np.testing.assert_allclose(terms.absorbed + terms.glass + terms.reflected + terms.missed, terms.emitted, rtol=1e-6)

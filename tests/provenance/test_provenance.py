@@ -14,8 +14,20 @@ from refgi.provenance import plain, program, scene_record
 from refgi.provenance.content import camera_from, geometry_digest, light_from, light_json, materials_digest
 from refgi.provenance.frames import same_sequence
 from refgi.provenance.record import git_id
-from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
+from refgi.scene import (
+    Camera,
+    DirectionalLight,
+    Geometry,
+    Image,
+    Material,
+    PointLight,
+    Scene,
+    SpotLight,
+    Texture,
+    load_scene,
+)
 from tests.scene.samples import write_scene
+from tests.textured import room
 
 OPTIONS = {"dtype": "float32", "rsm_resolution": 16, "shadows": "map"}
 PAINT = (Material("a"),)
@@ -150,3 +162,22 @@ def test_frames_are_of_one_sequence_however_scene_and_path_are_named():
     assert same_sequence(a, b | {"settings": {"n": 2, "m": 3}}) == ["settings.m", "settings.n"]
     assert same_sequence(a, {**b, "path": {"source": "p.toml", "sha256": "2"}}) == ["path.sha256"]
     assert same_sequence(a, {"frame": 1}) != []
+
+
+@pytest.mark.feature("REF-22")
+def test_a_changed_texel_or_coordinate_changes_the_digests():
+    scene = room()
+    paint, uv = scene.materials[1], scene.geometry.uv
+    pixels = paint.texture.image.pixels.copy()
+    pixels[1, 2, 0] += np.float32(1e-7)
+    others = [dataclasses.replace(paint, texture=change) for change in (
+        None, Texture(Image(pixels), ("clamp", "clamp")), Texture(paint.texture.image, ("clamp", "mirror")),
+        Texture(paint.texture.image, ("clamp", "clamp"), "bilinear"))]
+    digests = {materials_digest(dataclasses.replace(scene, materials=(scene.materials[0], one)))
+               for one in (paint, *others)}
+    assert len(digests) == 5
+    assert materials_digest(room()) in digests
+    turned = dataclasses.replace(scene, geometry=dataclasses.replace(scene.geometry, uv=uv[:, ::-1]))
+    bare = dataclasses.replace(scene, materials=(others[0], others[0]), geometry=dataclasses.replace(
+        scene.geometry, uv=None))
+    assert len({geometry_digest(one) for one in (scene, turned, bare)}) == 3

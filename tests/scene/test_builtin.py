@@ -18,8 +18,8 @@ from refgi.scene.builtin.stage import vase
 from refgi.scene.builtin.surfaces import ring_surface, sphere
 from refgi.scene.model import Material, Mesh
 
-NAMES = ("cornell_box", "cornell_sphere", "atrium", "integrating_sphere", "wedge", "parallel_plates", "ring",
-         "glass_ball", "metaballs", "stage")
+NAMES = ("cornell_box", "cornell_sphere", "atrium", "textured_atrium", "integrating_sphere", "wedge", "parallel_plates",
+         "ring", "glass_ball", "metaballs", "stage")
 FACE_SHARE = 0.05  # grids have whole rows and columns
 SMALL_FACE_SHARE = 0.1  # ... of which a form of a hundred faces has few
 
@@ -50,6 +50,28 @@ def test_the_table_lists_every_scene_with_a_line_and_its_faces() -> None:
 def test_faces_come_within_a_share_of_what_was_asked(name: str, faces: int) -> None:
     scene = load_scene(f"{name}:faces={faces}")
     assert abs(scene.face_count / faces - 1) < (FACE_SHARE if faces > 100 else SMALL_FACE_SHARE)
+
+
+def test_the_textured_atrium_is_the_atrium_with_pictures() -> None:
+    plain, scene = load_scene("atrium:faces=20000,seed=4"), load_scene("textured_atrium:faces=20000,seed=4,texels=64")
+    for name in ("vertices", "faces", "material_of_face"):
+        assert np.array_equal(getattr(plain.geometry, name), getattr(scene.geometry, name))
+    assert scene.geometry.uv is not None
+    assert plain.geometry.uv is None
+    bare = [one.name for one in scene.materials if one.texture is None]
+    assert bare == ["water"]
+    for one, other in zip(plain.materials, scene.materials, strict=True):
+        assert one.diffuse == other.diffuse
+        if other.texture is not None:
+            level = other.texture.image.linear()
+            assert level.shape == (64, 64, 3)
+            assert 0.3 < level.mean() < 1
+            assert level.std() > 0.01
+    # the floor's tiles are 1 m, and a picture lies on each: u and v grow by 1 a metre
+    floor = scene.geometry.material_of_face == [one.name for one in scene.materials].index("pale_tile")
+    corner = scene.geometry.vertices[scene.geometry.faces[floor]]
+    flat = np.ptp(corner[..., 1], axis=1) == 0
+    assert np.array_equal(scene.geometry.uv[floor][flat], corner[flat][..., [0, 2]])
 
 
 def test_ten_million_faces_of_the_atrium() -> None:

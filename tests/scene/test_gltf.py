@@ -147,7 +147,7 @@ def test_without_camera_and_light_both_are_placed(tmp_path: Path) -> None:
 def test_what_has_no_triangles_is_passed_over_with_a_count(tmp_path: Path) -> None:
     def edit(tree: dict[str, Any]) -> None:
         tree["meshes"][0]["primitives"].append({"attributes": {"POSITION": 0}, "mode": 1})
-        tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
+        tree["materials"][0]["normalTexture"] = {"index": 0}
 
     with pytest.warns(RefgiWarning, match="passed over") as said:
         load_scene(written(tmp_path, edit))
@@ -155,7 +155,7 @@ def test_what_has_no_triangles_is_passed_over_with_a_count(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("key", ["normalTexture", "occlusionTexture", "emissiveTexture"])
-def test_any_texture_and_vertex_colours_are_passed_over_with_a_count(tmp_path: Path, key: str) -> None:
+def test_any_other_texture_and_vertex_colours_are_passed_over_with_a_count(tmp_path: Path, key: str) -> None:
     def edit(tree: dict[str, Any]) -> None:
         tree["materials"][0][key] = {"index": 0}
         tree["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 0
@@ -163,7 +163,8 @@ def test_any_texture_and_vertex_colours_are_passed_over_with_a_count(tmp_path: P
     with pytest.warns(RefgiWarning) as said:
         load_scene(written(tmp_path, edit))
     assert {str(warning.message).partition(": ")[2] for warning in said} == {
-        "1 material(s)' textures passed over", "1 primitive(s)' vertex colours passed over"}
+        f"1 material(s)' {'normal maps' if key == 'normalTexture' else 'other textures'} passed over",
+        "1 primitive(s)' vertex colours passed over"}
 
 
 def chained(scale: list[float], depth: int = 3) -> Edit:

@@ -82,19 +82,19 @@ def test_albedo_over_one_in_a_material_file(tmp_path: Path) -> None:
 
 def test_textures_are_passed_over_with_a_count_and_those_that_are_missing_named(tmp_path: Path) -> None:
     (tmp_path / "the wood.png").write_bytes(b"")
-    (tmp_path / "m.mtl").write_text("newmtl a\nKd 0.5 0.5 0.5\nmap_Kd -s 1 1 1 the wood.png\nbump absent bump.png\n"
+    (tmp_path / "m.mtl").write_text("newmtl a\nKd 0.5 0.5 0.5\nmap_Ka -s 1 1 1 the wood.png\nbump absent bump.png\n"
                                     "newmtl b\nmap_Ks gone.png\n")
     with pytest.warns(RefgiWarning) as said:
         read_obj(written(tmp_path, "mtllib m.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\nmtllib m.mtl\n"))
     assert [str(warning.message) for warning in said] == [
-        f"{tmp_path / 'm.mtl'}: 3 texture(s) (bump, map_Kd, map_Ks) passed over; "
+        f"{tmp_path / 'm.mtl'}: 3 texture(s) (bump, map_Ka, map_Ks) passed over; "
         "2 of them name no file: absent bump.png, gone.png"]
 
 
 def test_textures_that_are_there_are_passed_over_with_a_count(tmp_path: Path) -> None:
     (tmp_path / "wood.png").write_bytes(b"")
-    (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd wood.png\n")
-    with pytest.warns(RefgiWarning, match=r"m\.mtl: 1 texture\(s\) \(map_Kd\) passed over$"):
+    (tmp_path / "m.mtl").write_text("newmtl a\nmap_Ka wood.png\n")
+    with pytest.warns(RefgiWarning, match=r"m\.mtl: 1 texture\(s\) \(map_Ka\) passed over$"):
         read_obj(written(tmp_path, "mtllib m.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n"))
 
 

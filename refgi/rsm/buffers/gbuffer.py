@@ -10,6 +10,7 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, resolve_at
 from refgi.rsm.buffers.surfaces import Surface
+from refgi.rsm.buffers.textures import paint
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection, camera_projection
 from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
@@ -174,6 +175,7 @@ class GBuffer:
             surface = _surface(self._geometry, self._materials, self.dtype)
             channels = ChannelMask(*(name in missing for name in ChannelMask._fields))
             resolve_at(surface, self.projection, self.visibility.triangle_id, texel, channels, planes, allocate(1, 1))
+            paint(self._geometry, self._materials, self.projection, self.visibility.triangle_id, planes.albedo, texel)
             computed = {name: getattr(planes, name)[..., 0, :] for name in missing}
         return tuple(computed[n] if n in computed else values_at(self.resolve(n)[0], texel) for n in names)
 
@@ -260,6 +262,7 @@ def _resolve(
     channels = ChannelMask(*(name in names for name in ChannelMask._fields))
     scratch = allocate(numba.get_num_threads())
     resolve(_surface(geometry, materials, dtype), projection, triangle_id, channels, planes, scratch)
+    paint(geometry, materials, projection, triangle_id, planes.albedo)
     return {name: getattr(planes, name) for name in names}
 
 

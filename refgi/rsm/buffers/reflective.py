@@ -86,6 +86,11 @@ class Rsm:
         return self.resolve("normal")[0]
 
     @property
+    def albedo(self) -> Array:
+        """Diffuse reflectance, (3, H, W): of a texture its mean over the texel, where its filter is trilinear."""
+        return self._view.albedo
+
+    @property
     def solid_angle(self) -> Array:
         """Solid angle of the whole texel, (H, W), sr; directional: its area perpendicular to the light, m^2."""
         return self.resolve("solid_angle")[0]

@@ -12,6 +12,7 @@ from refgi.scene.builtin.closed_forms import integrating_sphere, parallel_plates
 from refgi.scene.builtin.cornell import cornell_box, cornell_sphere
 from refgi.scene.builtin.metaballs import metaballs
 from refgi.scene.builtin.stage import glass_ball, ring, stage
+from refgi.scene.builtin.textured_atrium import textured_atrium
 from refgi.scene.files import did_you_mean
 from refgi.scene.model import Scene
 
@@ -78,6 +79,8 @@ SCENES: dict[str, BuiltinScene] = {
         BuiltinScene("cornell_sphere", "A tessellated sphere in the Cornell box", 16_990, cornell_sphere),
         BuiltinScene("atrium", "A colonnade of two storeys with curtains, a spot from above into its courtyard",
                      250_000, atrium),
+        BuiltinScene("textured_atrium", "The atrium with masonry, plaster, tiles and cloth as textures made in code",
+                     250_000, textured_atrium),
         BuiltinScene("integrating_sphere", "Inside a diffuse sphere: one bounce is the same everywhere, in closed form",
                      20_000, integrating_sphere),
         BuiltinScene("wedge", "Two plates that meet in an edge, one evenly lit: closed form", 4, wedge),

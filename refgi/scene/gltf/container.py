@@ -120,11 +120,21 @@ class Document:
             content = self._chunk or b""
         else:
             expect(isinstance(uri, str), f"{self.path}: {where}.uri", "a string", uri)
-            content = self._from_uri(uri, where)
+            content = self.from_uri(uri, where)
         expect(len(content) >= length, f"{self.path}: {where}", f"{length} bytes (the file is cut short)", len(content))
         return content[:length]
 
-    def _from_uri(self, uri: str, where: str) -> bytes:
+    def view(self, index: Any, referrer: str) -> bytes:
+        """Return the bytes of a buffer view that holds a file, such as an image."""
+        entry, where = self.item("bufferViews", index, referrer), f"bufferViews[{index}]"
+        content = self.buffer(self.integer(entry, "buffer", where))
+        start, length = self.integer(entry, "byteOffset", where, 0), self.integer(entry, "byteLength", where)
+        expect(start + length <= len(content), f"{self.path}: {where}",
+               f"a range inside the buffer's {len(content)} bytes", f"{start} to {start + length}")
+        return content[start : start + length]
+
+    def from_uri(self, uri: str, where: str) -> bytes:
+        """Return the bytes behind a uri, of a file beside the document or inside the uri itself."""
         if uri.startswith("data:"):
             head, _, payload = uri.partition(",")
             expect(head.endswith(";base64"), f"{self.path}: {where}.uri", "a base64 data URI", head[:40])

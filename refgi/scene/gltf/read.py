@@ -1,5 +1,10 @@
-"""From a glTF document to meshes in world space: the node tree, primitives and materials."""
+"""From a glTF document to meshes in world space: the node tree, primitives and materials.
 
+Textures of the base colour are decoded when a primitive first shows their material; texture coordinates take the
+material's choice of set and its `KHR_texture_transform` at once, as both are affine.
+"""
+
+import dataclasses
 import warnings
 from pathlib import Path
 from typing import Any
@@ -10,11 +15,13 @@ from refgi.errors import InputError, RefgiWarning, expect
 from refgi.scene.files import Contents
 from refgi.scene.gltf.container import Document, accessor
 from refgi.scene.gltf.nodes import node_camera, node_light, scene_nodes
-from refgi.scene.mesh import expect_memory
+from refgi.scene.gltf.textures import Look, base_colour, transformed
+from refgi.scene.mesh import as_float64, expect_memory
 from refgi.scene.model import Array, Camera, Light, Material, Mesh, Rgb
 from refgi.scene.transform import transformed_all
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
+READ = ("baseColorTexture", "normalTexture")  # or named apart among what is passed over
 
 
 def read_gltf(path: Path) -> Contents:
@@ -50,6 +57,7 @@ class _Reader:
         self.lights: list[Light] = []
         self.passed_over: dict[str, int] = {}
         self.materials: list[Material] = [self._material(index) for index in range(len(document.items("materials")))]
+        self._looks: dict[int, Look | None] = {}
         self._shapes: dict[int, list[Mesh]] = {}
 
     def contents(self) -> Contents:
@@ -113,23 +121,57 @@ class _Reader:
             whole = indices.dtype.kind in "iu"
             expect(whole, f"{self.path}: {where}.indices", "an accessor of integers", indices.dtype)
             corners = indices.astype(np.int64)
-        mesh = Mesh(vertices, _triangles(corners, mode, f"{self.path}: {where}"), normals,
-                    self._material_of(entry, where), name)
+        material, look = self._material_of(entry, where)
+        mesh = Mesh(vertices, _triangles(corners, mode, f"{self.path}: {where}"), normals, material, name)
+        mesh.expect_sound(f"{self.path}: {where}")
+        return self._with_coordinates(mesh, attributes, look, where)
+
+    def _with_coordinates(self, mesh: Mesh, attributes: dict[str, Any], look: Look | None, where: str) -> Mesh:
+        """Return the mesh with the texture coordinates that its material asks for, or without texture."""
+        key = f"TEXCOORD_{0 if look is None else look.coordinates}"
+        if look is None:  # another material may be put on the mesh, which then has a texture
+            return dataclasses.replace(mesh, uv=self._spare_coordinates(mesh, attributes, key))
+        if key not in attributes:
+            self._pass_over(f"primitive(s)' textures for lack of {key}")
+            return dataclasses.replace(mesh, material=dataclasses.replace(mesh.material, texture=None))
+        uv = as_float64(accessor(self.document, attributes[key], "VEC2", f"{where}.attributes.{key}"))
+        expect(len(uv) == len(mesh.vertices), f"{self.path}: {where}.attributes.{key}",
+               f"{len(mesh.vertices)} elements as POSITION", len(uv))
+        mesh = dataclasses.replace(mesh, uv=transformed(uv, look.transform)[mesh.faces])
         mesh.expect_sound(f"{self.path}: {where}")
         return mesh
 
-    def _material_of(self, entry: dict[str, Any], where: str) -> Material:
+    def _spare_coordinates(self, mesh: Mesh, attributes: dict[str, Any], key: str) -> Array | None:
+        """Return texture coordinates that no material here asks for, None where they cannot be used."""
+        if key not in attributes:
+            return None
+        try:
+            uv = as_float64(accessor(self.document, attributes[key], "VEC2", key))
+        except InputError:
+            return None
+        return uv[mesh.faces] if len(uv) == len(mesh.vertices) and np.isfinite(uv).all() else None
+
+    def _material_of(self, entry: dict[str, Any], where: str) -> tuple[Material, Look | None]:
+        """Return a primitive's material and how its texture lies on it, the image decoded when first asked for."""
         if "material" not in entry:
-            return Material()
+            return Material(), None
         index = entry["material"]
-        self.document.item("materials", index, f"{where}.material")
-        return self.materials[int(index)]
+        found = self.document.item("materials", index, f"{where}.material")
+        if index not in self._looks:
+            look = self._looks[index] = base_colour(self.document, found, f"materials[{index}]")
+            if look is not None:
+                self.materials[index] = dataclasses.replace(self.materials[index], texture=look.texture)
+        return self.materials[index], self._looks[index]
 
     def _material(self, index: int) -> Material:
         entry, where = self.document.items("materials")[index], f"materials[{index}]"
         surface = self.document.member(entry, "pbrMetallicRoughness", where)
-        if any(key.endswith("Texture") for key in (*surface, *entry)):
-            self._pass_over("material(s)' textures")
+        if "normalTexture" in entry:
+            self._pass_over("material(s)' normal maps")
+        if any(key.endswith("Texture") and key not in READ for key in (*surface, *entry)):
+            self._pass_over("material(s)' other textures")
+        if entry.get("alphaMode", "OPAQUE") != "OPAQUE":
+            self._pass_over("material(s)' alpha, opaque here,")
         base = self.document.numbers(surface, "baseColorFactor", f"{where}.pbrMetallicRoughness", (1.0,) * 4)
         emissive = self.document.numbers(entry, "emissiveFactor", where, (0.0, 0.0, 0.0))
         key = "KHR_materials_emissive_strength"

@@ -1,0 +1,93 @@
+"""Base colour textures of a glTF document: image, sampler, set of texture coordinates, KHR_texture_transform."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from refgi.errors import InputError, expect, shortened
+from refgi.scene.gltf.container import Document
+from refgi.scene.texture.image import Image, decoded
+from refgi.scene.texture.texture import Filter, Texture, Wrap
+from refgi.scene.values import Array
+
+EXTENSION = "KHR_texture_transform"
+WRAPS: dict[int, Wrap] = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
+FILTERS: dict[int, Filter] = {9728: "nearest", 9729: "bilinear", 9984: "trilinear", 9985: "trilinear",
+                              9986: "trilinear", 9987: "trilinear"}
+LARGEST_SET = 15  # of texture coordinates
+
+
+class Look(NamedTuple):
+    """A texture as a material names it."""
+
+    texture: Texture
+    coordinates: int  # n of TEXCOORD_n
+    transform: Array  # (2, 3): u' and v' from u, v, 1
+
+
+def base_colour(document: Document, material: dict[str, Any], where: str) -> Look | None:
+    """Return the texture of a material's base colour, None where it has none.
+
+    Raises `InputError` that names file and image if it cannot be read.
+    """
+    surface = document.member(material, "pbrMetallicRoughness", where)
+    if "baseColorTexture" not in surface:
+        return None
+    where = f"{where}.pbrMetallicRoughness.baseColorTexture"
+    info = document.member(surface, "baseColorTexture", where)
+    change = document.member(document.member(info, "extensions", where), EXTENSION, f"{where}.extensions")
+    number = document.integer(change, "texCoord", where, document.integer(info, "texCoord", where, 0))
+    expect(number <= LARGEST_SET, f"{document.path}: {where}.texCoord", f"0 to {LARGEST_SET}", number)
+    transform = _transform(document, change, f"{where}.extensions.{EXTENSION}")
+    return Look(_texture(document, info, where), number, transform)
+
+
+def transformed(uv: Array, transform: Array) -> Array:
+    """Return texture coordinates (n, 2) after an affine map (2, 3)."""
+    return np.asarray(uv @ transform[:, :2].T + transform[:, 2])
+
+
+def _transform(document: Document, change: dict[str, Any], where: str) -> Array:
+    sx, sy = document.numbers(change, "scale", where, (1.0, 1.0))
+    ox, oy = document.numbers(change, "offset", where, (0.0, 0.0))
+    angle = document.number(change, "rotation", where, 0.0)
+    c, s = math.cos(angle), math.sin(angle)
+    # u' = c sx u + s sy v + ox, v' = -s sx u + c sy v + oy
+    return np.array([[c * sx, s * sy, ox], [-s * sx, c * sy, oy]])
+
+
+def _texture(document: Document, info: dict[str, Any], where: str) -> Texture:
+    index = info.get("index")
+    entry, where = document.item("textures", index, f"{where}.index"), f"textures[{index}]"
+    wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
+    chosen: Filter = "trilinear"
+    if "sampler" in entry:
+        sampler = document.item("samplers", entry["sampler"], f"{where}.sampler")
+        key = f"samplers[{entry['sampler']}]"
+        across, down = (_code(document, sampler, name, key, WRAPS, 10497) for name in ("wrapS", "wrapT"))
+        wrap = WRAPS[across], WRAPS[down]
+        chosen = FILTERS[_code(document, sampler, "minFilter", key, FILTERS, 9987)]
+    if "source" not in entry:
+        extensions = ", ".join(document.member(entry, "extensions", where)) or "none"
+        raise InputError(f"{document.path}: {where}.source: expected a PNG or JPEG image, got none "
+                         f"(extensions: {shortened(extensions, 80)})")
+    return Texture(_image(document, entry["source"], f"{where}.source"), wrap, chosen)
+
+
+def _code(document: Document, owner: dict[str, Any], key: str, where: str, known: dict[int, Any], default: int) -> int:
+    code = owner.get(key, default)
+    expect(type(code) is int and code in known, f"{document.path}: {where}.{key}", f"one of {sorted(known)}", code)
+    return code  # type: ignore[no-any-return]
+
+
+def _image(document: Document, index: Any, referrer: str) -> Image:
+    entry, where = document.item("images", index, referrer), f"images[{index}]"
+    uri = entry.get("uri")
+    name = f"{document.path}: {where}"
+    if uri is None:
+        expect("bufferView" in entry, f"{name}", "a uri or a bufferView", sorted(entry))
+        return decoded(document.view(entry["bufferView"], f"{where}.bufferView"), name)
+    expect(isinstance(uri, str), f"{name}.uri", "a string", uri)
+    content = document.from_uri(uri, where)
+    return decoded(content, name if uri.startswith("data:") else f"{name}: {shortened(uri, 200)}")

@@ -1,0 +1,182 @@
+"""Images of textures: PNG and JPEG files (TGA and BMP as well) decoded to codes, and the sRGB curve to linear light.
+
+An image keeps the codes of its file, 8 or 16 bits a channel, so that it is small and has a digest that means the same
+everywhere; `linear` applies the curve texel by texel through a table of all codes. Alpha is dropped, grey and palettes
+become RGB, CMYK becomes (1 - C)(1 - K). Colour profiles, gamma and orientation notes of a file are ignored, as glTF
+asks for.
+"""
+
+import functools
+import hashlib
+import io
+import warnings
+import weakref
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from refgi.errors import InputError, expect
+from refgi.scene.values import Array
+
+MOST_TEXELS = 1 << 27  # of one image: 16384 x 8192
+FORMATS = ("PNG", "JPEG", "BMP")
+CODES = {"uint8": 256, "uint16": 65536}
+
+_decoded: "weakref.WeakValueDictionary[str, Image]" = weakref.WeakValueDictionary()  # by digest of the file
+
+
+class Image:
+    """A picture as it was stored: sRGB codes of 8 or 16 bits, or linear numbers.
+
+    Parameters
+    ----------
+    pixels : (h, w, 3) ndarray
+        Row 0 is v = 0. Uint8 or uint16: sRGB codes; float32 or float64: linear RGB from 0 to 1.
+    name : str
+        For messages; of no other meaning.
+
+    Raises
+    ------
+    InputError
+        If shape, type or a value is not usable.
+
+    Notes
+    -----
+    Images are equal if all their pixels are.
+    """
+
+    def __init__(self, pixels: Array, name: str = "image") -> None:
+        kind = pixels.dtype.name
+        expect(pixels.ndim == 3 and pixels.shape[2] == 3 and pixels.size > 0, name, "an (h, w, 3) array of texels",
+               pixels.shape)
+        expect(kind in CODES or kind in ("float32", "float64"), name, "uint8, uint16, float32 or float64 texels", kind)
+        if kind not in CODES:
+            expect(bool((pixels >= 0).all() and (pixels <= 1).all()), name, "linear texels from 0 to 1",
+                   [float(pixels.min()), float(pixels.max())])
+        self.name = name
+        self.pixels = np.ascontiguousarray(pixels)
+
+    @property
+    def height(self) -> int:
+        """Rows."""
+        return int(self.pixels.shape[0])
+
+    @property
+    def width(self) -> int:
+        """Columns."""
+        return int(self.pixels.shape[1])
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """SHA-256 of type, shape and texels."""
+        form = f"{self.pixels.dtype.newbyteorder('<').str} {self.pixels.shape}\0".encode()
+        little = self.pixels.astype(self.pixels.dtype.newbyteorder("<"), copy=False)
+        return hashlib.sha256(form + little.tobytes()).hexdigest()
+
+    def linear(self) -> Array:
+        """Return (h, w, 3) float32 in linear light, each texel by itself."""
+        kind = self.pixels.dtype.name
+        if kind in CODES:
+            return np.asarray(srgb_table(CODES[kind]).astype(np.float32)[self.pixels])
+        return self.pixels.astype(np.float32)
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (isinstance(other, Image) and self.digest == other.digest)
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __repr__(self) -> str:
+        return f"Image({self.name!r}, {self.width} x {self.height}, {self.pixels.dtype.name})"
+
+
+@functools.cache
+def srgb_table(codes: int) -> Array:
+    """Return the linear value of each of so many sRGB codes, (codes,) float64 (IEC 61966-2-1)."""
+    share = np.arange(codes) / (codes - 1)
+    table = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    table.setflags(write=False)
+    return table
+
+
+def image_file(path: Path) -> Image:
+    """Return the image of a file.
+
+    Result: the very object of an earlier call where the file's content is the same and that is still in use. Raises
+    `InputError` naming it if it is missing, cut short, no image or too large.
+    """
+    from refgi.scene.files import read_bytes  # which knows the model, and that materials
+
+    return decoded(read_bytes(path), str(path))
+
+
+def decoded(content: bytes, where: str) -> Image:
+    """Return the image that the bytes of a file hold.
+
+    `where`: what the error's text names. Result: the very object of an earlier call with the same content. Raises
+    `InputError` if it is cut short, no image or too large.
+    """
+    key = hashlib.sha256(content).hexdigest()
+    found = _decoded.get(key)
+    if found is None:
+        found = _decoded[key] = Image(_codes(content, where), where)
+    return found
+
+
+def _codes(content: bytes, where: str) -> Array:
+    """Return (h, w, 3) codes of the file, uint8 or uint16."""
+    from PIL import Image as Pictures
+    from PIL import UnidentifiedImageError
+
+    formats = [*FORMATS, "TGA"] if where.lower().endswith(".tga") else list(FORMATS)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of doubts about a file that decodes all the same; sizes are judged here
+        try:
+            with Pictures.open(io.BytesIO(content), formats=formats) as picture:
+                _expect_size(picture.size, where)
+                return np.array(_read(picture, content), order="C")
+        except InputError:
+            raise
+        except UnidentifiedImageError as error:
+            raise InputError(f"{where}: expected an image ({', '.join(formats)}), got {content[:8]!r}") from error
+        except Pictures.DecompressionBombError as error:
+            raise InputError(f"{where}: expected at most {MOST_TEXELS:,} texels: {error}") from error
+        except Exception as error:  # a damaged file raises nearly any
+            raise InputError(f"{where}: damaged or cut short: {error}") from error
+
+
+def _expect_size(size: tuple[int, int], where: str) -> None:
+    from refgi.scene.mesh import BYTES_OF_TEXEL, physical_memory
+
+    texels = size[0] * size[1]
+    expect(texels <= MOST_TEXELS, where, f"at most {MOST_TEXELS:,} texels", f"{size[0]} x {size[1]}")
+    present = physical_memory()
+    expect(texels * BYTES_OF_TEXEL <= present, where, f"an image that fits in {present / 2**30:.1f} GiB of memory",
+           f"{size[0]} x {size[1]} ({texels * BYTES_OF_TEXEL / 2**30:.1f} GiB)")
+
+
+def _read(picture: Any, content: bytes) -> Array:
+    """Return (h, w, 3) codes of an opened picture."""
+    if picture.mode in ("I", "I;16", "I;16B", "I;16L"):
+        return np.repeat(np.asarray(picture).astype(np.uint16)[..., None], 3, axis=2)
+    raw = picture.tile[0][3] if picture.format == "PNG" and picture.tile else None
+    if raw in ("RGB;16B", "RGBA;16B"):
+        return _both_bytes(picture, content, raw)
+    if picture.mode == "CMYK":
+        ink = 255 - np.asarray(picture).astype(np.uint32)
+        return ((ink[..., :3] * ink[..., 3:] + 127) // 255).astype(np.uint8)
+    if picture.mode in ("LA", "PA", "RGBA", "P"):
+        return np.asarray(picture.convert("RGBA"))[..., :3]
+    return np.asarray(picture.convert("RGB"))
+
+
+def _both_bytes(picture: Any, content: bytes, raw: str) -> Array:
+    """Return the codes of a 16-bit colour PNG, which Pillow decodes to one byte of each: the upper, then the lower."""
+    from PIL import Image as Pictures
+
+    upper = np.asarray(picture)[..., :3].astype(np.uint16)
+    with Pictures.open(io.BytesIO(content), formats=["PNG"]) as again:
+        again.tile = [again.tile[0]._replace(args=raw.replace("16B", "16L"))]
+        lower = np.asarray(again)[..., :3].astype(np.uint16)
+    return upper << 8 | lower

@@ -17,6 +17,7 @@ COMPARED_PIXEL_BYTES = 90  # a method's or reference's pictures, maps and figure
 TEXEL_FLOATS = 36
 FACE_BYTES = 400  # vertices, faces, Embree's tree
 TEXEL_BYTES = 28  # of an image: float32 with mip levels, and what these are made from
+ALPHA_BYTES = 12  # of a texel whose alpha is asked for: codes, float32, and what that is made from
 
 
 def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4, rsm_resolution: int = 512,
@@ -47,6 +48,8 @@ def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4,
     texels = map_count(scene) * rsm_resolution**2 * TEXEL_FLOATS * float_bytes
     images = {one.texture.image for one in scene.materials if one.texture is not None}
     painted = sum(image.width * image.height for image in images) * TEXEL_BYTES
+    cut = {one.texture.image for one in scene.materials if one.texture is not None and one.cutoff is not None}
+    painted += sum(image.width * image.height for image in cut) * ALPHA_BYTES
     return width * height * pixel + texels + scene.face_count * FACE_BYTES + painted
 
 

@@ -24,7 +24,8 @@ class Material:
     `diffuse` and `specular` are reflectances (1), `exponent` is the Phong exponent of the lobe around the mirror
     direction (normalised so that `specular` is its reflectance), `ior` the index of refraction of a dielectric (0:
     opaque), `emission` the radiance the surface emits by itself (W/m^2/sr; seen by the camera, not a light source).
-    `texture` multiplies `diffuse` where a surface has texture coordinates.
+    `texture` multiplies `diffuse` where a surface has texture coordinates. With a `cutoff` the surface has holes: it is
+    there only where `alpha` times the texture's alpha is at least the cutoff (None: it is there everywhere).
     """
 
     name: str = "default"
@@ -34,6 +35,8 @@ class Material:
     ior: float = 0.0
     emission: Rgb = BLACK
     texture: Texture | None = None
+    alpha: float = 1.0
+    cutoff: float | None = None
 
     def __post_init__(self) -> None:
         for key in ("diffuse", "specular"):
@@ -51,6 +54,10 @@ class Material:
                [round(d + s, 6) for d, s in zip(self.diffuse, self.specular, strict=True)])
         expect(self.texture is None or isinstance(self.texture, Texture), f"material {self.name!r}: texture",
                "a Texture or None", type(self.texture).__name__)
+        expect(is_number(self.alpha) and 0 <= self.alpha <= 1, f"material {self.name!r}: alpha", "a number from 0 to 1",
+               self.alpha)
+        expect(self.cutoff is None or (is_number(self.cutoff) and self.cutoff >= 0), f"material {self.name!r}: cutoff",
+               "a number >= 0, or None", self.cutoff)
         as_float_tuples(self, "diffuse", "specular", "emission")
 
     @property

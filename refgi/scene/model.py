@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from refgi.errors import expect
+from refgi.scene.cutouts import CutFaces, CutOuts, cut_faces, cut_outs
 from refgi.scene.light import (
     DIRECTIONAL,
     POINT,
@@ -75,7 +76,9 @@ class Geometry:
 
     `vertices` (n, 3) float64, m; `faces` (m, 3) int32; `material_of_face` (m,) int32, index into the scene's
     materials; `vertex_normals` (n, 3) float64 unit vectors, or None where the scene shades with face normals; `uv`
-    (m, 3, 2) float64 texture coordinates of each face's corners, or None where no material has a texture.
+    (m, 3, 2) float64 texture coordinates of each face's corners, or None where no material has a texture; `cut_outs`
+    where surfaces of the materials have holes, or None where none has: those of the scene's materials, which `merge`
+    and `Scene` put here.
     """
 
     vertices: Array
@@ -83,6 +86,7 @@ class Geometry:
     material_of_face: Array
     vertex_normals: Array | None = None
     uv: Array | None = None
+    cut_outs: CutOuts | None = None
 
     def __post_init__(self) -> None:
         if len(self.faces):
@@ -98,6 +102,20 @@ class Geometry:
         expect(self.material_of_face.min(initial=0) >= 0, "geometry: material_of_face", "indices >= 0",
                self.material_of_face.min(initial=0))
         return int(self.material_of_face.max(initial=-1)) + 1
+
+    @cached_property
+    def cut(self) -> CutFaces | None:
+        """The triangles that may have holes, None where there are none."""
+        return cut_faces(self)
+
+    @cached_property
+    def without_cut(self) -> Array:
+        """Vertices of the faces, of those that may have holes the first one three times: they show nothing."""
+        if self.cut is None:
+            return self.faces
+        faces = self.faces.copy()
+        faces[self.cut.face] = faces[self.cut.face, :1]
+        return faces
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
@@ -162,6 +180,9 @@ class Scene:
         textured = [material.name for material in self.materials if material.texture is not None]
         expect(not textured or self.geometry.uv is not None, "geometry: uv", "texture coordinates for the textures of "
                f"{len(textured)} material(s)", None)
+        holes = cut_outs(self.materials)
+        if holes != self.geometry.cut_outs:
+            object.__setattr__(self, "geometry", dataclasses.replace(self.geometry, cut_outs=holes))
         for light in self.lights:
             expect(isinstance(light, Light), "lights", "spot, point or directional lights", light)
 
@@ -219,6 +240,7 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
         np.repeat(np.array(index, np.int32), np.array([len(part) for part in faces], np.int64)),
         np.concatenate([np.asarray(m.normals, np.float64) for m in meshes]) if smooth else None,
         np.concatenate([_coordinates(mesh) for mesh in meshes]) if textured else None,
+        cut_outs(tuple(index_of)),
     ), tuple(index_of)
 
 

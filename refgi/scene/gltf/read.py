@@ -21,6 +21,7 @@ from refgi.scene.model import Array, Camera, Light, Material, Mesh, Rgb
 from refgi.scene.transform import transformed_all
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
+CUTOFF = 0.5  # glTF's default of alphaCutoff
 READ = ("baseColorTexture", "normalTexture")  # or named apart among what is passed over
 
 
@@ -56,6 +57,7 @@ class _Reader:
         self.cameras: list[Camera] = []
         self.lights: list[Light] = []
         self.passed_over: dict[str, int] = {}
+        self.blended = 0  # materials
         self.materials: list[Material] = [self._material(index) for index in range(len(document.items("materials")))]
         self._looks: dict[int, Look | None] = {}
         self._shapes: dict[int, list[Mesh]] = {}
@@ -72,6 +74,9 @@ class _Reader:
             self._view_and_light(node, nodes.world[k], where)
         for what, count in self.passed_over.items():
             warnings.warn(RefgiWarning(f"{self.path}: {count} {what} passed over"), stacklevel=4)
+        if self.blended:
+            warnings.warn(RefgiWarning(f"{self.path}: {self.blended} material(s) of alphaMode BLEND taken as MASK with a "
+                                       f"cutoff of {CUTOFF}: there is no partial transparency"), stacklevel=4)
         meshes = transformed_all(shapes, nodes.world[placed_by]) if shapes else []
         return Contents(tuple(meshes), tuple(self.cameras), tuple(self.lights))
 
@@ -170,18 +175,29 @@ class _Reader:
             self._pass_over("material(s)' normal maps")
         if any(key.endswith("Texture") and key not in READ for key in (*surface, *entry)):
             self._pass_over("material(s)' other textures")
-        if entry.get("alphaMode", "OPAQUE") != "OPAQUE":
-            self._pass_over("material(s)' alpha, opaque here,")
         base = self.document.numbers(surface, "baseColorFactor", f"{where}.pbrMetallicRoughness", (1.0,) * 4)
         emissive = self.document.numbers(entry, "emissiveFactor", where, (0.0, 0.0, 0.0))
         key = "KHR_materials_emissive_strength"
         extension = self.document.member(self.document.member(entry, "extensions", where), key, where)
         strength = self.document.number(extension, "emissiveStrength", f"{where}.extensions.{key}", 1.0)
         emission: Rgb = (emissive[0] * strength, emissive[1] * strength, emissive[2] * strength)
+        cutoff = self._cutoff(entry, where)
         try:
-            return Material(self.document.name(entry, where), (base[0], base[1], base[2]), emission=emission)
+            return Material(self.document.name(entry, where), (base[0], base[1], base[2]), emission=emission,
+                            alpha=1.0 if cutoff is None else base[3], cutoff=cutoff)
         except InputError as error:
             raise InputError(f"{self.path}: {where}: {error}") from error
+
+    def _cutoff(self, entry: dict[str, Any], where: str) -> float | None:
+        """Return from which alpha on a material is there, None where it is there everywhere."""
+        mode = entry.get("alphaMode", "OPAQUE")
+        expect(mode in ("OPAQUE", "MASK", "BLEND"), f"{self.path}: {where}.alphaMode", "OPAQUE, MASK or BLEND", mode)
+        if mode == "OPAQUE":
+            return None
+        if mode == "BLEND":
+            self.blended += 1
+            return CUTOFF
+        return self.document.number(entry, "alphaCutoff", where, CUTOFF)
 
     def _pass_over(self, what: str) -> None:
         self.passed_over[what] = self.passed_over.get(what, 0) + 1

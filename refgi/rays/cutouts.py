@@ -19,7 +19,7 @@ from numba.extending import intrinsic
 
 from refgi.jit import kernel, prange
 from refgi.scene import Geometry
-from refgi.scene.texture.alpha import AlphaTable, is_opaque
+from refgi.scene.texture.alpha import NO_MASKS, AlphaTable, is_opaque
 
 Array = npt.NDArray[Any]
 
@@ -33,7 +33,7 @@ PRIMITIVE = 5  # word of 4 bytes in a hit: which triangle
 class RayHoles(NamedTuple):
     """The triangles that may have holes, c of them."""
 
-    of_face: Array  # (m,) int32: which of them each triangle is, -1 for one without holes; (0,) where no scene has any
+    of_face: Array  # (m,) int32: which of them each triangle is, -1 for one without holes; (0,) where none has any
     corner: Array  # (c, 9) float64, m: first corner, the edges from it to the second and the third
     uv: Array  # (c, 6) float64: u and v at the first corner, their change along either edge
     mask: Array  # (c,) int64: row of the table
@@ -44,15 +44,12 @@ def ray_holes(geometry: Geometry) -> RayHoles:
     """Return a geometry's triangles that may have holes, as rays ask for them."""
     cut = geometry.cut
     if cut is None:
-        none = AlphaTable(np.zeros(0, np.float32), np.zeros((0, 6), np.int64), np.zeros((0, 2)))
-        return RayHoles(np.zeros(0, np.int32), np.zeros((0, 9)), np.zeros((0, 6)), np.zeros(0, np.int64), none)
-    of_face = np.full(len(geometry.faces), -1, np.int32)
-    of_face[cut.face] = np.arange(len(cut.face))
+        return RayHoles(np.zeros(0, np.int32), np.zeros((0, 9)), np.zeros((0, 6)), np.zeros(0, np.int64), NO_MASKS)
     corner = np.asarray(geometry.vertices, np.float64)[geometry.faces[cut.face]]
     corner[:, 1:] -= corner[:, :1]
     uv = cut.uv.reshape(-1, 3, 2).copy()
     uv[:, 1:] -= uv[:, :1]
-    return RayHoles(of_face, corner.reshape(-1, 9), uv.reshape(-1, 6), cut.mask, cut.table)
+    return RayHoles(cut.of_face, corner.reshape(-1, 9), uv.reshape(-1, 6), cut.mask, cut.table)
 
 
 @kernel

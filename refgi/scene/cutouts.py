@@ -12,7 +12,7 @@ import numpy as np
 
 from refgi.errors import expect
 from refgi.scene.material import Material
-from refgi.scene.texture.alpha import AlphaTable
+from refgi.scene.texture.alpha import NO_MASKS, AlphaTable
 from refgi.scene.texture.image import Image
 from refgi.scene.texture.table import WRAPS
 from refgi.scene.texture.texture import Texture
@@ -56,13 +56,16 @@ class CutOuts:
 
 
 class CutFaces(NamedTuple):
-    """The triangles that may have holes, for kernels."""
+    """The triangles that may have holes, for kernels: c of them."""
 
     face: Array  # (c,) int32: which triangles, in mesh order
+    of_face: Array  # (m,) int32: which of them each triangle is, -1 for one without holes
     uv: Array  # (c, 6) float64: u and v at the first corner, the second, the third
     mask: Array  # (c,) int64: row of the table
     table: AlphaTable
 
+
+NO_CUT = CutFaces(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 6)), np.zeros(0, np.int64), NO_MASKS)
 
 _in_use: "weakref.WeakValueDictionary[Key, CutOuts]" = weakref.WeakValueDictionary()
 
@@ -103,7 +106,9 @@ def cut_faces(geometry: "Geometry") -> CutFaces | None:
     textured = geometry.cut_outs.table.mask[mask[face], 1].any()
     expect(geometry.uv is not None or not textured, "geometry: uv", "texture coordinates for its cut-outs", None)
     uv = np.zeros((len(face), 6)) if geometry.uv is None else geometry.uv[face].reshape(-1, 6)
-    return CutFaces(face, np.ascontiguousarray(uv, np.float64), mask[face], geometry.cut_outs.table)
+    of_face = np.full(len(mask), -1, np.int32)
+    of_face[face] = np.arange(len(face))
+    return CutFaces(face, of_face, np.ascontiguousarray(uv, np.float64), mask[face], geometry.cut_outs.table)
 
 
 def _holes(material: Material) -> tuple[Texture | None, float, float] | None:

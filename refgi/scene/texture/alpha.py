@@ -25,6 +25,9 @@ class AlphaTable(NamedTuple):
     limit: Array  # (k, 2) float64: factor, cutoff
 
 
+NO_MASKS = AlphaTable(np.zeros(0, np.float32), np.zeros((0, 6), np.int64), np.zeros((0, 2)))
+
+
 @kernel
 def is_opaque(table: AlphaTable, mask: int, u: float, v: float) -> bool:
     """Return whether a surface is there at (u, v), by one of the masks; a mask without texels is a hole as a whole."""

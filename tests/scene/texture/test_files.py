@@ -187,7 +187,7 @@ def test_what_is_not_read_is_said(tmp_path: Path) -> None:
         scene = load_scene(textured(tmp_path, edit))
     assert {str(one.message).partition(": ")[2] for one in said} == {
         "1 material(s)' normal maps passed over", "1 material(s)' other textures passed over",
-        "1 material(s)' alpha, opaque here, passed over", "1 primitive(s)' textures for lack of TEXCOORD_0 passed over"}
+        "1 primitive(s)' textures for lack of TEXCOORD_0 passed over"}
     assert scene.materials[0].texture is None
 
 

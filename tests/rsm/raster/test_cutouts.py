@@ -1,0 +1,207 @@
+"""Cut-outs on maps: what a literal ray sees, what rays of Embree see, and the same as a mesh cut by hand."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from refgi.frame import Frame
+from refgi.jit import threads
+from refgi.rays import Tracer
+from refgi.rsm import camera_projection, paraboloid_depth_maps
+from refgi.rsm.raster.projection import cube_projection, paraboloid_projection
+from refgi.rsm.raster.visibility_buffer import rasterize
+from refgi.scene import Camera, Geometry, Material, PointLight, Scene, load_scene
+from tests.cutouts import heap, holed_quad, opaque
+from tests.naive import cutouts as naive
+from tests.rsm.raster.test_against_embree import edge_distance, pixel_rays
+from tests.rsm.raster.test_raster import RAYS, projections
+
+DOUBT = 1e-6  # of alpha or a barycentric coordinate: nearer decisions are rounding, as is nearness in float32
+NEAR_EDGE = 1e-3  # px
+OF_ALPHA = 1e-4  # a ray's direction is rounded to float32: a texel of the leaf is moved by 1e-5 of its size
+NAMES = tuple(projections())
+
+
+def texel_rays(projection):
+    """Origin and direction of each texel of the stacked maps, None outside a disc."""
+    for row in range(projection.shape[0]):
+        m, local = divmod(row, projection.height)
+        for column in range(projection.width):
+            yield row, column, RAYS[projection.kind](projection.origin[m], projection.frame[m], projection.half,
+                                                     projection.height, projection.width, local, column)
+
+
+@pytest.mark.feature("REF-25")
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("chosen", ["nearest", "trilinear"])
+def test_ids_are_those_of_a_literal_ray(name: str, chosen: str, evidence: Callable[[str], None]) -> None:
+    scene, projection = heap(18, chosen=chosen), projections()[name]
+    seen, doubtful, through = rasterize(scene.geometry, projection), 0, 0
+    for row, column, ray in texel_rays(projection):
+        if ray is None:
+            assert seen.triangle_id[row, column] == -1
+            continue
+        found = naive.hits(*ray, scene.geometry, scene.materials)
+        face, _, margin = naive.first(found)
+        through += len(found) > 0 and face != found[0][1]
+        if margin < DOUBT:
+            doubtful += 1
+        else:
+            assert seen.triangle_id[row, column] == face
+    evidence(f"{name}, {chosen}: {through} texels of {seen.triangle_id.size} see through holes, {doubtful} in doubt")
+    assert through > 20
+    assert doubtful <= 2
+
+
+def test_nearness_is_that_of_what_is_seen_behind() -> None:
+    scene, projection = heap(18), projections()["perspective"]
+    seen = rasterize(scene.geometry, projection)
+    for row, column, ray in texel_rays(projection):
+        face, t, margin = naive.nearest(*ray, scene.geometry, scene.materials)
+        if margin >= DOUBT:
+            expected = 0.0 if face < 0 else 1 / t
+            assert seen.inverse_depth[row, column] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_bits_do_not_depend_on_threads_bands_or_order(name: str) -> None:
+    scene, projection = heap(60), projections()[name]
+    with threads(1):
+        expected = rasterize(scene.geometry, projection)
+    for rows in (1, 7, 64):
+        with threads(2):
+            found = rasterize(scene.geometry, projection, band_rows=rows)
+        for one, other in zip(found, expected, strict=True):
+            np.testing.assert_array_equal(one, other)
+    order = np.random.default_rng(5).permutation(60)
+    shape = dataclasses.replace(scene.geometry, faces=scene.geometry.faces[order], uv=scene.geometry.uv[order],
+                                material_of_face=scene.geometry.material_of_face[order])
+    found = rasterize(shape, projection)
+    np.testing.assert_array_equal(found.inverse_depth, expected.inverse_depth)
+    np.testing.assert_array_equal(np.append(order, -1)[found.triangle_id], expected.triangle_id)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_of_coincident_triangles_the_first_that_is_there_is_seen(name: str) -> None:
+    """The same triangles whole and with holes, either first: where there is a hole the whole one is seen."""
+    scene, projection = heap(12), projections()[name]
+    shape, count = scene.geometry, scene.face_count
+    for whole_first in (True, False):
+        of = [np.zeros(count, np.int32), np.ones(count, np.int32)]
+        both = dataclasses.replace(shape, faces=np.concatenate([shape.faces] * 2), uv=np.concatenate([shape.uv] * 2),
+                                   material_of_face=np.concatenate(of if whole_first else of[::-1]))
+        found = rasterize(both, projection).triangle_id
+        holes = rasterize(dataclasses.replace(shape, material_of_face=of[1]), projection).triangle_id
+        whole = rasterize(dataclasses.replace(shape, material_of_face=of[0]), projection).triangle_id
+        np.testing.assert_array_equal(np.where(found >= 0, found % count, -1), whole)
+        nearest_is_there = holes == whole
+        expected = whole if whole_first else np.where(nearest_is_there | (whole < 0), whole, whole + count)
+        assert (found == expected).all()
+        assert (~nearest_is_there).any()
+
+
+def test_scenes_without_holes_are_drawn_as_ever() -> None:
+    """Bits, and not a second pass."""
+    scene = opaque(heap(30))
+    assert scene.geometry.cut is None
+    assert scene.geometry.without_cut is scene.geometry.faces
+    bare = Geometry(scene.geometry.vertices, scene.geometry.faces, scene.geometry.material_of_face)
+    for projection in projections().values():
+        for one, other in zip(rasterize(scene.geometry, projection), rasterize(bare, projection), strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def excess_at(scene: Scene, face: int, origin: np.ndarray, direction: np.ndarray) -> float:
+    """How far alpha is above the cutoff where a ray meets a face's plane."""
+    shape = scene.geometry
+    weights = naive.barycentric(shape.vertices[shape.faces[face]], origin, direction)
+    return naive.excess(scene.materials[shape.material_of_face[face]], *(weights @ shape.uv[face]))
+
+
+@pytest.mark.feature("REF-25")
+def test_rasterizer_and_rays_see_the_same_leaves(evidence: Callable[[str], None]) -> None:
+    """But for texels on a triangle's edge, or where alpha is the cutoff within the ray's rounding."""
+    scene = load_scene("leaf_grid")
+    projection = camera_projection(scene.camera, 512, 512)
+    origins, directions = pixel_rays(projection)
+    seen, hits = rasterize(scene.geometry, projection).triangle_id.reshape(-1), Tracer(scene.geometry).closest(
+        origins, directions)
+    index = np.flatnonzero(seen != hits.triangle_id)
+    on_edge, on_mask = 0, 0
+    for k in index:
+        faces = [face for face in (seen[k], hits.triangle_id[k]) if face >= 0]
+        near = [edge_distance(projection, scene.geometry, np.array([face]), np.array([k]))[0] for face in faces]
+        if min(near) < NEAR_EDGE:
+            on_edge += 1
+        else:
+            # the nearer of the two is there for one and not for the other
+            least = min(abs(excess_at(scene, face, origins[k], directions[k])) for face in faces)
+            assert least < OF_ALPHA
+            on_mask += 1
+    leaves = scene.geometry.cut.of_face[seen[seen >= 0]] >= 0
+    evidence(f"leaf_grid: {len(index)} of 262144 ids differ, {on_edge} on a triangle's edge, {on_mask} on a mask's; "
+             f"{leaves.sum()} texels show leaves")
+    assert leaves.sum() > 30_000
+    assert len(index) < 20
+
+
+@pytest.mark.feature("REF-25")
+def test_a_cut_out_is_the_mesh_that_is_cut_along_its_edge(evidence: Callable[[str], None]) -> None:
+    cut, mesh = holed_quad()
+    total = 0
+    for projection in (camera_projection(cut.camera), cube_projection((0.3, 0.5, 1.2), 64),
+                       paraboloid_projection([(0.3, 0.5, 1.2)], [(0.1, 0, -1.0)], 96)):
+        one, other = (rasterize(scene.geometry, projection).triangle_id for scene in (cut, mesh))
+        np.testing.assert_array_equal(one >= 2, other >= 2)
+        np.testing.assert_array_equal(np.where(one >= 2, 2, one), np.where(other >= 2, 2, other))
+        total += int((one >= 2).sum())
+    evidence(f"{total} texels on three maps, none differs")
+    assert total > 2000
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_paraboloid_depth_maps_show_what_lies_behind_holes(dtype: type) -> None:
+    scene = heap(18)
+    centres, axes = np.array([[0.1, 0.2, 0.05], [0.0, 0.0, 3.0]]), np.array([[1, 2, 0.5], [0.1, 0.0, -1.0]])
+    maps = paraboloid_depth_maps(scene.geometry, centres, axes, 24, dtype)
+    projection, through = paraboloid_projection(centres, axes, 24), 0
+    for row, column, ray in texel_rays(projection):
+        if ray is None:
+            continue
+        found = naive.hits(*ray, scene.geometry, scene.materials)
+        face, t, margin = naive.first(found)
+        through += len(found) > 0 and face != found[0][1]
+        if margin >= DOUBT:
+            assert maps[row // 24, row % 24, column] == pytest.approx(t, rel=3e-6)
+    assert through > 20
+
+
+def test_a_material_without_texels_is_there_or_not_as_a_whole() -> None:
+    scene = heap(18)
+    for alpha, cutoff, there in ((0.4, 0.5, False), (0.5, 0.5, True), (1.0, 1.5, False), (0.0, 0.0, True)):
+        material = Material("all or nothing", alpha=alpha, cutoff=cutoff)
+        chosen = dataclasses.replace(scene, materials=(material,) * 3)
+        assert (chosen.geometry.cut is None) == there
+        for projection in projections().values():
+            assert (rasterize(chosen.geometry, projection).triangle_id >= 0).any() == there
+
+
+def test_the_picture_and_the_map_of_a_light_see_through_holes() -> None:
+    scene = heap(18)
+    frame, whole = (Frame(one, rsm_resolution=32) for one in (scene, opaque(scene)))
+    assert (frame.gbuffer.triangle_id != whole.gbuffer.triangle_id).any()
+    assert (frame.rsms[0].triangle_id != whole.rsms[0].triangle_id).any()
+    assert (frame.direct != whole.direct).any()
+
+
+def test_triangles_that_cross_the_plane_of_the_eye() -> None:
+    """A camera in the middle of the heap."""
+    scene = heap(30)
+    camera = Camera((0.1, 0.05, -0.1), (1.0, 0.3, 0.2), vfov=2.0, width=40, height=40)
+    lamp = PointLight((0.1, 0.05, -0.1), (1.0, 1.0, 1.0))
+    seen = Frame(dataclasses.replace(scene, camera=camera, lights=(lamp,))).gbuffer.triangle_id
+    for row, column, ray in texel_rays(camera_projection(camera)):
+        face, _, margin = naive.nearest(*ray, scene.geometry, scene.materials)
+        assert margin < DOUBT or seen[row, column] == face

@@ -46,7 +46,7 @@ def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4,
     """
     pixel = PIXEL_FLOATS * float_bytes + traced * TRUTH_PIXEL_BYTES + compared * COMPARED_PIXEL_BYTES
     texels = map_count(scene) * rsm_resolution**2 * TEXEL_FLOATS * float_bytes
-    images = {one.texture.image for one in scene.materials if one.texture is not None}
+    images = {texture.image for one in scene.materials for texture in one.textures}
     painted = sum(image.width * image.height for image in images) * TEXEL_BYTES
     cut = {one.texture.image for one in scene.materials if one.texture is not None and one.cutoff is not None}
     painted += sum(image.width * image.height for image in cut) * ALPHA_BYTES

@@ -91,14 +91,15 @@ def materials_digest(scene: Scene) -> str:
 
 
 def _material_json(material: Material) -> dict[str, Any]:
-    """Return a material as JSON values; its texture and cutoff only where it has one, the image by its digest."""
-    texture = material.texture
-    fields: dict[str, Any] = plain(dataclasses.replace(material, texture=None))
-    del fields["texture"]
+    """Return a material as JSON values; textures, alpha and cutoff only where it has some, images by their digests."""
+    fields: dict[str, Any] = plain(dataclasses.replace(material, texture=None, emission_texture=None))
+    for key in ("texture", "emission_texture"):
+        del fields[key]
+        texture = getattr(material, key)
+        if texture is not None:
+            fields[key] = {"image": texture.image.digest, "wrap": list(texture.wrap), "filter": texture.filter}
     if material.cutoff is None:  # absent, the digest is that of earlier versions
         del fields["alpha"], fields["cutoff"]
-    if texture is not None:
-        fields["texture"] = {"image": texture.image.digest, "wrap": list(texture.wrap), "filter": texture.filter}
     return fields
 
 

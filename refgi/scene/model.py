@@ -177,7 +177,7 @@ class Scene:
         expect(is_number(self.exposure) and self.exposure > 0, "exposure", "a finite number > 0", self.exposure)
         expect(self.geometry.materials_needed <= len(self.materials), "materials",
                f"the {self.geometry.materials_needed} that the geometry names", len(self.materials))
-        textured = [material.name for material in self.materials if material.texture is not None]
+        textured = [material.name for material in self.materials if material.textures]
         expect(not textured or self.geometry.uv is not None, "geometry: uv", "texture coordinates for the textures of "
                f"{len(textured)} material(s)", None)
         holes = cut_outs(self.materials)
@@ -223,7 +223,7 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
         If a mesh has a coordinate that is not finite or an index out of range, or all do not fit in memory.
     """
     expect_all_sound(meshes, lambda number: f"mesh {number} ({meshes[number].name})")
-    textured = any(mesh.material.texture is not None for mesh in meshes)
+    textured = any(mesh.material.textures for mesh in meshes)
     expect_memory(sum(len(mesh.vertices) for mesh in meshes), sum(len(mesh.faces) for mesh in meshes), "meshes",
                   texels=_texels(meshes), textured=textured)
     index_of: dict[Material, int] = {}
@@ -246,7 +246,7 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
 
 def _texels(meshes: Sequence[Mesh]) -> int:
     """Return the number of texels of all images, each counted once."""
-    textures = dict.fromkeys(mesh.material.texture for mesh in meshes if mesh.material.texture is not None)
+    textures = dict.fromkeys(texture for mesh in meshes for texture in mesh.material.textures)
     images = dict.fromkeys(texture.image for texture in textures)
     return sum(image.width * image.height for image in images)
 
@@ -254,7 +254,7 @@ def _texels(meshes: Sequence[Mesh]) -> int:
 def _coordinates(mesh: Mesh) -> Array:
     """Return texture coordinates of a mesh's corners, (m, 3, 2); 0 where it needs none."""
     if mesh.uv is None:
-        expect(mesh.material.texture is None, f"mesh {mesh.name}: uv",
+        expect(not mesh.material.textures, f"mesh {mesh.name}: uv",
                f"texture coordinates for the texture of material {mesh.material.name!r}", None)
         return np.zeros((len(mesh.faces), 3, 2))
     return np.asarray(mesh.uv, np.float64)

@@ -116,7 +116,9 @@ def _warn_of_textures(textures: Sequence[tuple[str, ...]], path: Path) -> None:
              for words in set(textures)}
     missing = [" ".join(words[1:]) for words in textures if not found[words]]
     absent = f"; {len(missing):,} of them name no file: {first_faults([shortened(m, 80) for m in missing], ', ')}"
-    text = f"{path}: {len(textures):,} texture(s) ({kinds}) passed over{absent if missing else ''}"
+    bumps = any(word in words[0].lower() for words in textures for word in ("bump", "norm"))
+    normals = " (shading normals stay the mesh's)" if bumps else ""
+    text = f"{path}: {len(textures):,} texture(s) ({kinds}) passed over{normals}{absent if missing else ''}"
     warnings.warn(RefgiWarning(text), stacklevel=6)
 
 

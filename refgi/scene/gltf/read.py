@@ -1,7 +1,7 @@
 """From a glTF document to meshes in world space: the node tree, primitives and materials.
 
-Textures of the base colour are decoded when a primitive first shows their material; texture coordinates take the
-material's choice of set and its `KHR_texture_transform` at once, as both are affine.
+Textures of base colour and emission are decoded when a primitive first shows their material; texture coordinates take
+the material's choice of set and its `KHR_texture_transform` at once, as both are affine.
 """
 
 import dataclasses
@@ -15,14 +15,14 @@ from refgi.errors import InputError, RefgiWarning, expect
 from refgi.scene.files import Contents
 from refgi.scene.gltf.container import Document, accessor
 from refgi.scene.gltf.nodes import node_camera, node_light, scene_nodes
-from refgi.scene.gltf.textures import Look, base_colour, transformed
+from refgi.scene.gltf.textures import Look, base_colour, emissive, transformed
 from refgi.scene.mesh import as_float64, expect_memory
 from refgi.scene.model import Array, Camera, Light, Material, Mesh, Rgb
 from refgi.scene.transform import transformed_all
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 CUTOFF = 0.5  # glTF's default of alphaCutoff
-READ = ("baseColorTexture", "normalTexture")  # or named apart among what is passed over
+READ = ("baseColorTexture", "emissiveTexture", "normalTexture")  # or named apart among what is passed over
 
 
 def read_gltf(path: Path) -> Contents:
@@ -138,7 +138,8 @@ class _Reader:
             return dataclasses.replace(mesh, uv=self._spare_coordinates(mesh, attributes, key))
         if key not in attributes:
             self._pass_over(f"primitive(s)' textures for lack of {key}")
-            return dataclasses.replace(mesh, material=dataclasses.replace(mesh.material, texture=None))
+            return dataclasses.replace(mesh, material=dataclasses.replace(mesh.material, texture=None,
+                                                                          emission_texture=None))
         uv = as_float64(accessor(self.document, attributes[key], "VEC2", f"{where}.attributes.{key}"))
         expect(len(uv) == len(mesh.vertices), f"{self.path}: {where}.attributes.{key}",
                f"{len(mesh.vertices)} elements as POSITION", len(uv))
@@ -163,16 +164,23 @@ class _Reader:
         index = entry["material"]
         found = self.document.item("materials", index, f"{where}.material")
         if index not in self._looks:
-            look = self._looks[index] = base_colour(self.document, found, f"materials[{index}]")
+            look = base_colour(self.document, found, f"materials[{index}]")
+            glows = any(self.materials[index].emission)
+            shining = emissive(self.document, found, f"materials[{index}]") if glows else None
             if look is not None:
                 self.materials[index] = dataclasses.replace(self.materials[index], texture=look.texture)
+            self._looks[index] = look or shining
+            if shining is not None and look is not None and not shining.lies_as(look):
+                self._pass_over("material(s)' emissive textures, which lie other than the base colour's,")
+            elif shining is not None:
+                self.materials[index] = dataclasses.replace(self.materials[index], emission_texture=shining.texture)
         return self.materials[index], self._looks[index]
 
     def _material(self, index: int) -> Material:
         entry, where = self.document.items("materials")[index], f"materials[{index}]"
         surface = self.document.member(entry, "pbrMetallicRoughness", where)
         if "normalTexture" in entry:
-            self._pass_over("material(s)' normal maps")
+            self._pass_over("material(s)' normal maps (shading normals stay the mesh's)")
         if any(key.endswith("Texture") and key not in READ for key in (*surface, *entry)):
             self._pass_over("material(s)' other textures")
         base = self.document.numbers(surface, "baseColorFactor", f"{where}.pbrMetallicRoughness", (1.0,) * 4)

@@ -48,7 +48,7 @@ def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4,
     texels = map_count(scene) * rsm_resolution**2 * TEXEL_FLOATS * float_bytes
     images = {texture.image for one in scene.materials for texture in one.textures}
     painted = sum(image.width * image.height for image in images) * TEXEL_BYTES
-    cut = {one.texture.image for one in scene.materials if one.texture is not None and one.cutoff is not None}
+    cut = {texture.image for one in scene.materials if one.cutoff is not None for texture in one.textures}
     painted += sum(image.width * image.height for image in cut) * ALPHA_BYTES
     return width * height * pixel + texels + scene.face_count * FACE_BYTES + painted
 

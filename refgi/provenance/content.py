@@ -14,6 +14,7 @@ import numpy as np
 from refgi.errors import InputError
 from refgi.image import canonical_json
 from refgi.scene import Camera, DirectionalLight, Light, Material, PointLight, Scene, SpotLight
+from refgi.scene.material import TEXTURES
 from refgi.settings import Settings, flat
 
 LIGHTS: dict[str, type[SpotLight] | type[PointLight] | type[DirectionalLight]] = {
@@ -92,8 +93,8 @@ def materials_digest(scene: Scene) -> str:
 
 def _material_json(material: Material) -> dict[str, Any]:
     """Return a material as JSON values; textures, alpha and cutoff only where it has some, images by their digests."""
-    fields: dict[str, Any] = plain(dataclasses.replace(material, texture=None, emission_texture=None))
-    for key in ("texture", "emission_texture"):
+    fields: dict[str, Any] = plain(dataclasses.replace(material, texture=None, emission_texture=None, alpha_texture=None))
+    for key in TEXTURES:
         del fields[key]
         texture = getattr(material, key)
         if texture is not None:

@@ -115,13 +115,14 @@ def _holes(material: Material) -> tuple[Texture | None, float, float] | None:
     """Return what decides where a material has holes, None where it has none."""
     if material.cutoff is None:
         return None
-    image = None if material.texture is None else material.texture.image
+    texture = material.alpha_texture or material.texture
+    image = None if texture is None else texture.image
     least, most = (1.0, 1.0) if image is None else image.alpha_range
     if material.alpha * least >= material.cutoff:
         return None
     if material.alpha * most < material.cutoff:
         return None, material.alpha, material.cutoff  # one hole
-    return material.texture, material.alpha, material.cutoff
+    return texture, material.alpha, material.cutoff
 
 
 def _row(texture: Texture, first: dict[Image, int]) -> tuple[int, ...]:

@@ -15,6 +15,7 @@ from refgi.scene.values import BLACK, BRIGHTEST, Array, Rgb, as_float_tuples, is
 SHARPEST = 1e20  # Phong exponent; far within float32
 DENSEST = 1e3  # index of refraction
 ROUNDING = 1e-6  # of a sum of two reflectances that are float32 numbers
+TEXTURES = ("texture", "emission_texture", "alpha_texture")  # fields of a material
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,7 +26,8 @@ class Material:
     direction (normalised so that `specular` is its reflectance), `ior` the index of refraction of a dielectric (0:
     opaque), `emission` the radiance the surface emits by itself (W/m^2/sr; seen by the camera, not a light source).
     `texture` multiplies `diffuse`, `emission_texture` the emission, where a surface has texture coordinates. With a `cutoff` the surface has holes: it is
-    there only where `alpha` times the texture's alpha is at least the cutoff (None: it is there everywhere).
+    there only where `alpha` times the texture's alpha is at least the cutoff (None: it is there everywhere);
+    `alpha_texture` is one whose alpha counts in its place.
     """
 
     name: str = "default"
@@ -38,6 +40,7 @@ class Material:
     alpha: float = 1.0
     cutoff: float | None = None
     emission_texture: Texture | None = None
+    alpha_texture: Texture | None = None
 
     def __post_init__(self) -> None:
         for key in ("diffuse", "specular"):
@@ -53,7 +56,7 @@ class Material:
         possible = self.is_dielectric or not reflects_too_much(self.diffuse, self.specular)
         expect(possible, f"material {self.name!r}: diffuse + specular", "at most 1 in each channel",
                [round(d + s, 6) for d, s in zip(self.diffuse, self.specular, strict=True)])
-        for key in ("texture", "emission_texture"):
+        for key in TEXTURES:
             value = getattr(self, key)
             expect(value is None or isinstance(value, Texture), f"material {self.name!r}: {key}", "a Texture or None",
                    type(value).__name__)
@@ -66,7 +69,8 @@ class Material:
     @property
     def textures(self) -> tuple[Texture, ...]:
         """All that need texture coordinates."""
-        return tuple(one for one in (self.texture, self.emission_texture) if one is not None)
+        found = (getattr(self, key) for key in TEXTURES)
+        return tuple(one for one in found if one is not None)
 
     @property
     def is_glossy(self) -> bool:

@@ -173,8 +173,8 @@ def loaded(path: Path, *said: str) -> Scene:
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         scene = load_scene(path)
-    texts = [str(one.message) for one in found if issubclass(one.category, RefgiWarning)]
-    about = [text for text in texts if "alpha" in text or "opacity" in text]
+    texts = [str(one.message).partition(": ")[2] for one in found if issubclass(one.category, RefgiWarning)]
+    about = [text for text in texts if any(word in text for word in ("alpha", "opacity", "map_d"))]
     assert len(about) == len(said)
     for text, words in zip(about, said, strict=True):
         assert words in text
@@ -250,3 +250,47 @@ def test_merge_gives_meshes_their_holes() -> None:
         pytest.fail("a texture without coordinates was taken")
 
 
+
+
+def obj(folder: Path, library: str, faces: str = "f 1/1 2/2 3/3\n") -> Path:
+    """Write a triangle whose coordinates are the corners of a picture, and two pictures."""
+    (folder / "wood.png").write_bytes(encoded(Pictures.fromarray(CODES[..., :3])))
+    (folder / "leaf.png").write_bytes(encoded(Pictures.fromarray(CODES)))
+    (folder / "m.mtl").write_text(library)
+    path = folder / "leaf.obj"
+    path.write_text(f"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nusemtl a\n{faces}")
+    return path
+
+
+@pytest.mark.parametrize(("library", "expected"), [
+    ("map_Kd wood.png\nmap_d leaf.png\n", CODES[..., 3]), ("map_d leaf.png\n", CODES[..., 3]),
+    ("map_Kd leaf.png\nmap_d leaf.png\nd 1.0\n", CODES[..., 3]),
+    ("map_d wood.png\n", np.round(CODES[..., :3].mean(axis=2)))])
+def test_obj_s_opacity_is_a_cut_out(tmp_path: Path, library: str, expected: np.ndarray) -> None:
+    scene = loaded(obj(tmp_path, f"newmtl a\nKd 0.5 0.5 0.5\n{library}"), "1 material(s) with map_d cut out where opacity")
+    found = scene.materials[0]
+    assert (found.cutoff, found.alpha) == (0.5, 1.0)
+    assert np.array_equal(found.alpha_texture.image.alpha, expected)
+    assert (found.texture is None) == ("map_Kd" not in library)
+    assert scene.geometry.cut.face.tolist() == [0]
+    assert scene.geometry.cut.uv.tolist() == [[0, 1, 1, 1, 1, 0]]
+    assert scene.geometry.cut_outs.table.alpha.tolist() == (
+        np.asarray(expected, np.float64) / 255).astype(np.float32).ravel().tolist()
+
+
+def test_obj_s_factor_and_what_is_not_read(tmp_path: Path) -> None:
+    half = loaded(obj(tmp_path, "newmtl a\nKd 0.5 0.5 0.5\nd 0.75\nmap_d leaf.png\n"), "map_d cut out")
+    assert half.materials[0].alpha == 0.75
+    for line in ("d 0.5", "Tr 0.5", "d -halo 0.25"):
+        plain = loaded(obj(tmp_path, f"newmtl a\nKd 0.5 0.5 0.5\n{line}\n"), "1 material(s) with opacity below 1")
+        assert plain.materials[0].cutoff is None
+    for line in ("d 1.0", "Tr 0", "d", "Tr x"):
+        loaded(obj(tmp_path, f"newmtl a\nKd 0.5 0.5 0.5\n{line}\n"))
+    moved = loaded(obj(tmp_path, "newmtl a\nmap_Kd wood.png\nmap_d -s 2 2 leaf.png\n"), "map_d, which lies other than map_Kd")
+    assert moved.materials[0].cutoff is None
+    bare = obj(tmp_path, "newmtl a\nmap_d leaf.png\n", "f 1 2 3\n")
+    with pytest.warns(RefgiWarning, match="lack of texture coordinates"):
+        scene = load_scene(bare)
+    assert scene.geometry.cut is None  # alpha 1 where there is no picture
+    with pytest.raises(InputError, match=r"m\.mtl: line 2: map_d: .*gone\.png"):
+        load_scene(obj(tmp_path, "newmtl a\nmap_d gone.png\n"))

@@ -149,7 +149,8 @@ def test_light_paths_meet_what_is_there() -> None:
 @pytest.mark.parametrize("rule", ["keep", "planes", "ball"])
 def test_maps_of_area_lights_are_those_of_rays(rule: str, evidence: Callable[[str], None]) -> None:
     scene = load_scene("leaf_grid")
-    areas = area_lights([[0.1, 0.05, 0.2], [0.4, 1.0, 0.1], [-0.9, 1.2, 0.3]], [[0, 1, 0], [0, -1, 0.2], [1, 0, 0]], 0.2)
+    areas = area_lights([[0.1, 0.05, 0.2], [0.4, 1.0, 0.1], [-0.9, 1.2, 0.3]],
+                        [[0, 1, 0], [0, -1, 0.2], [1, 0, 0]], 0.2)
     drawn, traced, whole = (shadow_maps(shape, areas, of(ValSettings, maps_resolution=64, maps_renderer=kind,
                                                          near_geometry=rule).maps, np.float64)
                             for shape, kind in ((scene.geometry, "raster"), (scene.geometry, "rays"),
@@ -187,7 +188,8 @@ def test_shadows_of_leaves_by_map_and_by_rays(evidence: Callable[[str], None]) -
     scene = load_scene("leaf_grid")
     shares = []
     for size in (256, 1024):
-        by_map, by_rays = (Frame(scene, width=192, height=192, rsm_resolution=size, shadows=how) for how in ("map", "exact"))
+        by_map, by_rays = (Frame(scene, width=192, height=192, rsm_resolution=size, shadows=how)
+                           for how in ("map", "exact"))
         differ = (by_map.direct.max(axis=0) > 0) != (by_rays.direct.max(axis=0) > 0)
         row, column, _ = by_map.rsms[0].project(by_map.gbuffer.position[:, differ])
         ids = np.pad(by_map.rsms[0].triangle_id, 2, mode="edge")
@@ -219,13 +221,15 @@ def test_light_that_leaves_glass_passes_holes_before_it() -> None:
     glass = Material("glass", (0.0, 0.0, 0.0), ior=1.5)
     ball = sphere((0.0, 0.0, 0.0), 0.1, 5000, glass, "ball")
     lobes = {}
-    for kind, material in (("none", None), ("hole", Material("sheet", alpha=0.1, cutoff=0.5)), ("whole", Material("sheet"))):
+    hole = Material("sheet", alpha=0.1, cutoff=0.5)
+    for kind, material in (("none", None), ("hole", hole), ("whole", Material("sheet"))):
         meshes: list[Mesh] = [ball]
         if material is not None:
             meshes.append(rectangle((-0.05, 0.01, 0.05), (0.1, 0, 0), (0, 0, -0.1), material, "sheet"))
         geometry, materials = merge(meshes, smooth=True)
         table = material_table(materials)
-        rsm = reflective_shadow_map(geometry, table, DirectionalLight((0.0, -1.0, 0.0), (1.0, 1.0, 1.0)), 64, np.float64)
+        down = DirectionalLight((0.0, -1.0, 0.0), (1.0, 1.0, 1.0))
+        rsm = reflective_shadow_map(geometry, table, down, 64, np.float64)
         for mode in ("back_face", "two_interface"):
             tracer = Tracer(geometry) if mode == "two_interface" else None
             lobes[kind, mode] = refracted(rsm, geometry, table, mode, 1e4, tracer=tracer).lobe_flux

@@ -93,7 +93,8 @@ def materials_digest(scene: Scene) -> str:
 
 def _material_json(material: Material) -> dict[str, Any]:
     """Return a material as JSON values; textures, alpha and cutoff only where it has some, images by their digests."""
-    fields: dict[str, Any] = plain(dataclasses.replace(material, texture=None, emission_texture=None, alpha_texture=None))
+    without: dict[str, Any] = dict.fromkeys(TEXTURES)
+    fields: dict[str, Any] = plain(dataclasses.replace(material, **without))
     for key in TEXTURES:
         del fields[key]
         texture = getattr(material, key)

@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 from llvmlite import ir
-from numba import carray, types
+from numba import types
 from numba.extending import intrinsic
+from numba.np.numpy_support import carray
 
 from refgi.jit import kernel, prange
 from refgi.scene import Geometry
@@ -99,7 +100,7 @@ class Filter:
         self.record = int(self._record.ctypes.data)
 
 
-def _pointer_of(_: Any, address: Any) -> Any:
+def _pointer_of(_: Any, address: Any) -> Any:  # noqa: ARG001
     """Type and emit a pointer from an address."""
 
     def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:  # noqa: ARG001

@@ -87,7 +87,7 @@ class AddressBackend:
                          _padded(faces[whole:], np.uint32))
         self._filter = None if cut is None else Filter(cut.holes, cut.numbers)
         meshes = [_Mesh(self._buffers[1], whole), _Mesh(self._buffers[2], len(faces) - whole, self._filter)]
-        device, scene = _build(library, self._buffers[0], len(vertices), [mesh for mesh in meshes if mesh.count])
+        device, scene = _build(library, self._buffers[0], len(vertices), [mesh for mesh in meshes if mesh.size])
         self.calls = Calls(_address(library.rtcIntersect1), _address(library.rtcOccluded1), np.uint64(scene),
                            whole if whole < len(faces) else 0)
         weakref.finalize(self, _release, library, device, scene)
@@ -188,7 +188,7 @@ class RunBackend:
 
 class _Mesh(NamedTuple):
     faces: Array  # as Embree reads them
-    count: int
+    size: int  # triangles
     filter: Filter | None = None
 
 
@@ -199,7 +199,7 @@ class _Built(NamedTuple):
 
 def _build(library: ctypes.CDLL, vertices: Array, vertex_count: int, meshes: Sequence[_Mesh]) -> _Built:
     """Build the tree. Embree reports a failed call only through rtcGetDeviceError; what it left must not be traced."""
-    count = sum(mesh.count for mesh in meshes)
+    count = sum(mesh.size for mesh in meshes)
     device, scene = library.rtcNewDevice(None), None
     try:
         _check(library, device, count)
@@ -215,11 +215,13 @@ def _build(library: ctypes.CDLL, vertices: Array, vertex_count: int, meshes: Seq
     return _Built(device, scene)
 
 
-def _attach(library: ctypes.CDLL, device: int, scene: int, vertices: tuple[Array, int], mesh: _Mesh, total: int) -> None:
+def _attach(
+    library: ctypes.CDLL, device: int, scene: int, vertices: tuple[Array, int], mesh: _Mesh, total: int
+) -> None:
     """Add a mesh to the scene, numbered in the order of calls."""
     geometry = _made(library, device, total, library.rtcNewGeometry(device, _TRIANGLES))
     try:
-        for kind, form, array, count in ((_VERTICES, _FLOAT3, *vertices), (_INDICES, _UINT3, mesh.faces, mesh.count)):
+        for kind, form, array, count in ((_VERTICES, _FLOAT3, *vertices), (_INDICES, _UINT3, mesh.faces, mesh.size)):
             library.rtcSetSharedGeometryBuffer(geometry, kind, 0, form, array.ctypes.data, 0, 12, count)
             _check(library, device, total)
         if mesh.filter is not None:
@@ -227,9 +229,10 @@ def _attach(library: ctypes.CDLL, device: int, scene: int, vertices: tuple[Array
             library.rtcSetGeometryIntersectFilterFunction(geometry, mesh.filter.function)
             library.rtcSetGeometryOccludedFilterFunction(geometry, mesh.filter.function)
             _check(library, device, total)
-        for call, arguments in ((library.rtcCommitGeometry, (geometry,)), (library.rtcAttachGeometry, (scene, geometry))):
-            call(*arguments)
-            _check(library, device, total)
+        library.rtcCommitGeometry(geometry)
+        _check(library, device, total)
+        library.rtcAttachGeometry(scene, geometry)
+        _check(library, device, total)
     finally:
         library.rtcReleaseGeometry(geometry)
 

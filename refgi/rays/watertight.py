@@ -57,9 +57,9 @@ def closest_around(
 ) -> tuple[int, float]:
     """Find the nearest hit among the triangles that share a corner with `triangle`, in float64.
 
-    `tables`: the mesh by corners. `holes`: those of its triangles that may have some. `origin`, `direction` (3,) float64: the ray; its distance counts in lengths of
-    `direction`. `reach`: how far to look. Result: triangle and distance; -1 and inf for a miss. Ties go to the lowest
-    id.
+    `tables`: the mesh by corners. `holes`: those of its triangles that may have some. `origin`, `direction` (3,)
+    float64: the ray; its distance counts in lengths of `direction`. `reach`: how far to look. Result: triangle and
+    distance; -1 and inf for a miss. Ties go to the lowest id.
     """
     nearest, hit = np.inf, -1
     for corner in range(3):

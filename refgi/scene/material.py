@@ -25,9 +25,9 @@ class Material:
     `diffuse` and `specular` are reflectances (1), `exponent` is the Phong exponent of the lobe around the mirror
     direction (normalised so that `specular` is its reflectance), `ior` the index of refraction of a dielectric (0:
     opaque), `emission` the radiance the surface emits by itself (W/m^2/sr; seen by the camera, not a light source).
-    `texture` multiplies `diffuse`, `emission_texture` the emission, where a surface has texture coordinates. With a `cutoff` the surface has holes: it is
-    there only where `alpha` times the texture's alpha is at least the cutoff (None: it is there everywhere);
-    `alpha_texture` is one whose alpha counts in its place.
+    `texture` multiplies `diffuse`, `emission_texture` the emission, where a surface has texture coordinates. With a
+    `cutoff` the surface has holes: it is there only where `alpha` times the texture's alpha is at least the cutoff
+    (None: it is there everywhere); `alpha_texture` is one whose alpha counts in place of the texture's.
     """
 
     name: str = "default"

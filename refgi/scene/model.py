@@ -117,6 +117,11 @@ class Geometry:
         faces[self.cut.face] = faces[self.cut.face, :1]
         return faces
 
+    def selected(self, chosen: Array) -> "Geometry":
+        """Return some of the faces, with the same vertices; `chosen` (m,) bool."""
+        return dataclasses.replace(self, faces=self.faces[chosen], material_of_face=self.material_of_face[chosen],
+                                   uv=None if self.uv is None else self.uv[chosen])
+
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Corners of the axis-aligned box of all used vertices, m."""

@@ -83,8 +83,8 @@ def read_library(path: Path) -> tuple[dict[str, Material], dict[str, Maps]]:
     Result: materials by name, and the textures of those that have some, not yet decoded. A lobe that would reflect more
     than arrives together with Kd is left out. Raises `InputError` if the file is missing or a value is out of range.
 
-    Warns `RefgiWarning` if lobes are left out, opacity is not what the file says, or other textures or unknown options of
-    textures are named.
+    Warns `RefgiWarning` if lobes are left out, opacity is not what the file says, or other textures or unknown options
+    of textures are named.
     """
     textures: list[tuple[str, ...]] = []
     maps: dict[str, Maps] = {}
@@ -140,7 +140,7 @@ def _add_cut_outs(opacities: dict[str, TextureMap], values: dict[str, dict[str, 
         values.setdefault(name, {})["cutoff"] = (CUTOFF,)
         cut += 1
     partial = sum("cutoff" not in found and found.get("d", (1.0,))[0] < 1 for found in values.values())
-    for count, what in ((cut, f"with map_d cut out where opacity is below {CUTOFF}: there is no partial transparency"),
+    for count, what in ((cut, f"with map_d cut out where opacity is below {CUTOFF}: no partial transparency"),
                         (elsewhere, "with map_d, which lies other than map_Kd, opaque here"),
                         (partial, "with opacity below 1 (d, Tr), opaque here")):
         if count:

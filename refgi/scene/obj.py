@@ -5,7 +5,6 @@ it stands on, takes index 0 for 1, hands groups back in reverse order and rounds
 coordinates of OBJ have v = 0 at the bottom of the picture; they are turned when they are read.
 """
 
-import dataclasses
 import warnings
 from itertools import pairwise
 from pathlib import Path

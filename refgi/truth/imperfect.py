@@ -99,8 +99,8 @@ def imperfect_maps(geometry: Geometry, lights: "PixelLights", settings: Imperfec
     Point k lies in the k-th of n equal shares of the area, in the order of the faces, and within its face where a
     sequence of low discrepancy has its k-th point (Roberts 2018), all shifted at random for each light; the paper draws
     points independently. A point nearer than its radius is left out: what it stands for reaches around the light.
-    Points reach both sides of faces, as surfaces do; those in holes of cut-outs are left out. Boxes by angle, the bias by slope and what counts as near
-    (`HORIZON`, `GRAZING`, `NEAR`) are this module's own: the paper leaves them open.
+    Points reach both sides of faces, as surfaces do; those in holes of cut-outs are left out. Boxes by angle, the bias
+    by slope and what counts as near (`HORIZON`, `GRAZING`, `NEAR`) are this module's own: the paper leaves them open.
     """
     corners, facing, upto = areas_of(geometry)
     total = float(upto[-1]) if len(upto) else 0.0

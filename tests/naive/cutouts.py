@@ -11,7 +11,8 @@ def blend(alpha, wrap, chosen, u, v):
     """Alpha at (u, v): weights fall linearly from the texels' centres, or the texel that (u, v) lies in."""
     height, width = alpha.shape
     if chosen == "nearest":
-        return float(alpha[index(math.floor(v * height), height, wrap[1]), index(math.floor(u * width), width, wrap[0])])
+        row, column = index(math.floor(v * height), height, wrap[1]), index(math.floor(u * width), width, wrap[0])
+        return float(alpha[row, column])
     total, across, down = 0.0, u * width - 0.5, v * height - 0.5
     for j in (math.floor(down), math.floor(down) + 1):
         for i in (math.floor(across), math.floor(across) + 1):

@@ -178,7 +178,7 @@ def test_a_light_and_the_sky_shine_through_holes() -> None:
     lit = tracer.visible_from_light(position, normal, covered, PointLight((0.0, 2.0, 0.0), (1, 1, 1)))[0]
     np.testing.assert_array_equal(lit, position[0, 0] < 0)
     share = openness(tracer, position, normal, radius=np.inf, rays=256)[0]
-    # a half plane at height 1 over x > 0: the share of the cosine-weighted sky that is left is (1 - x / sqrt(1 + x^2)) / 2
+    # a half plane at height 1 over x > 0 leaves (1 - x / sqrt(1 + x^2)) / 2 of the cosine-weighted sky
     x = position[0, 0]
     np.testing.assert_allclose(share, 0.5 * (1 - x / np.hypot(1, x)), atol=0.02)
 

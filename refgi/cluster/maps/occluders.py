@@ -48,7 +48,7 @@ class Blockers(NamedTuple):
         if self.shape is None:
             faces = self.faces[chosen]
             return Geometry(self.vertices, faces, np.zeros(len(faces), np.int32))
-        return _selected(self.shape, chosen)
+        return self.shape.selected(chosen)
 
 
 class Ends(NamedTuple):
@@ -160,13 +160,8 @@ def selected_blockers(geometry: Geometry, chosen: Array) -> Blockers:
     faces = np.ascontiguousarray((np.cumsum(used) - 1)[selected], np.int32)
     if geometry.cut is None:
         return Blockers(vertices, faces, chunks(vertices, faces))
-    shape = dataclasses.replace(_selected(geometry, chosen), vertices=vertices, faces=faces, vertex_normals=None)
+    shape = dataclasses.replace(geometry.selected(chosen), vertices=vertices, faces=faces, vertex_normals=None)
     return Blockers(vertices, faces, whole_chunks(shape), cut_chunks(shape), shape)
-
-
-def _selected(geometry: Geometry, chosen: Array) -> Geometry:
-    return dataclasses.replace(geometry, faces=geometry.faces[chosen], material_of_face=geometry.material_of_face[chosen],
-                               uv=None if geometry.uv is None else geometry.uv[chosen])
 
 
 def _used(count: int, faces: Array) -> Array:

@@ -15,7 +15,6 @@ from refgi.cluster.maps.occluders import Blockers, Ends, blockers
 from refgi.cluster.settings import ShadowMapSettings
 from refgi.rays import Tracer
 from refgi.sampling import halton
-from refgi.scene.model import Geometry
 
 if TYPE_CHECKING:
     from refgi.frame import Frame

@@ -12,7 +12,20 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.raster.batch import BATCH, EMPTY, LIMIT, ROWS, Part, draw, gather, integer, key_of, set_up, shorten, unpack
+from refgi.rsm.raster.batch import (
+    BATCH,
+    EMPTY,
+    LIMIT,
+    ROWS,
+    Part,
+    draw,
+    gather,
+    integer,
+    key_of,
+    set_up,
+    shorten,
+    unpack,
+)
 from refgi.rsm.raster.projection import Projection
 from refgi.rsm.raster.triangle import LANES, SPAN_CUT, bound_triangles, project_vertices
 from refgi.scene.cutouts import CutFaces

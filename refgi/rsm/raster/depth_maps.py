@@ -68,11 +68,13 @@ def distance_maps(
     """Measure the distance to the nearest of some triangles on paraboloid maps.
 
     `projection`: k paraboloid maps of n x n texels. `ignored`: what lies too near the centres to count; nothing where
-    absent. `cut`: further triangles, that may have holes. Returns `distance` (k, n, n): distance, m; inf without surface and outside the disc. `nearest` (k,):
-    float64: smallest distance on each map, m; inf where nothing is. `left_out` (k,): int64: triangles that reach into
-    each map's hemisphere and are ignored for their planes or lie in its ball.
+    absent. `cut`: further triangles, that may have holes. Returns `distance` (k, n, n): distance, m; inf without
+    surface and outside the disc. `nearest` (k,): float64: smallest distance on each map, m; inf where nothing is.
+    `left_out` (k,): int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in
+    its ball.
     """
     n, none = projection.width, np.zeros(projection.maps)
     distance = plane((projection.maps * n, max(n, BLOCK)), dtype)
-    found = draw_distances(projection, triangles, ignored or Ignored(none, none), numba.get_num_threads(), distance, cut)
+    workers = numba.get_num_threads()
+    found = draw_distances(projection, triangles, ignored or Ignored(none, none), workers, distance, cut)
     return np.ascontiguousarray(distance[:, :n]).reshape(-1, n, n), *found

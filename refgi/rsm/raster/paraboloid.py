@@ -133,6 +133,7 @@ def _draw_maps(
 
 @kernel
 def clear_outside_disc(projection: Projection, nearness: Array, ids: Array) -> None:
+    """Empty the texels beyond the hemisphere."""
     n, half = projection.width, projection.half[0]
     step = 2.0 * half / n
     for row in range(n):

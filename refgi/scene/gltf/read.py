@@ -75,8 +75,8 @@ class _Reader:
         for what, count in self.passed_over.items():
             warnings.warn(RefgiWarning(f"{self.path}: {count} {what} passed over"), stacklevel=4)
         if self.blended:
-            warnings.warn(RefgiWarning(f"{self.path}: {self.blended} material(s) of alphaMode BLEND taken as MASK with a "
-                                       f"cutoff of {CUTOFF}: there is no partial transparency"), stacklevel=4)
+            text = f"material(s) of alphaMode BLEND taken as MASK with a cutoff of {CUTOFF}: no partial transparency"
+            warnings.warn(RefgiWarning(f"{self.path}: {self.blended} {text}"), stacklevel=4)
         meshes = transformed_all(shapes, nodes.world[placed_by]) if shapes else []
         return Contents(tuple(meshes), tuple(self.cameras), tuple(self.lights))
 

@@ -1,4 +1,7 @@
-"""Base colour and emissive textures of a glTF document: image, sampler, set of texture coordinates, KHR_texture_transform."""
+"""Base colour and emissive textures of a glTF document.
+
+Image, sampler, set of texture coordinates, KHR_texture_transform.
+"""
 
 import math
 from typing import Any, NamedTuple

@@ -29,7 +29,7 @@ from refgi.rsm.raster.batch import (
 from refgi.rsm.raster.projection import Projection
 from refgi.rsm.raster.triangle import LANES, SPAN_CUT, bound_triangles, project_vertices
 from refgi.scene.cutouts import CutFaces
-from refgi.scene.texture.alpha import is_opaque
+from refgi.scene.texture.alpha import is_opaque, lent
 
 if TYPE_CHECKING:
     from refgi.rsm.raster.visibility_buffer import Bands, Scratch, Visibility
@@ -45,7 +45,7 @@ def draw_cut(corners: Array, faces: Array, part: Part, width: int, holes: CutFac
     counts; `holes` has their ids, coordinates and masks.
     """
     members, boxes, stride = part.members, part.boxes, width + LANES
-    uv, setup = holes.uv, np.zeros(ROWS * BATCH)
+    uv, table, setup = holes.uv, lent(holes.table), np.zeros(ROWS * BATCH)
     for base in range(part.start, part.stop, BATCH):
         count = min(BATCH, part.stop - base)
         gather(corners, faces, members, base, count, setup)
@@ -73,10 +73,10 @@ def draw_cut(corners: Array, faces: Array, part: Part, width: int, holes: CutFac
                     e0, e1, e2 = a0 * x + r0, a1 * x + r1, a2 * x + r2
                     key = key_of(an * x + rn, earliness)
                     if (e0 >= t0) & (e1 >= t1) & (e2 >= t2) & (key <= nearest) & (key > keys[at]):
-                        total = e0 + e1 + e2
-                        u = (e0 * uv[k, 0] + e1 * uv[k, 2] + e2 * uv[k, 4]) / total
-                        v = (e0 * uv[k, 1] + e1 * uv[k, 3] + e2 * uv[k, 5]) / total
-                        if is_opaque(holes.table, mask, u, v):
+                        scale = 1.0 / (e0 + e1 + e2)
+                        u = (e0 * uv[k, 0] + e1 * uv[k, 2] + e2 * uv[k, 4]) * scale
+                        v = (e0 * uv[k, 1] + e1 * uv[k, 3] + e2 * uv[k, 5]) * scale
+                        if is_opaque(table, mask, u, v):
                             keys[at] = key
 
 

@@ -25,7 +25,7 @@ from refgi.rsm.raster.paraboloid_batch import (
 )
 from refgi.rsm.raster.projection import Projection
 from refgi.rsm.raster.triangle import CHUNK, SPAN_CUT, Chunks
-from refgi.scene.texture.alpha import is_opaque
+from refgi.scene.texture.alpha import is_opaque, lent
 
 Array = npt.NDArray[Any]
 
@@ -64,7 +64,7 @@ def _draw_cut(
     step, real = 2.0 * half / n, nearness.dtype.type
     steepest, ball = limits
     nearest, within = 1.0 / ball, 1.0 / (ball * ball)
-    origin, frame, uv = projection.origin, projection.frame, holes.uv
+    origin, frame, uv, table = projection.origin, projection.frame, holes.uv, lent(holes.table)
     view = (origin[m, 0], origin[m, 1], origin[m, 2], frame[m, 0, 0], frame[m, 0, 1], frame[m, 0, 2],
             frame[m, 1, 0], frame[m, 1, 1], frame[m, 1, 2], frame[m, 2, 0], frame[m, 2, 1], frame[m, 2, 2])  # fmt: skip
     left_out = 0
@@ -109,10 +109,10 @@ def _draw_cut(
                     far_enough = (near <= limit) & (near <= (length + s * s) * cut_short)
                     is_first = (near > before) | ((near == before) & (face < ids[row, column]))
                     if (e0 >= t0) & (e1 >= t1) & (e2 >= t2) & far_enough & is_first:
-                        total = e0 + e1 + e2
-                        u = (e0 * uv[k, 0] + e1 * uv[k, 2] + e2 * uv[k, 4]) / total
-                        v = (e0 * uv[k, 1] + e1 * uv[k, 3] + e2 * uv[k, 5]) / total
-                        if is_opaque(holes.table, mask, u, v):
+                        scale = 1.0 / (e0 + e1 + e2)
+                        u = (e0 * uv[k, 0] + e1 * uv[k, 2] + e2 * uv[k, 4]) * scale
+                        v = (e0 * uv[k, 1] + e1 * uv[k, 3] + e2 * uv[k, 5]) * scale
+                        if is_opaque(table, mask, u, v):
                             nearness[row, column] = near
                             ids[row, column] = face
     return left_out

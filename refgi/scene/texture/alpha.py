@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from refgi.jit import kernel
+from refgi.jit.borrowed import borrowed
 from refgi.scene.texture.lookup import inside, near, neighbours_of
 from refgi.scene.values import Array
 
@@ -26,6 +27,12 @@ class AlphaTable(NamedTuple):
 
 
 NO_MASKS = AlphaTable(np.zeros(0, np.float32), np.zeros((0, 6), np.int64), np.zeros((0, 2)))
+
+
+@kernel
+def lent(table: AlphaTable) -> AlphaTable:
+    """Return a table for calls of `is_opaque` in an inner loop; the one it is made of must be kept."""
+    return AlphaTable(borrowed(table.alpha), borrowed(table.mask), borrowed(table.limit))
 
 
 @kernel

@@ -294,4 +294,4 @@ def test_obj_s_factor_and_what_is_not_read(tmp_path: Path) -> None:
     scene = loaded(bare, "map_d cut out")
     assert scene.geometry.cut is None  # alpha 1 where there is no picture
     with pytest.raises(InputError, match=r"m\.mtl: line 2: map_d: .*gone\.png"):
-        load_scene(obj(tmp_path, "newmtl a\nmap_d gone.png\n"))
+        loaded(obj(tmp_path, "newmtl a\nmap_d gone.png\n"))

@@ -123,6 +123,13 @@ class Method(NamedTuple):
         with sharing():
             return Light(*self.compute(frame, settings), *self.compute_lobes(frame, settings))
 
+    def made(self, frame: Any, settings: Any) -> "Light":
+        """Return what the method makes of a frame, without its estimates."""
+        if not frame.glossy_receivers:
+            return Light(self.function(frame, settings))
+        with sharing():
+            return Light(self.function(frame, settings), lobes=self.compute_lobes(frame, settings)[0])
+
     def extra_bytes(self, settings: Any, extent: Extent) -> int:
         """Return what settings add to the memory of a picture."""
         return self.memory(settings, extent) if self.memory is not None else 0

@@ -47,7 +47,7 @@ class Light(NamedTuple):
 
     irradiance: Array  # (3, h, w) indirect, W/m^2
     estimate: Any = None  # that the irradiance is the mean of, of a method that states its own error
-    lobes: Array | None = None  # (3, h, w) radiance of receivers' lobes by indirect light, W/m^2/sr, where there are any
+    lobes: Array | None = None  # (3, h, w) radiance of receivers' lobes by indirect light, W/m^2/sr, if any
     lobe_estimate: Any = None  # that the lobes are the mean of
 
 

@@ -81,7 +81,7 @@ class Picture(NamedTuple):
     radiance: Array  # (3, h, w) what the camera receives, W/m^2/sr
     estimate: Any = None  # a `TruthResult`, of a method that states its own error
     frames: Any = None  # (h, w) frames that each pixel is blended of, of a temporal filter that counts them
-    lobes: Array | None = None  # (3, h, w) radiance of receivers' lobes by indirect light, W/m^2/sr, where there are any
+    lobes: Array | None = None  # (3, h, w) radiance of receivers' lobes by indirect light, W/m^2/sr, if any
     lobe_estimate: Any = None  # as `estimate`, of the lobes, W/m^2/sr
 
 

@@ -10,7 +10,9 @@ from refgi.scene.material import Material
 SIZE = 48  # pixels
 
 
-def glossy_box(exponent: float = 60.0, specular: float = 0.5, *, name: str = "cornell_box", blocks: float = 8.0) -> Scene:
+def glossy_box(
+    exponent: float = 60.0, specular: float = 0.5, *, name: str = "cornell_box", blocks: float = 8.0
+) -> Scene:
     """Return the box with a floor of one lobe and blocks of another, beside walls that have none.
 
     Parameters

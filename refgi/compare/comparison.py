@@ -154,7 +154,8 @@ class _Runner:
                               references[j].mean_variance) for j in judges}
         shown = {j: references[j].lobes for j in judges if references[j].lobes is not None}
         lobes_against = {} if lobes is None else {
-            j: measure(lobes, one.mean, one.variance_of_mean, covered, one.picture_variance) for j, one in shown.items()}
+            j: measure(lobes, one.mean, one.variance_of_mean, covered, one.picture_variance)
+            for j, one in shown.items()}
         seen = flip(radiance, references[TRUTH].radiance, covered)
         account = method.ledger if accounts else None
         ledger = account(self.frame, settings) if account else None

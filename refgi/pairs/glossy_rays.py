@@ -64,7 +64,8 @@ def weigh_by_lobes(
 
 @kernel
 def _weigh(
-    points: GlossyPoints, to: RayReceivers, r: int, senders: Senders, j: int, reach: Array, contribution: Array, ray: int
+    points: GlossyPoints, to: RayReceivers, r: int, senders: Senders, j: int, reach: Array, contribution: Array,
+    ray: int,
 ) -> None:
     if reach[ray] <= 0:
         return

@@ -120,13 +120,14 @@ def glossy_level(
     draws, slices = _draws(senders, index, settings), None
     if isinstance(settings.visibility, Bitmask):
         slices = slice_samples(to, senders, index, settings, frame.visible_extent.diagonal)
-    count = len(draws.weight) if slices is None else slices.count
+    count = len(draws.weight) if slices is None else slices.per_receiver
     tally("pairs", lambda: len(points.pixel) * count)
     radiance = np.asarray(senders.radiance.reshape(3, -1), np.float64)
-    total, step = np.zeros(points.position.shape), max(1, BATCH // max(count, 1))
+    total, step = np.zeros((3, len(points.pixel))), max(1, BATCH // max(count, 1))
     rays = _Rays(frame, points, senders) if isinstance(settings.visibility, Rays) else None
     form, share = form_of(settings.senders.form_factor), settings.senders.disc_share
-    transfer, sender, blocked = np.empty(step * count), np.empty(step * count, np.int64), np.zeros(step * count, np.bool_)
+    transfer, sender = np.empty(step * count), np.empty(step * count, np.int64)
+    blocked = np.zeros(step * count, np.bool_)
     for first in range(0, total.shape[1], step):
         last = min(first + step, total.shape[1])
         if slices is None:

@@ -1,7 +1,7 @@
 """Lobes of glossy receivers under the visibility of area lights: L_s(x) = sum_m V_m(x) sum_i f_s I_i cos / r^2.
 
-The pixel lights of an area light are summed one by one, each with f_s in its own direction; V is that of the area light,
-as for irradiance. Every glossy pixel sums all lights: nothing is interleaved or blurred.
+The pixel lights of an area light are summed one by one, each with f_s in its own direction; V is that of the area
+light, as for irradiance. Every glossy pixel sums all lights: nothing is interleaved or blurred.
 """
 
 from typing import TYPE_CHECKING, Any

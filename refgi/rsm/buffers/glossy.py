@@ -125,7 +125,7 @@ def _mirror(position: Array, normal: Array, eye: Array, mirror: Array, faces_eye
 
 @stage("rsm.direct_lobes")
 def direct_lobes(points: GlossyPoints, light: Light, visible: Array) -> Array:
-    """Return the radiance towards the eye that receivers' lobes make of a light's direct irradiance: f_s I(w) cos / d^2.
+    """Return the radiance towards the eye that receivers' lobes make of a light: f_s I(w) cos / d^2.
 
     Parameters
     ----------

@@ -56,7 +56,8 @@ def multires_lobes(frame: "Frame", settings: MultiresSettings) -> Array:
     double = doubled(frame)
     points = glossy_points(double, frame.materials, frame.scene.camera.eye)
     fine = _lobes(frame, double, points, lights, footprint, settings)
-    return halved(fine, covered_by(points, fine.shape[1:]), covered_by(frame.glossy_points, frame.gbuffer.covered.shape))
+    covered = covered_by(frame.glossy_points, frame.gbuffer.covered.shape)
+    return halved(fine, covered_by(points, fine.shape[1:]), covered)
 
 
 def _lobes(

@@ -9,10 +9,10 @@ from refgi.lights.settings import with_clamp
 from refgi.pairs.glossy import as_receivers, glossy_radiance, summed
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.rsm.buffers.glossy import GlossyPoints, spread_over_picture
+from refgi.settings import replaced
 from refgi.splat.sii.reach.lists import LightLists
 from refgi.splat.sii.reach.reference_length import with_reference_length
 from refgi.splat.sii.settings import FullBound, SiiSettings
-from refgi.settings import replaced
 from refgi.stages import stage
 
 if TYPE_CHECKING:

@@ -4,7 +4,6 @@ With a bitmask the samples are those of the slices of `bitmask`, as many in each
 marched past in all of them, so that none are drawn by importance.
 """
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,7 +34,7 @@ class SliceSamples(NamedTuple):
     key: Any  # uint32, of the level
 
     @property
-    def count(self) -> int:
+    def per_receiver(self) -> int:
         """Samples of a receiver, occluders among them."""
         return self.steps.slices * self.steps.per_slice
 
@@ -70,8 +69,9 @@ def slice_samples(
     receiving, sending = np.zeros((1, PLANES, len(to.row))), np.zeros((level.shape[0], PLANES, level.shape[1]))
     pack(to.position[:, None], to.normal[:, None], np.zeros((3, 1, len(to.row))), np.zeros((1, len(to.row))), 1.0, 1,
          receiving)
-    parts = (np.asarray(part, np.float64) for part in (level.position, level.normal, level.radiance, level.area))
-    pack(*parts, 1.0, 1, sending)
+    position, normal, radiance, area = (np.asarray(part, np.float64) for part in (
+        level.position, level.normal, level.radiance, level.area))
+    pack(position, normal, radiance, area, 1.0, 1, sending)
     return SliceSamples(steps, receiving, sending, float(bitmask.thickness * diagonal),
                         level_key(sampling.seed, level.number))
 
@@ -140,8 +140,9 @@ def _fill_ray(
     directions: Array, reach: Array,
 ) -> None:
     j = sender[ray]
-    dx, dy, dz = (np.float64(senders.origin[0, j]) - to.origin[0, i], np.float64(senders.origin[1, j]) - to.origin[1, i],
-                  np.float64(senders.origin[2, j]) - to.origin[2, i])
+    end, start = senders.origin, to.origin
+    dx, dy, dz = (np.float64(end[0, j]) - start[0, i], np.float64(end[1, j]) - start[1, i],
+                  np.float64(end[2, j]) - start[2, i])
     above = to.facing[0, i] * dx + to.facing[1, i] * dy + to.facing[2, i] * dz
     before = -(senders.facing[0, j] * dx + senders.facing[1, j] * dy + senders.facing[2, j] * dz)
     if above <= 0.0 or before <= 0.0:

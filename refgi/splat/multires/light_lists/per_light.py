@@ -127,8 +127,8 @@ def per_light_lobes(
 
     Notes
     -----
-    A cell is split where max - min of that radiance over its quadrants exceeds T. The quadrants are sampled at one point
-    each: a highlight narrower than a coarsest cell may lie between them, and is lost (Sec. 3.3.1 says so).
+    A cell is split where max - min of that radiance over its quadrants exceeds T. The quadrants are sampled at one
+    point each: a highlight narrower than a coarsest cell may lie between them, and is lost (Sec. 3.3.1 says so).
     """
     covered = covered_by(points, shape)
     tree = cell_tree(covered, top_level(*shape, settings.coarsest), settings.finest)

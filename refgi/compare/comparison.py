@@ -154,7 +154,7 @@ class _Runner:
                               references[j].mean_variance) for j in judges}
         shown = {j: references[j].lobes for j in judges if references[j].lobes is not None}
         lobes_against = {} if lobes is None else {
-            j: measure(lobes, one.mean, one.variance_of_mean, covered, one.picture_variance)
+            j: measure(lobes, one.mean, one.variance_of_mean, covered, _over_all(one, covered))
             for j, one in shown.items()}
         seen = flip(radiance, references[TRUTH].radiance, covered)
         account = method.ledger if accounts else None
@@ -192,6 +192,11 @@ class _Runner:
     def _tell(self, what: str, done: float) -> None:
         if self.progress is not None:
             self.progress(what, done)
+
+
+def _over_all(lobes: Any, covered: Any) -> Any:
+    """Return the variance of the mean of lobes over all pixels that see a surface; theirs is over glossy ones."""
+    return lobes.picture_variance * (lobes.block_pixels.sum() / covered.sum()) ** 2
 
 
 def _names(methods: Sequence[str] | None) -> list[str]:

@@ -6,6 +6,8 @@ import numpy as np
 
 from refgi.scene import Scene, load_scene
 from refgi.scene.material import Material
+from tests.naive.pair_term import parts, received
+from tests.naive.receiver_lobes import brdf
 
 SIZE = 48  # pixels
 
@@ -39,3 +41,16 @@ def glossy_box(
     material[on_floor], material[inside] = count, count + 1
     return dataclasses.replace(scene, materials=(*scene.materials, floor, metal), source=None,
                                geometry=dataclasses.replace(geometry, material_of_face=np.asarray(material, np.int32)))
+
+
+def defined(points, lights, w_o, pairs, footprint=None, factor=None):
+    """Return sum f_s E from the definition of f_s; E of each pair is that of the diffuse sum's twin."""
+    x, normal = points.position.T.astype(float), points.normal.T.astype(float)
+    result = np.zeros((3, len(x)))
+    for part in parts(lights, pairs, footprint):
+        w_i = part.position - x
+        w_i = w_i / np.linalg.norm(w_i, axis=1)[:, None]
+        f = brdf(points.exponent.astype(float), normal, w_i, w_o.T)
+        e = received(part, x.T, normal.T, pairs)
+        result += np.outer(part.flux, f * e * (1.0 if factor is None else factor(part, x)))
+    return result * points.specular

@@ -1,4 +1,4 @@
-"""The sum over pairs of pixel light and glossy receiver: against the definition, to rounding, and the same bits always."""
+"""The sum over pairs of pixel light and glossy receiver: against the definition, to rounding, and always the same."""
 
 import math
 
@@ -122,7 +122,8 @@ def test_float32_keeps_the_stated_bound(rng, evidence):
             h = 0.5 * float(((m - w) ** 2).sum())
             if h > 0.9:
                 continue
-            lead = (exponent + 2) / (2 * math.pi) * here.specular.astype(float) * one.flux / math.pi * (1 - h) ** exponent
+            peak = (exponent + 2) / (2 * math.pi) * here.specular.astype(float) * one.flux / math.pi
+            lead = peak * (1 - h) ** exponent
             cosines = float((w * n).sum()) - float((w * one.normal).sum())
             bound = U * (exact * (20 + 5 * -exponent * math.log2(1 - h)
                                   + 6.5 * exponent * (math.sqrt(2 * h) + h) / (1 - h)) + 4 * lead * cosines / r**2)

@@ -72,7 +72,7 @@ def lobes(frame, method, *changes):
     return known.compute_lobes(frame, from_text(known.settings(), changes))[0]
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 def test_receivers_are_the_pixels_with_a_lobe_that_face_the_eye(frame):
     points = frame.glossy_points
     at, materials = receiver_lobes.glossy_pixels(frame)
@@ -86,7 +86,7 @@ def test_receivers_are_the_pixels_with_a_lobe_that_face_the_eye(frame):
     assert len(set(points.exponent.tolist())) > 1
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 @pytest.mark.parametrize("shadows", ["map", "exact"])
 def test_direct_light_is_reflected_with_its_shadows(shadows):
     frame = Frame(SCENES["lamps"](), **OPTIONS, shadows=shadows)
@@ -102,7 +102,7 @@ def test_direct_light_is_reflected_with_its_shadows(shadows):
     close(frame.direct_lobes, expected.reshape(3, 13, 17))
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 def test_the_picture_is_diffuse_light_and_lobes():
     frame = Frame(SCENES["lamps"](), **OPTIONS)
     picture = render(frame.scene, "sii", of(SiiSettings, lights=32), **OPTIONS)
@@ -114,7 +114,7 @@ def test_the_picture_is_diffuse_light_and_lobes():
     np.testing.assert_allclose(frame.radiance(), direct, rtol=1e-12)
 
 
-@pytest.mark.feature("AMS-13", "REF-25")
+@pytest.mark.feature("AMS-13", "REF-27")
 @pytest.mark.parametrize("clamp", ["none", "disc"])
 def test_sii_sums_all_lights(frame, clamp):
     settings = of(SiiSettings, lights=48, **{"pairs.clamp": clamp})
@@ -127,14 +127,14 @@ def test_sii_sums_all_lights(frame, clamp):
         close(got, receiver_lobes.of_lights(frame, lights, settings.pairs))
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 def test_half_resolution_and_lightcuts_leave_lobes_as_they_are(room):
     plain = lobes(room, "sii", "lights=48")
     assert np.array_equal(lobes(room, "sii", "lights=48", "half_resolution=true"), plain)
     assert np.array_equal(lobes(room, "sii", "lights=48", "lightcuts=bounded"), plain)
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 def test_a_cut_leaves_the_same_pairs_out(room):
     """Lobes of exponent 0 around the normals: what is left is the irradiance."""
     changes = ("lights=64", "reach.cut=relative", "reach.cut.share=0.3", "pairs.clamp=none")
@@ -150,7 +150,7 @@ def test_a_cut_leaves_the_same_pairs_out(room):
     close(METHODS["sii"].lobes(frame, settings).reshape(3, -1)[:, points.pixel], irradiance / math.pi)
 
 
-@pytest.mark.feature("AMS-13", "REF-25")
+@pytest.mark.feature("AMS-13", "REF-27")
 @pytest.mark.parametrize(("scene", "visibility"), [("lamps", True), ("smooth", True), ("lamps", False)])
 def test_vpl_sums_what_shadow_rays_let_through(scene, visibility):
     """Without visibility nothing arrives from below a face either, which flat faces alone leave to the normal."""
@@ -163,7 +163,7 @@ def test_vpl_sums_what_shadow_rays_let_through(scene, visibility):
     close(got, receiver_lobes.of_lights(frame, lights, replaced(pairs, {"clamp": "none"}), visibility), RAYS)
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 @pytest.mark.parametrize("offset", [0.0, 0.05])
 def test_gather_sums_the_discs(room, offset):
     settings = from_text(METHODS["gather"].settings(), ("disc.samples=40", f"disc.offset={offset}"))
@@ -190,7 +190,7 @@ def test_gather_sums_the_discs(room, offset):
     close(METHODS["gather"].lobes(room, settings), spread(room, points, total))
 
 
-@pytest.mark.feature("AMS-13", "REF-25")
+@pytest.mark.feature("AMS-13", "REF-27")
 @pytest.mark.parametrize("kind", ["geometry", "irradiance", "error"])
 def test_multires_of_single_pixels_is_the_whole_sum(room, kind):
     changes = ("lights=32", "pairs.clamp=none", f"subsplats={kind}", "subsplats.coarsest=64")
@@ -200,7 +200,7 @@ def test_multires_of_single_pixels_is_the_whole_sum(room, kind):
     close(METHODS["multires"].lobes(room, settings), receiver_lobes.of_lights(room, lights, settings.pairs))
 
 
-@pytest.mark.feature("AMS-13", "REF-25")
+@pytest.mark.feature("AMS-13", "REF-27")
 @pytest.mark.parametrize("criteria", ["none", "geometry"])
 def test_lists_of_each_light_are_refined_by_what_the_lobe_reflects(room, criteria):
     """Exponent by exponent, on cells of glossy pixels: the paper's refinement and upsampling by loops."""
@@ -230,7 +230,7 @@ def test_lists_of_each_light_are_refined_by_what_the_lobe_reflects(room, criteri
         assert np.abs(both - whole).sum() < np.abs(got - whole).sum()
 
 
-@pytest.mark.feature("AMS-13", "REF-25")
+@pytest.mark.feature("AMS-13", "REF-27")
 @pytest.mark.parametrize("upsampling", ["tent", "demo", "nearest"])
 def test_shared_subsplats_stand_for_glossy_pixels_of_one_exponent(room, upsampling):
     """Every glossy pixel lies in one of them, at whose representative the lobe is summed and upsampled by loops."""
@@ -258,7 +258,7 @@ def test_shared_subsplats_stand_for_glossy_pixels_of_one_exponent(room, upsampli
     close(METHODS["multires"].lobes(room, settings), expected * spread(room, points, points.specular), 1e-9)
 
 
-@pytest.mark.feature("AMS-13", "REF-25")
+@pytest.mark.feature("AMS-13", "REF-27")
 @pytest.mark.parametrize("visibility", ["rays", "val"])
 def test_multires_sees_what_vpl_and_val_see(room, visibility):
     """With subsplats of one pixel each the shadows are those of the other method, to rounding."""
@@ -272,7 +272,7 @@ def test_multires_sees_what_vpl_and_val_see(room, visibility):
         close(METHODS["multires"].lobes(room, settings), METHODS["val"].lobes(room, settings.shadows))
 
 
-@pytest.mark.feature("AMS-13", "REF-25")
+@pytest.mark.feature("AMS-13", "REF-27")
 def test_a_supersampled_lobe_is_the_mean_of_its_glossy_pixels(room):
     settings = from_text(METHODS["multires"].settings(), ("lights=16", "pairs.clamp=none", "subsplats=error"))
     fine = Frame(room.scene, **{**OPTIONS, "width": 34, "height": 26})
@@ -291,7 +291,7 @@ def test_a_supersampled_lobe_is_the_mean_of_its_glossy_pixels(room):
     assert not got.reshape(3, -1)[:, outside].any()
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 @pytest.mark.parametrize("changes", [("visibility=rays_vpls",), ("visibility=rays_rectangle", "interleaving.block=4"),
                                      ("visibility=none",), ("visibility=pcf",), ("visibility=csm",)], ids=str)
 def test_val_shadows_each_area_light(room, changes):
@@ -328,7 +328,7 @@ def texel(level, i, j):
             "area": level.area[i : i + 1, j : j + 1]}
 
 
-@pytest.mark.feature("REF-25", "HSS-04")
+@pytest.mark.feature("REF-27", "HSS-04")
 @pytest.mark.parametrize("changes", [(), ("form_factor=point",), ("form_factor=texel",), ("disc_share=1",),
                                      ("only_level=1",), ("visibility=rays",), ("downsample=closest", "start=full")],
                          ids=str)
@@ -372,7 +372,7 @@ def unoccluded(frame, x, facing, pixel):
     return float(free(corners_of(frame.scene.geometry), (x + LIFT * facing)[None], y + LIFT * up)[0])
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 def test_hssil_marches_slices_past_a_bitmask(room):
     changes = ("levels=2", "radius=2", "samples=9", "visibility=bitmask", "visibility.thickness=0.05", "pattern=pixel")
     settings = from_text(HssilSettings(), changes)
@@ -400,7 +400,7 @@ def test_hssil_marches_slices_past_a_bitmask(room):
     close(METHODS["hssil"].lobes(room, settings), spread(room, points, total * points.specular), 1e-9)
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 @pytest.mark.parametrize("spread_of", [1.0, 0.3, 1 / 64])
 def test_warped_angles_have_the_density_of_their_weights(spread_of):
     """Points fall into bins of angle as often as weights say they do not: each bin's weights sum to its share."""
@@ -416,7 +416,7 @@ def test_warped_angles_have_the_density_of_their_weights(spread_of):
     assert abs(within.mean() - 0.5) < 1e-3
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 def test_crowns_by_importance_mean_the_sum_over_all_texels(evidence):
     """Over many seeds, with discs of one texel: others would be smaller where a sample stands for less."""
     frame = Frame(glossy_box(60.0, blocks=60.0), width=SIZE, height=SIZE, rsm_resolution=64)
@@ -431,7 +431,7 @@ def test_crowns_by_importance_mean_the_sum_over_all_texels(evidence):
     evidence(f"mean of 40 seeds: {bias:.1%} off, {np.abs(z).max():.1f} standard errors")
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 def test_cameras_join_the_largest_lobes(room):
     """What a second camera finds is what glossy pixels that it sees reflect towards the first camera's eye."""
     side = VIEW.__class__((-0.6, 1.2, 0.9), (0.3, 0.4, -0.6), (0.0, 1.0, 0.1), math.radians(80), 17, 13)
@@ -447,7 +447,7 @@ def test_cameras_join_the_largest_lobes(room):
     np.testing.assert_allclose(METHODS["hssil"].lobes(room, same), alone, rtol=0.05, atol=0.02 * alone.max())
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 def test_frames_of_a_sequence_have_lobes_of_their_own(room):
     settings = from_text(HssilSettings(), ("levels=2", "radius=3", "samples=8"))
     scenes = [room.scene, room.scene.with_camera(eye=(1.6, 1.4, 1.5))]
@@ -458,7 +458,7 @@ def test_frames_of_a_sequence_have_lobes_of_their_own(room):
         assert np.array_equal(step.radiance, step.frame.radiance(step.irradiance, step.lobes))
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 def test_without_a_visible_glossy_surface_no_code_of_lobes_runs():
     """A glossy material that is out of sight, or glass, is none."""
     def never(*_):
@@ -474,7 +474,7 @@ def test_without_a_visible_glossy_surface_no_code_of_lobes_runs():
         again = Frame(scene, width=16, height=16, rsm_resolution=32)
         assert again.glossy_receivers
         assert not METHODS["sii"].light(again, of(SiiSettings, lights=16)).lobes.any()
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-27")
 def test_glass_has_no_lobe():
     """Whatever reflectances its material states, alone in the picture or beside lobes."""
     scene = SCENES["lamps"]()

@@ -55,7 +55,7 @@ def scattered(rng, count, lamps, exponent, real=np.float64, *, near=None):
     return points, lights, w_o
 
 
-@pytest.mark.feature("AMS-13", "REF-25")
+@pytest.mark.feature("AMS-13", "REF-27")
 @pytest.mark.parametrize("exponent", [0.0, 1.0, 20.0, 1e3, 1e6])
 def test_it_is_the_sum_of_the_definition(exponent, rng, evidence):
     """Some receivers see nothing in their lobe, others a light near its axis."""

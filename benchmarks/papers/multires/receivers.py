@@ -77,14 +77,14 @@ def _notes(found: dict[tuple[str, float, str], Errors], exponents: Sequence[floa
         return min(found[part, exponent, "shared"].rmse / found[part, exponent, "both"].rmse for exponent in exponents)
 
     known, last = ", ".join(f"{exponent:g}" for exponent in exponents), len(thresholds) - 1
-    lost = ", ".join(f"{found['body', exponent, f'light{last}'].lost:.0f}" for exponent in exponents)
+    made = ", ".join(f"{-found['body', exponent, f'light{last}'].lost:.0f}" for exponent in exponents)
     return [
         f"RMSE of the shared list for exponents {known}: {said('body', 'shared')} % on the body, whose folds it "
         f"follows, {said('floor', 'shared')} % with the floor, where geometry asks for nothing and highlights blur.",
         f"Lists of each light's own, from the coarsest cells on with T = {thresholds[last]:g}: "
         f"{said('body', f'light{last}')} % and {said('floor', f'light{last}')} %. Only wide lobes are found that way. "
         "The paper says why: quadrants are compared at one point each, and a highlight between these points is "
-        f"not seen, or stands for its whole cell when a point meets it. The body is darker by {lost} %.",
+        f"not seen, or stands for its whole cell when a point meets it. The body is too bright by {made} %.",
         f"From the shared list on, what the authors plan for later (Sec. 6), each light's own list comes to "
         f"{said('body', 'both')} % and {said('floor', 'both')} %: at least {gain('body'):.1f} and {gain('floor'):.1f} "
         "times nearer than the shared list alone, whatever the exponent."]

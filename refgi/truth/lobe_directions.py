@@ -144,4 +144,4 @@ def _lobe_share(lobes: Lobes, r: int, material: int, share: float) -> Any:
     sender = lobes.surfaces.exponent[material]
     if sender < lobes.photon_exponent:
         return share
-    return 0.0 if comes_by_photons(lobes.exponent[r], sender, lobes.photon_exponent) else 1.0
+    return 0.0 if comes_by_photons(lobes.exponent[r], sender) else 1.0

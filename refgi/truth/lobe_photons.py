@@ -19,7 +19,7 @@ from refgi.rays import MISS
 from refgi.scene import DirectionalLight
 from refgi.truth.caustics import Film, photons_of, power_of, reflect, seen
 from refgi.truth.light_grid import light_rays
-from refgi.truth.lobe_receivers import BLURRED, Lobes
+from refgi.truth.lobe_receivers import Lobes, comes_by_photons
 from refgi.truth.task import Task
 
 Array = npt.NDArray[Any]
@@ -66,7 +66,7 @@ def _reflect_to_eye(lobes: Lobes, normals: Array, receiver: Array, irradiance: A
     """Add what lobes make of photons, in their order; -1: no receiver. `irradiance` (n, 3): across the faces, W/m^2."""
     for i in range(len(receiver)):
         r = receiver[i]
-        if r < 0 or sender[i] < BLURRED * lobes.exponent[r]:
+        if r < 0 or not comes_by_photons(lobes.exponent[r], sender[i]):
             continue
         length = math.sqrt(way[i, 0] ** 2 + way[i, 1] ** 2 + way[i, 2] ** 2)
         x, y, z = way[i, 0] / length, way[i, 1] / length, way[i, 2] / length

@@ -77,9 +77,16 @@ def subset_of(lobes: Lobes, chosen: Array) -> Lobes:
 
 
 @kernel
-def comes_by_photons(exponent: float, sender: float, photon_exponent: float) -> bool:
-    """Return whether the light of a sender's lobe reaches a receiver's by photons: else by the receiver's directions.
+def comes_by_photons(exponent: float, sender: float) -> bool:
+    """Return whether what a lobe sends that is left to photons reaches a receiver by them: else by its directions.
 
-    `exponent`: P. `sender`: Q, of a lobe that is left to photons at all. `photon_exponent`: where those begin.
+    `exponent`: P. `sender`: Q.
     """
-    return bool(sender >= photon_exponent and sender >= BLURRED * exponent)
+    return bool(sender >= BLURRED * exponent)
+
+
+def meets_photons(lobes: Lobes) -> bool:
+    """Return whether some sender's lobe reaches some receiver by photons."""
+    sharp = lobes.surfaces.exponent[lobes.surfaces.specular.any(axis=1)].max(initial=0.0)
+    least = lobes.exponent.min(initial=np.inf)
+    return bool(sharp >= lobes.photon_exponent and sharp >= BLURRED * least)

@@ -24,7 +24,7 @@ from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
 from refgi.truth.checkpoint import Checkpoint
 from refgi.truth.light_pass import pilot
 from refgi.truth.lobe_pass import lobe_pass
-from refgi.truth.lobe_receivers import glossy_triangles, lobes_of
+from refgi.truth.lobe_receivers import glossy_triangles, lobes_of, meets_photons
 from refgi.truth.passes import one_pass
 from refgi.truth.result import Moments, TruthResult, add_pass, blocks_of, no_passes, result_of, with_means
 from refgi.truth.settings import TruthSettings
@@ -267,7 +267,12 @@ def _with_lobes(scene: Scene, tracer: Any, position: Array, normal: Array, trian
     """Return a task of lobes; `triangle_id`: as `glossy_triangles` has it."""
     task = _without_pilot(scene, tracer, position, normal, triangle_id, settings)
     left_to_photons = math.inf if task.caustics is None else MIRROR_EXPONENT if settings.caustics else SHARP_LOBE
-    return task._replace(lobes=lobes_of(scene, task.receivers.pixel, position, normal, triangle_id, left_to_photons))
+    lobes = lobes_of(scene, task.receivers.pixel, position, normal, triangle_id, left_to_photons)
+    count = settings.photons * len(scene.lights)
+    if task.caustics is not None and not settings.caustics and not meets_photons(lobes) and left_out(
+            "truth.photons", lambda: (count, count)):
+        task = task._replace(caustics=None)
+    return task._replace(lobes=lobes)
 
 
 def _checkpoint(place: Path, computation: bytes, values: int) -> Checkpoint:

@@ -11,7 +11,7 @@ import numpy as np
 
 from tests.naive.crossings import LIFT, corners_of, crossings, face_normals, free
 from tests.naive.pair_term import parts
-from tests.naive.radiometry import gauss_legendre, lobe_fraction
+from tests.naive.radiometry import gauss_legendre, lobe_fraction, spot_intensity
 from tests.naive.truth import nearest_hits
 from tests.naive.vpl import sender_faces
 
@@ -180,5 +180,14 @@ def _radiance(scene, origin, w, light):
     start = y + LIFT * g
     lit = ~(crossings(corners_of(geometry), start, np.asarray(light.position) - start) < 1).any(axis=1)
     albedo = np.array([scene.materials[m].diffuse for m in geometry.material_of_face[triangle]])
-    result[hit] = albedo / math.pi * (lit * cosine / d2)[:, None] * np.asarray(light.intensity)
+    result[hit] = albedo / math.pi * (lit * cosine / d2 * _falloff(light, -to_light / np.sqrt(d2)[:, None]))[
+        :, None] * np.asarray(light.intensity)
     return result
+
+
+def _falloff(light, w):
+    if not hasattr(light, "direction"):
+        return np.ones(len(w))
+    axis = unit(np.asarray(light.direction))
+    return np.array([spot_intensity(1.0, one @ axis, math.cos(light.inner_half_angle),
+                                    math.cos(light.outer_half_angle)) for one in w])

@@ -12,7 +12,7 @@ import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NoReturn
 
 import click
@@ -154,7 +154,7 @@ class VerbGroup(click.Group):
         args = sys.argv[1:] if args is None else list(args)
         session = Session(debug=bool(os.environ.get("REFGI_DEBUG")), as_json="--json" in args)  # usage errors as well
         extra |= {"standalone_mode": False, "obj": session}
-        with warnings.catch_warnings(), _heeding_sigterm():
+        with warnings.catch_warnings(), _heeding_signals():
             warnings.simplefilter("default")
             warnings.showwarning = session.warn
             try:
@@ -165,21 +165,36 @@ class VerbGroup(click.Group):
 
 
 @contextlib.contextmanager
-def _heeding_sigterm() -> Iterator[None]:
-    """Raise `Terminated` where SIGTERM comes, so that unfinished files are removed; only a main thread can."""
+def _heeding_signals() -> Iterator[None]:
+    """End by an exception where SIGTERM or SIGINT comes, so that unfinished files are removed; a main thread can."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGTERM, _terminate)
+    handlers: dict[signal.Signals, Callable[..., NoReturn]] = {signal.SIGTERM: _terminate}
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell's background job ignores it
+        handlers[signal.SIGINT] = _interrupt
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _terminate(*_: object) -> NoReturn:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # once: what is cleaned up now is cleaned up whole
+    _expect_halves()
     raise Terminated
+
+
+def _interrupt(*_: object) -> NoReturn:
+    _expect_halves()
+    raise KeyboardInterrupt
+
+
+def _expect_halves() -> None:
+    """Say nothing of finalizers that fail from now on: a signal may leave any object, as a compiler's, half made."""
+    sys.unraisablehook = lambda _: None
 
 
 def _explained(error: BaseException, session: Session) -> int:

@@ -21,8 +21,8 @@ import numpy as np
 from refgi.provenance.content import geometry_digest, light_json, materials_digest, plain
 from refgi.scene import Scene
 
-PACKAGES = ("refgi", "numpy", "numba", "llvmlite", "scipy", "embreex", "trimesh", "OpenEXR", "imageio", "matplotlib",
-            "click", "rich", "pydantic", "jinja2", "flip-evaluator")
+PACKAGES = ("refgi", "numpy", "numba", "llvmlite", "scipy", "embreex", "trimesh", "OpenEXR", "imageio", "pillow",
+            "matplotlib", "click", "rich", "pydantic", "jinja2", "flip-evaluator")
 GIT_SECONDS = 10.0
 DIRTY = "-dirty"
 VERSION = 2  # of the record; its key is `provenance`

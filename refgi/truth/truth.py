@@ -6,7 +6,7 @@ import math
 import sys
 import time
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -300,9 +300,18 @@ def _fingerprint(task: Task, shape: tuple[int, ...]) -> bytes:
     view_arrays = () if task.view is None else (task.view.origin, task.view.frame, task.view.half)
     film = () if task.caustics is None else (task.caustics.solid_angle, *task.caustics.mirrors, task.caustics.ior)
     lobes = () if task.lobes is None else (*task.lobes[:3], np.array(task.lobes.photon_exponent))
-    for array in (*task.surfaces, *task.lights, *task.receivers, *view_arrays, *film, *lobes):
+    for array in _arrays((task.surfaces, task.lights, task.receivers, view_arrays, film, lobes)):
         digest.update(repr((array.shape, array.dtype.str)).encode() + np.ascontiguousarray(array).data)
     return digest.digest()
+
+
+def _arrays(parts: Iterable[Any]) -> Iterator[Array]:
+    """Yield the arrays of tuples in tuples; one without values where there is none."""
+    for part in parts:
+        if isinstance(part, tuple):
+            yield from _arrays(part)
+        else:
+            yield np.zeros(0) if part is None else part
 
 
 def _more_samples(settings: TruthSettings, _: Mapping[str, Any]) -> TruthSettings:

@@ -5,6 +5,7 @@ import math
 import shutil
 from pathlib import Path
 
+import imageio.v3
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -172,6 +173,21 @@ def test_camera_and_lights_of_a_changed_scene_file_do_not_matter(room, monkeypat
     scene["lights"][0]["intensity_w_per_sr"] = [1, 1, 1]
     Path("room.json").write_text(json.dumps(scene))
     assert run("--again", "a.exr").exit_code == 0
+
+
+def test_a_texture_is_made_again_and_a_changed_image_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    codes = np.full((4, 4, 3), 200, np.uint8)
+    imageio.v3.imwrite("wood.png", codes)
+    Path("floor.obj").write_text("mtllib floor.mtl\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nv -1 0 -1\n"
+                                 "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl wood\nf 1/1 2/2 3/3 4/4\n")
+    Path("floor.mtl").write_text("newmtl wood\nKd 1 1 1\nmap_Kd wood.png\n")
+    view = ["--eye", "0,1,2", "--target", "0,0,0", "--light", "point:position=0,1,0:intensity=1,2,3"]
+    assert run("floor.obj", *TINY, *SII, *view, "--out", "a.exr").exit_code == 0
+    assert made_again(Path("a.exr")) == Path("a.exr").read_bytes()
+    codes[3, 3] = 201
+    imageio.v3.imwrite("wood.png", codes)
+    assert refused(run("--again", "a.exr"), "got other materials (changed: wood.png)")
 
 
 def test_a_scene_of_other_content_is_refused_by_what_changed(room, monkeypatch):

@@ -164,6 +164,27 @@ def test_ctrl_c_leaves_with_130_and_no_file(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize(("asked", "code", "line"), [("SIGTERM", 143, "terminated"), ("SIGINT", 130, "interrupted")])
+def test_what_a_signal_leaves_half_made_says_nothing_when_it_is_freed(asked, code, line):
+    victim = f"""
+import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
+import refgi.scene, refgi.cli
+class Compiler:
+    def __init__(self, *_):
+        os.kill(os.getpid(), signal.{asked})
+        self.handle = 1
+    def __del__(self):
+        del self.handle
+refgi.scene.builtin_scenes = Compiler
+sys.argv = ["refgi", "scenes"]
+refgi.cli.main()
+"""
+    child = subprocess.run([sys.executable, "-c", victim], capture_output=True, text=True, timeout=60)
+    assert (child.returncode, child.stdout, child.stderr) == (code, "", f"refgi: {line}\n")
+
+
 @pytest.mark.skipif(os.name == "nt", reason="POSIX pipes")
 def test_a_reader_that_leaves_is_no_error():
     child = subprocess.Popen([sys.executable, "-m", "refgi", "scenes"], stdout=subprocess.PIPE,

@@ -66,9 +66,9 @@ def footprint(image, wrap, place, longest):
     a, b = math.hypot(ux * width, vx * height), math.hypot(uy * width, vy * height)
     if max(a, b) <= 0.5:
         return bilinear(levels[0], wrap, u, v)
-    part = max(min(a, b), max(a, b) / longest, 0.5)
+    part = max(1.2 * min(a, b), max(a, b) / longest, 0.5)
     across, down = max(1, math.ceil(a / part - 1e-6)), max(1, math.ceil(b / part - 1e-6))
-    level = min(len(levels) - 1, max(0.0, math.log2(max(a / across, b / down))))
+    level = min(len(levels) - 1, max(0.0, math.log2(0.93 * max(a / across, b / down))))
     total = np.zeros(3)
     for j in range(down):
         for i in range(across):

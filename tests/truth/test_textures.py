@@ -2,16 +2,19 @@
 
 import dataclasses
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.lights.walk import walk_lights
 from refgi.rays import Tracer
 from refgi.scene import Image, light_table, material_table
 from refgi.settings import of
 from refgi.truth import TruthSettings
+from refgi.truth.result import TruthResult
 from refgi.truth.surfaces import surfaces
 from refgi.truth.truth import trace_truth
 from refgi.truth.vpl import VplSettings, vpl
@@ -81,3 +84,17 @@ def test_scenes_without_textures_have_none_in_their_kernels() -> None:
     assert surfaces(plain).textures is None
     assert surfaces(plain).uv is None
     assert Frame(plain).materials.textures is None
+
+
+def test_a_checkpoint_of_another_texture_is_not_gone_on_from(tmp_path: Path) -> None:
+    def traced(codes: np.ndarray) -> TruthResult:
+        scene = room(image=Image(codes)).with_camera(width=6, height=5)
+        return trace_truth(Frame(scene), TruthSettings(samples=48, checkpoint=str(tmp_path / "passes.truth")))
+
+    codes = np.full((2, 2, 3), 200, np.uint8)
+    passes = traced(codes).passes
+    assert traced(codes.copy()).passes == passes
+    codes = codes.copy()
+    codes[1, 1, 2] += 1
+    with pytest.raises(InputError, match="checkpoint"):
+        traced(codes)

@@ -17,7 +17,7 @@ from refgi.rsm.buffers.surfaces import cross
 from refgi.rsm.buffers.texel_rays import image_ray, row_view
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.scene.model import Geometry, MaterialTable
-from refgi.scene.texture.footprint import footprint_means
+from refgi.scene.texture.footprint import Looks, footprint_means, looks
 from refgi.scene.texture.table import TextureTable
 
 Array = npt.NDArray[Any]
@@ -65,12 +65,13 @@ class Scratch(NamedTuple):
 
     texture: Array  # (n,) int32: row of the table, -1 for none
     place: Array  # (6, n): u, v, their change to the next texel of the row, and to that of the next row
-    colour: Array  # (3, n)
+    colour: Array  # (n, 3) float32
+    looks: Looks
 
 
 @kernel
 def _scratch(count: int) -> Any:
-    return Scratch(np.empty(count, np.int32), np.empty((6, count)), np.empty((3, count)))
+    return Scratch(np.empty(count, np.int32), np.empty((6, count)), np.empty((count, 3), np.float32), looks())
 
 
 @kernel(parallel=True)
@@ -96,11 +97,11 @@ def _paint_row(surface: Painted, projection: Projection, triangle_id: Array, row
             painted = True
             fill_places(surface, projection, face, (row, first, column), first, scratch.place)
     if painted:
-        footprint_means(surface.table, scratch.texture, scratch.place, width, scratch.colour)
+        footprint_means(surface.table, scratch.texture, scratch.place, width, scratch.looks, scratch.colour)
         for channel in range(3):
             for x in range(width):
                 if scratch.texture[x] >= 0:
-                    albedo[channel, row, x] = surface.diffuse[of_face[faces[x]], channel] * scratch.colour[channel, x]
+                    albedo[channel, row, x] = surface.diffuse[of_face[faces[x]], channel] * scratch.colour[x, channel]
 
 
 @kernel
@@ -114,12 +115,12 @@ def _paint_texels(surface: Painted, projection: Projection, triangle_id: Array, 
         scratch.texture[k] = texture
         if texture >= 0:
             fill_places(surface, projection, face, (row, column, column + 1), k, scratch.place)
-    footprint_means(surface.table, scratch.texture, scratch.place, len(texel), scratch.colour)
+    footprint_means(surface.table, scratch.texture, scratch.place, len(texel), scratch.looks, scratch.colour)
     for k in range(len(texel)):
         if scratch.texture[k] >= 0:
             material = surface.material_of_face[triangle_id[texel[k] // width, texel[k] % width]]
             for channel in range(3):
-                albedo[channel, k] = surface.diffuse[material, channel] * scratch.colour[channel, k]
+                albedo[channel, k] = surface.diffuse[material, channel] * scratch.colour[k, channel]
 
 
 @kernel

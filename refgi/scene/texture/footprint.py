@@ -1,86 +1,210 @@
 """The mean of a texture over what a pixel covers: probes on its footprint, each blended between two mip levels.
 
-The footprint of a pixel is the parallelogram that its sides a and b span on the image, in texels. It is divided into
-n_a x n_b equal parts no longer than its shorter side, and a probe in the middle of each is looked up where a texel is
-as long as the part. A longer footprint thus has more probes along it and is not blurred across (anisotropic
+The footprint of a pixel is the parallelogram that its sides a and b span on the image, in texels. It is divided along
+its longer side into equal parts no longer than `STRETCH` times the shorter one, and a probe in the middle of each is
+looked up where a texel is `TEXEL` times as long as the part or, if that is more, the shorter side: a blend of four
+texels is wider than one. A longer footprint thus has more probes along it and is not blurred across (anisotropic
 filtering); of those more than `MOST` times as long as wide the parts are longer.
+
+Probes are listed for some pixels at once, so that what is done for each needs no branch and runs in SIMD lanes.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from refgi.elementary import log2
 from refgi.jit import kernel
 from refgi.scene.texture.lookup import neighbours_of
 from refgi.scene.texture.table import FILTER, FIRST, LEVELS, NEAREST, TRILINEAR, WRAP_U, WRAP_V, TextureTable
 
 Array = npt.NDArray[Any]
 
-MOST = 32  # probes along a side
+MOST = 32  # probes along the longer side
+STRETCH, TEXEL = 1.2, 0.93  # of these pairs the best on a checkered floor
 SHORTEST = 0.5  # texel; smaller parts see no more of a blend of four
 EDGE_ON = 1e12  # texels a pixel, of a surface that is seen edge-on
+TOGETHER = 64  # pixels whose probes are listed at once
+LOOKS = 2 * MOST * TOGETHER  # of them, on two levels each
+WIDTH, HEIGHT, TOP, U, V, ALONG_U, ALONG_V, LEVEL, PROBES, PERIOD = range(10)
+PLACE = PERIOD + 4  # rows of `Looks.pixel`
+PERIODS = (1.0, 0.0, 2.0)  # of u and v, by wrap: repeat, clamp, mirror
+X, Y = range(2)  # rows of `Looks.place`
+PIXEL, START, RIGHT, BELOW, INTEGERS = range(5)  # rows of `Looks.texel`
+WEIGHT, P, Q, SHARES = range(4)  # rows of `Looks.share`
+
+
+class Looks(NamedTuple):
+    """Scratch of one worker: probes of some pixels, and where each is looked up."""
+
+    short: Array  # (TOGETHER,) float32
+    pixel: Array  # (ROWS TOGETHER,) float64: size of the image, its last level; first probe, step, level and number
+    place: Array  # (2 LOOKS,) float64: place of a look on its level, in texels
+    texel: Array  # (INTEGERS LOOKS,) int32: pixel, first texel (of the level; then of the look), steps to the others
+    share: Array  # (SHARES LOOKS,) float32: weight of a look, shares of the second texel along both axes
 
 
 @kernel
-def probe_counts(a: float, b: float) -> tuple[int, int]:
-    """Return how many probes lie along the sides of a footprint, lengths in texels."""
-    part = max(min(a, b), max(a, b) / MOST, SHORTEST)
-    # a side that rounding makes longer than the part has no second probe
-    return max(1, int(np.ceil(a / part - 1e-6))), max(1, int(np.ceil(b / part - 1e-6)))
+def looks() -> Any:
+    """Return scratch of one worker."""
+    return Looks(np.ones(TOGETHER, np.float32), np.ones((PLACE + 6) * TOGETHER), np.zeros(2 * LOOKS),
+                 np.zeros(INTEGERS * LOOKS, np.int32), np.zeros(SHARES * LOOKS, np.float32))
 
 
 @kernel
-def footprint_means(table: TextureTable, texture: Array, place: Array, count: int, colour: Array) -> None:
+def footprint_means(table: TextureTable, texture: Array, place: Array, count: int, scratch: Looks,
+                    colour: Array) -> None:
     """Look up what each texture's filter makes of each of a row of pixels: the mean over its footprint, or a point.
 
     `texture` (n,): row of the table, -1 for none. `place` (6, n): u and v of the pixel's centre, their change to the
-    next pixel of the row, and to that of the next row. `count`: how many pixels there are. `colour` (3, n): filled
-    where there is a texture.
-
-    One loop and no calls with arrays: each call counts references, over which threads wait for each other.
+    next pixel of the row, and to that of the next row. `count`: how many pixels there are. `colour` (n, 3) float32:
+    filled, 0 where there is no texture.
     """
-    texels, sizes, textures = table.texels, table.level, table.texture
-    for x in range(count):
-        if texture[x] < 0:
+    for first in range(0, count, TOGETHER):
+        size = min(TOGETHER, count - first)
+        _describe(table, texture, place, first, size, scratch.pixel)
+        _plan(scratch.pixel)
+        _level(scratch.pixel, scratch.short)
+        listed = _list(table, texture, first, size, scratch)
+        _locate(listed, scratch)
+        _wrap(table, texture, first, size, scratch)
+        for i in range(first, first + size):
+            colour[i, 0], colour[i, 1], colour[i, 2] = np.float32(0), np.float32(0), np.float32(0)
+        _blend(table.texels, listed, scratch, first, colour)
+
+
+@kernel
+def _describe(table: TextureTable, texture: Array, place: Array, first: int, size: int, pixel: Array) -> None:
+    """Fill place, size and last level of the images of some pixels; -1 for filters without levels."""
+    for row in range(PLACE, PLACE + 6):
+        for i in range(size):
+            pixel[row * TOGETHER + i] = place[row - PLACE, first + i]
+    for i in range(size):
+        row = max(texture[first + i], 0)
+        level = table.texture[row, FIRST]
+        pixel[WIDTH * TOGETHER + i], pixel[HEIGHT * TOGETHER + i] = table.level[level, 1], table.level[level, 2]
+        for axis, wrap in ((0, WRAP_U), (1, WRAP_V)):
+            period = PERIODS[table.texture[row, wrap]]
+            pixel[(PERIOD + axis) * TOGETHER + i] = period
+            pixel[(PERIOD + 2 + axis) * TOGETHER + i] = 1.0 / period if period > 0.0 else 0.0
+        trilinear = table.texture[row, FILTER] == TRILINEAR
+        pixel[TOP * TOGETHER + i] = table.texture[row, LEVELS] - 1 if trilinear else -1
+
+
+@kernel
+def _plan(pixel: Array) -> None:
+    """Fill first probe, step to the next, level and number of probes of some pixels, in SIMD lanes."""
+    for i in range(TOGETHER):
+        width, height, top = pixel[WIDTH * TOGETHER + i], pixel[HEIGHT * TOGETHER + i], pixel[TOP * TOGETHER + i]
+        u, v = pixel[PLACE * TOGETHER + i], pixel[(PLACE + 1) * TOGETHER + i]
+        au, av = pixel[(PLACE + 2) * TOGETHER + i], pixel[(PLACE + 3) * TOGETHER + i]
+        bu, bv = pixel[(PLACE + 4) * TOGETHER + i], pixel[(PLACE + 5) * TOGETHER + i]
+        # whole turns of the image, exactly; 0 where it does not turn
+        u -= pixel[PERIOD * TOGETHER + i] * np.floor(u * pixel[(PERIOD + 2) * TOGETHER + i])
+        v -= pixel[(PERIOD + 1) * TOGETHER + i] * np.floor(v * pixel[(PERIOD + 3) * TOGETHER + i])
+        ax, ay, bx, by = au * width, av * height, bu * width, bv * height
+        a, b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
+        across = a >= b
+        longer, shorter = a if across else b, b if across else a
+        part = longer * (1.0 / MOST)
+        part = part if part > SHORTEST else SHORTEST
+        part = STRETCH * shorter if STRETCH * shorter > part else part
+        # a side that rounding makes longer than the part has no second probe
+        probes = np.ceil(longer / part - 1e-6)
+        meant = (top >= 0.0) & (not longer <= SHORTEST)
+        known = a + b < EDGE_ON
+        several = meant & known & (probes > 1.0)
+        probes = probes if several else 1.0
+        inverse = 1.0 / probes
+        part = longer * inverse
+        part = TEXEL * (part if part > shorter else shorter)
+        part = part if known else EDGE_ON  # the mean of the image
+        pixel[LEVEL * TOGETHER + i] = part if meant & (part > 1.0) else 1.0
+        share = inverse if several else 0.0
+        du, dv = (au if across else bu) * share, (av if across else bv) * share
+        back = 0.5 * (probes - 1.0)
+        pixel[U * TOGETHER + i], pixel[V * TOGETHER + i] = u - back * du, v - back * dv
+        pixel[ALONG_U * TOGETHER + i], pixel[ALONG_V * TOGETHER + i] = du, dv
+        pixel[PROBES * TOGETHER + i] = probes
+
+
+@kernel
+def _level(pixel: Array, short: Array) -> None:
+    """Turn lengths of parts into levels, in SIMD lanes."""
+    for i in range(TOGETHER):
+        short[i] = pixel[LEVEL * TOGETHER + i]
+    for i in range(TOGETHER):
+        short[i] = log2(short[i])
+    for i in range(TOGETHER):
+        level, top = np.float64(short[i]), pixel[TOP * TOGETHER + i]
+        level = level if level < top else top
+        pixel[LEVEL * TOGETHER + i] = level if level > 0.0 else 0.0
+
+
+@kernel
+def _list(table: TextureTable, texture: Array, first: int, size: int, scratch: Looks) -> int:
+    """List every probe of some pixels on both levels around its own; return how many there are."""
+    pixel, place, texel, share, count = scratch.pixel, scratch.place, scratch.texel, scratch.share, 0
+    for i in range(size):
+        if texture[first + i] < 0:
             continue
-        chosen, first, levels = textures[texture[x], FILTER], textures[texture[x], FIRST], textures[texture[x], LEVELS]
-        wrap_u, wrap_v = textures[texture[x], WRAP_U], textures[texture[x], WRAP_V]
-        width, height = sizes[first, 1], sizes[first, 2]
-        across, down, level = plan(chosen, levels, place[2, x] * width, place[3, x] * height,
-                                   place[4, x] * width, place[5, x] * height)
-        below = int(level)
-        share = level - below
-        red, green, blue = 0.0, 0.0, 0.0
-        for upwards in range(1 if share == 0.0 else 2):
-            row = first + below + upwards
-            start, width, height = sizes[row, 0], sizes[row, 1], sizes[row, 2]
-            # the first probe, and the steps along both sides, in texels of the level
-            sx, sy, tx, ty = 0.0, 0.0, 0.0, 0.0
-            if across * down > 1:
-                sx, sy = place[2, x] * width / across, place[3, x] * height / across
-                tx, ty = place[4, x] * width / down, place[5, x] * height / down
-            x0 = place[0, x] * width - 0.5 * ((across - 1) * sx + (down - 1) * tx)
-            y0 = place[1, x] * height - 0.5 * ((across - 1) * sy + (down - 1) * ty)
-            along = 0
-            weight = (share if upwards else 1.0 - share) / (across * down)
-            for _ in range(across * down):
-                left, right, p = neighbours_of(x0, width, wrap_u)
-                upper, lower, q = neighbours_of(y0, height, wrap_v)
-                if chosen == NEAREST:
-                    p, q = nearer(p), nearer(q)
-                ul, ur = np.uint64(start + upper * width + left), np.uint64(start + upper * width + right)
-                ll, lr = np.uint64(start + lower * width + left), np.uint64(start + lower * width + right)
-                a, b = weight * (1.0 - p) * (1.0 - q), weight * p * (1.0 - q)
-                c, d = weight * (1.0 - p) * q, weight * p * q
-                red += a * texels[ul, 0] + b * texels[ur, 0] + c * texels[ll, 0] + d * texels[lr, 0]
-                green += a * texels[ul, 1] + b * texels[ur, 1] + c * texels[ll, 1] + d * texels[lr, 1]
-                blue += a * texels[ul, 2] + b * texels[ur, 2] + c * texels[ll, 2] + d * texels[lr, 2]
-                x0, y0, along = x0 + sx, y0 + sy, along + 1
-                if along == across:
-                    x0, y0, along = x0 + tx - across * sx, y0 + ty - across * sy, 0
-        colour[0, x], colour[1, x], colour[2, x] = red, green, blue
+        probes, lower = int(pixel[PROBES * TOGETHER + i]), int(pixel[LEVEL * TOGETHER + i])
+        rest = pixel[LEVEL * TOGETHER + i] - lower
+        row = table.texture[texture[first + i], FIRST] + lower
+        for upwards in range(2 if rest > 0.0 else 1):
+            level = row + upwards
+            start, width, height = table.level[level, 0], table.level[level, 1], table.level[level, 2]
+            weight = np.float32((rest if upwards else 1.0 - rest) / probes)
+            x, y = pixel[U * TOGETHER + i] * width, pixel[V * TOGETHER + i] * height
+            along_x, along_y = pixel[ALONG_U * TOGETHER + i] * width, pixel[ALONG_V * TOGETHER + i] * height
+            for k in range(probes):
+                at = count + k
+                place[X * LOOKS + at], place[Y * LOOKS + at] = x + k * along_x, y + k * along_y
+                texel[PIXEL * LOOKS + at], texel[START * LOOKS + at], texel[BELOW * LOOKS + at] = i, start, width
+                share[WEIGHT * LOOKS + at] = weight
+            count += probes
+    return count
+
+
+@kernel
+def _locate(count: int, scratch: Looks) -> None:
+    """Find the four texels around each look, as if the image had no edges, in SIMD lanes."""
+    place, texel, share = scratch.place, scratch.texel, scratch.share
+    for k in range(count):
+        x, y = place[X * LOOKS + k] - 0.5, place[Y * LOOKS + k] - 0.5
+        left, upper = np.floor(x), np.floor(y)
+        share[P * LOOKS + k], share[Q * LOOKS + k] = x - left, y - upper
+        texel[START * LOOKS + k] += np.int32(upper) * texel[BELOW * LOOKS + k] + np.int32(left)
+        texel[RIGHT * LOOKS + k] = 1
+
+
+@kernel
+def _wrap(table: TextureTable, texture: Array, first: int, size: int, scratch: Looks) -> None:
+    """Find the texels of pixels that reach over an edge of the image, and of those without a blend."""
+    pixel, place, texel, share, count = scratch.pixel, scratch.place, scratch.texel, scratch.share, 0
+    for i in range(size):
+        if texture[first + i] < 0:
+            continue
+        one = texture[first + i]
+        probes, lower = int(pixel[PROBES * TOGETHER + i]), int(pixel[LEVEL * TOGETHER + i])
+        row, whole = table.texture[one, FIRST] + lower, table.texture[one, FILTER] == NEAREST
+        for level in range(row, row + (2 if pixel[LEVEL * TOGETHER + i] > lower else 1)):
+            begin, end, width, height = count, count + probes, table.level[level, 1], table.level[level, 2]
+            count = end
+            x, far_x = place[X * LOOKS + begin], place[X * LOOKS + end - 1]
+            y, far_y = place[Y * LOOKS + begin], place[Y * LOOKS + end - 1]
+            within = (min(x, far_x) >= 0.5) & (max(x, far_x) < width - 0.5)
+            within &= (min(y, far_y) >= 0.5) & (max(y, far_y) < height - 0.5)
+            if within and not whole:
+                continue
+            for k in range(begin, end):
+                left, right, p = neighbours_of(place[X * LOOKS + k], width, table.texture[one, WRAP_U])
+                upper, under, q = neighbours_of(place[Y * LOOKS + k], height, table.texture[one, WRAP_V])
+                texel[START * LOOKS + k] = table.level[level, 0] + upper * width + left
+                texel[RIGHT * LOOKS + k], texel[BELOW * LOOKS + k] = right - left, (under - upper) * width
+                share[P * LOOKS + k], share[Q * LOOKS + k] = (nearer(p), nearer(q)) if whole else (p, q)
 
 
 @kernel
@@ -90,16 +214,17 @@ def nearer(share: float) -> float:
 
 
 @kernel
-def plan(chosen: int, levels: int, ax: float, ay: float, bx: float, by: float) -> tuple[int, int, float]:
-    """Return how many probes lie along both sides of a footprint, and their level between the image, 0, and the last.
-
-    `chosen`: the filter. `ax`, `ay`, `bx`, `by`: sides of the footprint, in texels of the image.
-    """
-    a, b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
-    if chosen != TRILINEAR or max(a, b) <= SHORTEST:
-        return 1, 1, 0.0
-    if not a + b < EDGE_ON:
-        return 1, 1, levels - 1.0  # the mean of the image
-    across, down = probe_counts(a, b)
-    part = max(a / across, b / down)
-    return across, down, min(math.log2(part), levels - 1.0) if part > 1.0 else 0.0
+def _blend(texels: Array, count: int, scratch: Looks, first: int, colour: Array) -> None:
+    """Add up what the looks find."""
+    texel, share, one = scratch.texel, scratch.share, np.float32(1)
+    for k in range(count):
+        i = np.uint64(first + texel[PIXEL * LOOKS + k])
+        ul = np.uint64(texel[START * LOOKS + k])
+        ur, ll = ul + np.uint64(np.int64(texel[RIGHT * LOOKS + k])), ul + np.uint64(np.int64(texel[BELOW * LOOKS + k]))
+        lr = ll + np.uint64(np.int64(texel[RIGHT * LOOKS + k]))
+        p, q, weight = share[P * LOOKS + k], share[Q * LOOKS + k], share[WEIGHT * LOOKS + k]
+        upper, lower = weight * (one - q), weight * q
+        a, b, c, d = upper * (one - p), upper * p, lower * (one - p), lower * p
+        colour[i, 0] += (a * texels[ul, 0] + b * texels[ur, 0]) + (c * texels[ll, 0] + d * texels[lr, 0])
+        colour[i, 1] += (a * texels[ul, 1] + b * texels[ur, 1]) + (c * texels[ll, 1] + d * texels[lr, 1])
+        colour[i, 2] += (a * texels[ul, 2] + b * texels[ur, 2]) + (c * texels[ll, 2] + d * texels[lr, 2])

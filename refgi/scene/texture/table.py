@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from refgi.errors import expect
 from refgi.scene.texture.image import Image
 from refgi.scene.texture.pyramid import level_sizes, next_level
 from refgi.scene.texture.texture import Texture
@@ -15,6 +16,7 @@ REPEAT, CLAMP, MIRROR = 0, 1, 2
 NEAREST, BILINEAR, TRILINEAR = 0, 1, 2
 WRAPS = {"repeat": REPEAT, "clamp": CLAMP, "mirror": MIRROR}
 FILTERS = {"nearest": NEAREST, "bilinear": BILINEAR, "trilinear": TRILINEAR}
+MOST_TEXELS = (1 << 31) - 1  # of all images: kernels count them in int32
 FIRST, LEVELS, WRAP_U, WRAP_V, FILTER = range(5)  # columns of `TextureTable.texture`
 
 
@@ -74,7 +76,9 @@ def _stored(images: Sequence[Image]) -> tuple[Array, Array]:
     """Return texels and levels of images, each level made where it is stored."""
     sizes = [size for image in images for size in level_sizes(image.width, image.height)]
     starts = np.cumsum([0, *(width * height for width, height in sizes)])
-    texels = np.empty((int(starts[-1]), 3), np.float32)
+    total = int(starts[-1])
+    expect(total <= MOST_TEXELS, "textures", f"up to {MOST_TEXELS} texels with all mip levels", total)
+    texels = np.empty((total, 3), np.float32)
     level = np.array([(start, *size) for start, size in zip(starts[:-1].tolist(), sizes, strict=True)], np.int64)
     row = 0
     for image in images:

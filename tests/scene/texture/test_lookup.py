@@ -8,14 +8,14 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.scene import Image, Texture
-from refgi.scene.texture.footprint import MOST, footprint_means
+from refgi.scene.texture.footprint import MOST, footprint_means, looks
 from refgi.scene.texture.lookup import bilinear, coordinates_at, nearest, point_sample
 from refgi.scene.texture.table import Textures, textures_of
 from tests.naive import textures as naive
 
 RNG = np.random.default_rng(9)
 ROUNDING = 1e-12  # of weights of float64 times texels below 1; the texels themselves are float32 in both
-LEVELS = 2e-7  # mip levels are stored in float32, so that each rounds once
+BLENDS = 1e-6  # mip levels are stored, blends are added up in float32: 2^-24 for each of some 10 looks
 WRAPS = ("repeat", "clamp", "mirror")
 PLACES = [*RNG.uniform(-3.2, 3.2, (60, 2)).tolist(), (0.0, 0.0), (1.0, 1.0), (-1.0, 2.0), (0.5, -0.5), (0.25, 0.75),
           (1 - 1e-17, -1e-17), (-1e-17, 1e-17)]
@@ -60,24 +60,25 @@ def footprints(count: int, seed: int) -> np.ndarray:
 def test_means_over_footprints_equal_the_twin(size: tuple[int, int], wrap: tuple[str, str]) -> None:
     picture, place = image(*size), footprints(60, 3)
     table = Textures([Texture(picture, wrap)]).table  # type: ignore[arg-type]
-    colour = np.full((3, 60), np.nan)
+    colour = np.full((60, 3), np.nan, np.float32)
     texture = np.zeros(60, np.int32)
     texture[10] = -1
-    footprint_means(table, texture, place, 59, colour)
-    assert np.isnan(colour[:, [10, 59]]).all()
+    footprint_means(table, texture, place, 59, looks(), colour)
+    assert not colour[10].any()
+    assert np.isnan(colour[59]).all()
     for k in set(range(59)) - {10}:
-        assert np.abs(colour[:, k] - naive.footprint(picture.pixels, wrap, place[:, k], MOST)).max() <= LEVELS
+        assert np.abs(colour[k] - naive.footprint(picture.pixels, wrap, place[:, k], MOST)).max() <= BLENDS
 
 
 @pytest.mark.parametrize("chosen", ["nearest", "bilinear"])
 def test_other_filters_look_at_the_middle_of_a_footprint(chosen: str) -> None:
     picture, place = image(6, 7), footprints(40, 4)
     table = Textures([Texture(picture, filter=chosen)]).table  # type: ignore[arg-type]
-    colour = np.empty((3, 40))
-    footprint_means(table, np.zeros(40, np.int32), place, 40, colour)
+    colour = np.empty((40, 3), np.float32)
+    footprint_means(table, np.zeros(40, np.int32), place, 40, looks(), colour)
     literal = {"nearest": naive.nearest, "bilinear": naive.bilinear}[chosen]
     expected = [literal(picture.pixels, ("repeat", "repeat"), u, v) for u, v in place[:2].T]
-    assert np.abs(colour - np.transpose(expected)).max() <= ROUNDING
+    assert np.abs(colour - expected).max() <= BLENDS
 
 
 def test_what_is_seen_edge_on_or_from_far_is_the_mean_and_no_number_breaks_a_look_up() -> None:
@@ -87,10 +88,10 @@ def test_what_is_seen_edge_on_or_from_far_is_the_mean_and_no_number_breaks_a_loo
     place[2:, 0], place[2:, 1], place[2:, 2] = np.inf, 1e300, [1e9, 0, 0, 1e9]
     place[2:, 3] = np.nan
     place[:2, 4] = 1e200
-    colour = np.full((3, 5), np.nan)
-    footprint_means(table, np.zeros(5, np.int32), place, 5, colour)
-    assert np.allclose(colour[:, :4].T, picture.pixels.mean(axis=(0, 1)), atol=1e-6)
-    assert ((colour[:, 4] >= 0) & (colour[:, 4] <= 1)).all()
+    colour = np.full((5, 3), np.nan, np.float32)
+    footprint_means(table, np.zeros(5, np.int32), place, 5, looks(), colour)
+    assert np.allclose(colour[:4], picture.pixels.mean(axis=(0, 1)), atol=1e-6)
+    assert ((colour[4] >= 0) & (colour[4] <= 1)).all()
 
 
 def test_images_are_stored_once_and_equal_materials_share_a_table() -> None:

@@ -48,7 +48,7 @@ def picture(method: str, scene: Scene, **extra: Any) -> np.ndarray:
     return np.asarray(found.function(Frame(scene, rsm_resolution=64), settings), np.float64)
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("method", METHODS)
 def test_a_strip_that_is_cut_out_is_a_strip(method: str, evidence: Callable[[str], None]) -> None:
     """Edges between texels, where alpha crosses the cutoff: the picture of the mesh but for rounding."""
@@ -77,7 +77,7 @@ def test_other_ways_to_see_pass_holes_too(extra: dict[str, Any]) -> None:
     assert (solid != none).any()
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("estimator", ["combined", "light", "hemisphere"])
 def test_both_estimators_of_the_truth_pass_holes(estimator: str) -> None:
     settings = TruthSettings(samples=16, estimator=estimator)
@@ -88,7 +88,7 @@ def test_both_estimators_of_the_truth_pass_holes(estimator: str) -> None:
     assert np.abs(none - mesh).mean() > 0.02 * mesh.mean()
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_flux_behind_a_plate_that_is_half_hole(dtype: type, evidence: Callable[[str], None]) -> None:
     """A point light 1 m above a plate of 40 x 40 m, its half x < 0 a hole; 1 m below it a floor of the same size.
@@ -114,7 +114,7 @@ def test_flux_behind_a_plate_that_is_half_hole(dtype: type, evidence: Callable[[
     np.testing.assert_array_equal(lit[on_floor & clear], (x < 0)[on_floor & clear])
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("settings", [{}, {"filtered": True, "pattern": "grid", "lights": 64}, {"source": "walk"}])
 def test_the_ledger_closes_on_leaves(settings: dict[str, Any], evidence: Callable[[str], None]) -> None:
     frame = Frame(load_scene("leaf_grid"), width=48, height=48, rsm_resolution=128)
@@ -145,7 +145,7 @@ def test_light_paths_meet_what_is_there() -> None:
     assert on_leaves > 100
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("rule", ["keep", "planes", "ball"])
 def test_maps_of_area_lights_are_those_of_rays(rule: str, evidence: Callable[[str], None]) -> None:
     scene = load_scene("leaf_grid")
@@ -182,7 +182,7 @@ def test_points_of_imperfect_maps_lie_on_what_is_there() -> None:
     assert min(columns.min(), rows.min()) < 14 <= max(columns.min(), rows.min()) == 32  # the half x > 0 alone
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 def test_shadows_of_leaves_by_map_and_by_rays(evidence: Callable[[str], None]) -> None:
     """They differ where an edge of a shadow goes through a texel of the map or its neighbours."""
     scene = load_scene("leaf_grid")

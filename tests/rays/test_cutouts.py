@@ -36,7 +36,7 @@ def rays(count: int, seed: int, spread: float = 1.5) -> tuple[np.ndarray, np.nda
     return origins, unit_vectors(count, seed + 1).astype(np.float32).astype(float)
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("chosen", ["nearest", "bilinear"])
 def test_hits_are_those_of_a_literal_ray(backend: str, chosen: str, evidence: Callable[[str], None]) -> None:
     scene = heap(18, chosen=chosen)
@@ -73,7 +73,7 @@ def test_reach_ends_between_what_lies_on_a_ray() -> None:
     assert (tracer.closest(origins, directions, 0.0).triangle_id == MISS).all()
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 def test_both_backends_agree(monkeypatch: pytest.MonkeyPatch, evidence: Callable[[str], None]) -> None:
     """A ray that starts anew may pass over a leaf that lies within its offset behind a hole, and nothing else."""
     scene, (origins, directions) = load_scene("leaf_grid"), rays(100_000, 9, 0.9)

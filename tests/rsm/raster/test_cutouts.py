@@ -35,7 +35,7 @@ def texel_rays(projection):
                                                      projection.height, projection.width, local, column)
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("chosen", ["nearest", "trilinear"])
 def test_ids_are_those_of_a_literal_ray(name: str, chosen: str, evidence: Callable[[str], None]) -> None:
@@ -131,7 +131,7 @@ def is_on_mask_edge(scene: Scene, face: int, origin: np.ndarray, direction: np.n
     return min(found) <= 0 <= max(found)
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("name", ["leaf_grid", "leaf_grid:leaves=20000,texels=1024"])
 def test_rasterizer_and_rays_see_the_same_leaves(name: str, evidence: Callable[[str], None]) -> None:
     """But for texels on a triangle's edge, or where alpha is the cutoff within the ray's rounding."""
@@ -158,7 +158,7 @@ def test_rasterizer_and_rays_see_the_same_leaves(name: str, evidence: Callable[[
     assert on_edge + on_mask < 20
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 def test_a_cut_out_is_the_mesh_that_is_cut_along_its_edge(evidence: Callable[[str], None]) -> None:
     cut, mesh = holed_quad()
     total = 0

@@ -31,7 +31,7 @@ NEAR = 1e-6  # of a cutoff: alpha is float32
 WRAPS = ("repeat", "clamp", "mirror")
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("kind", ["uint8", "uint16", "float32"])
 @pytest.mark.parametrize("chosen", ["nearest", "bilinear", "trilinear"])
 def test_a_surface_is_there_where_the_twin_says_so(kind: str, chosen: str) -> None:
@@ -183,7 +183,7 @@ def loaded(path: Path, *said: str) -> Scene:
     return scene
 
 
-@pytest.mark.feature("REF-25")
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize(("keys", "cutoff", "alpha", "said"), [
     ({}, None, 1.0, ()), ({"alphaMode": "OPAQUE", "alphaCutoff": 0.3}, None, 1.0, ()),
     ({"alphaMode": "MASK"}, 0.5, 0.75, ()), ({"alphaMode": "MASK", "alphaCutoff": 0.3}, 0.3, 0.75, ()),

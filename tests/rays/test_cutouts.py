@@ -159,6 +159,19 @@ def test_the_decision_in_float64_knows_holes() -> None:
         assert (tracer.closest(start, targets - start).triangle_id != MISS).any() == there
 
 
+@pytest.mark.usefixtures("backend")
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_rays_beside_an_edge_of_a_mask_are_not_decided_by_their_neighbours(up: float) -> None:
+    """A miss is asked again a hair beside, where the plate may be there; the ray itself passes its hole."""
+    scene = half_plate(size=4.0)
+    plate = scene.geometry.selected(np.arange(4) >= 2)
+    x = np.concatenate([-np.geomspace(1e-7, 1e-4, 50), np.geomspace(1e-7, 1e-4, 50)])
+    origins = np.stack([x, np.full(100, 1.0 - 2.0 * up), np.full(100, 0.3)], axis=1)
+    tracer, along = Tracer(plate), np.tile([0.0, up, 0.0], (100, 1))
+    np.testing.assert_array_equal(tracer.closest(origins, along).triangle_id != MISS, x > 0)
+    np.testing.assert_array_equal(tracer.occluded(origins, along), x > 0)
+
+
 def test_bits_do_not_depend_on_threads() -> None:
     scene, (origins, directions) = load_scene("leaf_grid"), rays(30_000, 11, 0.9)
     tracer, answers = Tracer(scene.geometry), []

@@ -2,8 +2,8 @@
 
 A direction of density (P + 1) / (2 pi) <m.w>^P that finds radiance L contributes s (P + 2) / (P + 1) <n.w> L: bounded,
 however sharp the lobe. Symbols: as in `refgi.truth.lobe_receivers` and `refgi.truth.surfaces`; x the receiver, y where
-a direction lands, A = r^2 n_a / n_b with n_a = N density <g.w> / r^2 for N directions, and n_b = <g.l> / (Omega d^2)
-for a light one of whose rays has Omega.
+a direction lands, A = r^2 n_a / n_b with n_a = D <m.w>^P <g.w> / r^2, D of `density_on_axis`, and n_b = <g.l> / (Omega
+d^2) for a light one of whose rays has Omega.
 """
 
 import math
@@ -20,7 +20,7 @@ from refgi.rays import MISS
 from refgi.sampling import hash_bits
 from refgi.scene import LightTable
 from refgi.truth.hemisphere import short_of, toward_light
-from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, comes_by_photons
+from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, comes_by_photons, density_on_axis
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point, row
 from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_pattern, shading_normal
 from refgi.truth.textured import diffuse_at
@@ -35,8 +35,8 @@ def send_along_lobes(receivers: RayReceivers, lobes: Lobes, span: tuple[int, int
 
     `span`: first receiver and one past the last. `points` (s, 2) uint32: the pass's point set. `seed`: random shift: a
     hash of it and the receiver's pixel. `paths`: origins, directions, reach, lengths, cosines and weights are filled.
-    `density` (n,) float64: filled: s times the density of each direction, 1/sr; inf for a receiver that takes nothing
-    from light vertices.
+    `density` (n,) float64: filled: D <m.w>^P of each direction, 1/sr; inf for a receiver that takes nothing from light
+    vertices.
     """
     count = span[1] - span[0]
     for chunk in prange((count + CHUNK - 1) // CHUNK):
@@ -66,7 +66,7 @@ def _send(receivers: RayReceivers, lobes: Lobes, first: int, span: tuple[int, in
             cosines[ray] = cosine
             # cos^P = u^(P / (P + 1))
             density[ray] = (np.inf if exponent > SHARPEST_VERTEX else
-                            count * (exponent + 1) / (2 * math.pi) * math.exp(math.log(u) * exponent / (exponent + 1)))
+                            density_on_axis(exponent, count) * math.exp(math.log(u) * exponent / (exponent + 1)))
             # f_s <n.w> over the density
             weight = cosine * (exponent + 2) / (exponent + 1) / count
             for c in range(3):
@@ -115,11 +115,12 @@ def _gather(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float,
         g = (cross[0] * scale, cross[1] * scale, cross[2] * scale)
         cos_in, cos_out = dot(g, light), dot(g, w)
         n = shading_normal(surfaces, triangle, y, g)
-        share = 1.0  # of the balance heuristic: A / (r^2 + A)
+        share = 1.0  # of the power heuristic: 1 / (1 + (r^2 / A)^2)
         if limits[0] and density[ray] < np.inf:
             length = np.float64(paths.travelled[ray]) + paths.distance[ray]
             a = density[ray] * cos_out * (measure if directional else measure * dot(toward, toward)) / cos_in
-            share = a / (length * length + a)
+            ratio = length * length / a
+            share = 1 / (1 + ratio * ratio)
         rho, glossy = diffuse_at(surfaces.textures, surfaces, triangle, y), row(
             surfaces.specular, surfaces.material_of_face[triangle])
         diffuse, lobe = share * max(0.0, dot(n, w)), 0.0

@@ -1,12 +1,13 @@
 """The light side of glossy receivers: picks among light vertices by what the receiver's lobe makes of them.
 
-As `refgi.truth.light_side`, with another term: for receiver x and sender i it is, by the balance heuristic,
+As `refgi.truth.light_side`, with another term: for receiver x and sender i it is, by the power heuristic,
 
-    p_i q_i <n_x.w> (P + 2) / (2 pi) <m.w>^P / (r^2 + A),    A = a_i N (P + 1) / (2 pi) <m.w>^P <g_i.-w>,
+    p_i q_i <n_x.w> (P + 2) / (2 pi) <m.w>^P / (r^2 (1 + (A / r^2)^2)),    A = a_i D <m.w>^P <g_i.-w>,
 
 p_i q_i the sender's intensity, g_i its face normal, a_i the area that one of the light's rays stands for when they are
-spread evenly, N the receiver's own directions. With A = 0 it is f_s I cos / r^2 over s; near a lobe's axis, or near a
-sender, A bounds it. Computed in float32, everywhere in one order. Receivers above `SHARPEST_VERTEX` take nothing.
+spread evenly, D what the receiver's own directions count on the axis (`density_on_axis`). With A = 0 it is f_s I cos /
+r^2 over s; near a lobe's axis, or near a sender, A bounds it. Computed in float32, everywhere in one order. Receivers
+above `SHARPEST_VERTEX` take nothing.
 """
 
 import math
@@ -19,14 +20,15 @@ from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.sampling import hash_bits
-from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes
+from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, density_on_axis
 from refgi.truth.light_side import BELOW_1, PART, PARTS, TILE, aim
 from refgi.truth.light_vertices import BLOCK, LightVertices
 
 Array = npt.NDArray[Any]
 
 NEAREST = np.float32(1e-12)  # m^2; smaller squared distances count as this one: no term of the sharpest lobe overflows
-ROWS = 12  # of a tile: position, normal, m, P, (P + 2) / (2 pi), N (P + 1) / (2 pi)
+LANES = 16  # receivers of a tile are filled up to a multiple of that
+ROWS = 12  # of a tile: position, normal, m, P, (P + 2) / (2 pi), D
 
 
 @kernel
@@ -67,8 +69,8 @@ def _factors(vertex: Any, tile: Array, i: int) -> Any:
 
 
 @kernel
-def _sum_terms(points: LightVertices, tile: Array, first: int, parts: Array) -> None:
-    """Fill the sums of the terms of each part of senders at each receiver of a tile: one loop a function, for SIMD."""
+def _sum_terms(points: LightVertices, tile: Array, lanes: int, first: int, parts: Array) -> None:
+    """Fill the sums of the terms of each part of senders at receivers of a tile: one loop a function, for SIMD."""
     power, power_sender, factor = np.empty(TILE, np.float32), np.empty(TILE, np.float32), np.empty(TILE, np.float32)
     square, shared = np.empty(TILE, np.float32), np.empty(TILE, np.float32)
     for p in range(parts.shape[0]):
@@ -76,18 +78,19 @@ def _sum_terms(points: LightVertices, tile: Array, first: int, parts: Array) -> 
             if points.power[j] <= np.float32(0):
                 continue
             vertex, exponent = _vertex(points, j), points.exponent[j]
-            for i in range(TILE):
+            for i in range(lanes):
                 power[i], power_sender[i], factor[i], square[i], shared[i] = _factors(vertex, tile, i)
-            for i in range(TILE):
+            for i in range(lanes):
                 power[i] = log2p1(power[i])
-            for i in range(TILE):
+            for i in range(lanes):
                 power_sender[i] = log2p1(power_sender[i])
-            for i in range(TILE):
+            for i in range(lanes):
                 power[i] = exp2(tile[9, i] * power[i])
-            for i in range(TILE):
+            for i in range(lanes):
                 power_sender[i] = exp2(exponent * power_sender[i])
-            for i in range(TILE):
-                parts[p, i] += (factor[i] * power_sender[i]) * (power[i] / (square[i] + shared[i] * power[i]))
+            for i in range(lanes):
+                ratio = shared[i] * power[i] / square[i]
+                parts[p, i] += (factor[i] * power_sender[i]) * (power[i] / (square[i] * (np.float32(1) + ratio * ratio)))
 
 
 @kernel
@@ -95,7 +98,8 @@ def _term(points: LightVertices, j: int, tile: Array, i: int) -> Any:
     """Return the term of one sender at one receiver, bit for bit that which was summed."""
     h, h_sender, factor, square, shared = _factors(_vertex(points, j), tile, i)
     power, power_sender = exp2(tile[9, i] * log2p1(h)), exp2(points.exponent[j] * log2p1(h_sender))
-    return (factor * power_sender) * (power / (square + shared * power))
+    ratio = shared * power / square
+    return (factor * power_sender) * (power / (square * (np.float32(1) + ratio * ratio)))
 
 
 @kernel(parallel=True)
@@ -115,9 +119,10 @@ def pick_for_lobes(points: LightVertices, starts: Array, receivers: RayReceivers
         _fill_tile(receivers, lobes, members[low:high], sampling[4], tile)
         first, size = starts[chosen, 0], starts[chosen, 2] - starts[chosen, 0]
         parts, blocks = np.zeros((size * PARTS, TILE), np.float32), np.zeros((size, TILE), np.float32)
-        _sum_terms(points, tile, first * BLOCK, parts)
+        lanes = min(TILE, (high - low + LANES - 1) // LANES * LANES)
+        _sum_terms(points, tile, lanes, first * BLOCK, parts)
         for p in range(parts.shape[0]):
-            for i in range(TILE):
+            for i in range(lanes):
                 blocks[p // PARTS, i] += parts[p, i]
         _pick_all(points, receivers, lobes, members[low:high], tile, sampling, (first * BLOCK, blocks, parts),
                   rays)
@@ -133,7 +138,7 @@ def _fill_tile(receivers: RayReceivers, lobes: Lobes, members: Array, directions
         tile[9, i] = lobes.exponent[r]
         if directions == 0 or lobes.exponent[r] <= SHARPEST_VERTEX:
             tile[10, i] = (lobes.exponent[r] + 2) / (2 * math.pi)
-        tile[11, i] = directions * (lobes.exponent[r] + 1) / (2 * math.pi)
+        tile[11, i] = density_on_axis(lobes.exponent[r], directions)
 
 
 @kernel

@@ -5,12 +5,13 @@ L_s = int f_s(w, w_o) L(w) <n.w> dw with f_s = s (P + 2) / (2 pi) <m.w>^P, m the
 Symbols: P the receiver's exponent, Q a sender's, n_a and n_b how many samples of a pass the directions of the receiver
 and the rays of a light put on a unit of area at the sender, A = r^2 n_a / n_b.
 
-- Diffuse reflection and lobes of a modest exponent: multiple importance sampling by the balance heuristic, n_a / (n_a +
-  n_b) for directions, n_b / (n_a + n_b) for light vertices. n_b counts rays that are spread evenly.
+- Diffuse reflection and lobes of a modest exponent: multiple importance sampling by the power heuristic, n_a^2 / (n_a^2
+  + n_b^2) for directions, the rest for light vertices. n_b counts rays that are spread evenly.
 - Lobes that are left to photons (the sharpest; with caustics all mirror-like ones): photons, where P is lower than Q by
   `BLURRED` or more; else the receiver's directions alone, which are then no wider than what they are to meet.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -74,6 +75,16 @@ def subset_of(lobes: Lobes, chosen: Array) -> Lobes:
     """Return some of the receivers' lobes."""
     return lobes._replace(mirrored=np.ascontiguousarray(lobes.mirrored[:, chosen]),
                           specular=np.ascontiguousarray(lobes.specular[:, chosen]), exponent=lobes.exponent[chosen])
+
+
+@kernel
+def density_on_axis(exponent: float, directions: float) -> float:
+    """Return D = c N (P + 1) / (2 pi), c = max(1, sqrt(P) / 6): what N directions count on a lobe's axis, 1/sr.
+
+    c = 1 is their density. By trial more for sharp lobes, over which what they see hardly varies: directions then have
+    next to no variance, and any light vertex adds to it.
+    """
+    return max(1.0, math.sqrt(exponent) / 6) * directions * (exponent + 1) / (2 * math.pi)
 
 
 @kernel

@@ -6,9 +6,6 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 <<<<<<< .merge_file_Z9NaI7
 WHOLE = {"SII": 29, "VAL": 27, "AMS": 22, "HSS": 20, "REF": 28}  # features of each paper and beyond
-=======
-WHOLE = {"SII": 29, "VAL": 27, "AMS": 22, "HSS": 20, "REF": 26}  # features of each paper and beyond
->>>>>>> .merge_file_19X0Mw
 NOT_BUILT = "not built: "
 
 

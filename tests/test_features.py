@@ -4,7 +4,6 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-<<<<<<< .merge_file_Z9NaI7
 WHOLE = {"SII": 29, "VAL": 27, "AMS": 22, "HSS": 20, "REF": 28}  # features of each paper and beyond
 NOT_BUILT = "not built: "
 

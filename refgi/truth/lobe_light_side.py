@@ -41,10 +41,10 @@ def _vertex(points: LightVertices, j: int) -> Any:
 
 @kernel
 def _factors(vertex: Any, tile: Array, i: int) -> Any:
-    """Return -h of the receiver's lobe, -h of the sender's, p q <n_x.w> without the sender's power of a cosine, r^2, A
-    without the receiver's power; free of branches.
+    """Return what a pair's weight is made of, without branches.
 
-    A diffuse sender has its normal for axis: its cosine is 1 - h of that.
+    Result: -h of the receiver's lobe, -h of the sender's, p q <n_x.w> without the sender's power of a cosine, r^2, A
+    without the receiver's power. A diffuse sender has its normal for axis: its cosine is 1 - h of that.
     """
     px, py, pz, ax, ay, az, ux, uy, uz, fx, fy, fz, peak, area = vertex
     zero, half = np.float32(0), np.float32(0.5)
@@ -90,7 +90,8 @@ def _sum_terms(points: LightVertices, tile: Array, lanes: int, first: int, parts
                 power_sender[i] = exp2(exponent * power_sender[i])
             for i in range(lanes):
                 ratio = shared[i] * power[i] / square[i]
-                parts[p, i] += (factor[i] * power_sender[i]) * (power[i] / (square[i] * (np.float32(1) + ratio * ratio)))
+                taken = power[i] / (square[i] * (np.float32(1) + ratio * ratio))
+                parts[p, i] += (factor[i] * power_sender[i]) * taken
 
 
 @kernel
@@ -108,8 +109,8 @@ def pick_for_lobes(points: LightVertices, starts: Array, receivers: RayReceivers
                    rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Pick light vertices for each glossy receiver of some tiles; write shadow rays and their contributions.
 
-    As `refgi.truth.light_side.pick`, but the vertices' `bound` is a_i, m^2; `sampling` ends with N, 0 for no directions.
-    The contributions are radiance, W/m^2/sr.
+    As `refgi.truth.light_side.pick`, but the vertices' `bound` is a_i, m^2; `sampling` ends with N, 0 for no
+    directions. The contributions are radiance, W/m^2/sr.
     """
     members, table = tiles
     for number in prange(len(table)):

@@ -1,6 +1,6 @@
 """Slow literal twin of what glossy receivers send to the eye, from the definitions alone: pair by pair in float64.
 
-    L(x) = sum_i f_s(w_i, w_o) I_i(-w_i) <n.w_i> / r_i^2,    f_s = s (P + 2) / (2 pi) <m.w_i>^P,   m = 2 (n.w_o) n - w_o,
+    L(x) = sum_i f_s(w_i, w_o) I_i(-w_i) <n.w_i> / r_i^2,   f_s = s (P + 2) / (2 pi) <m.w_i>^P,   m = 2 (n.w_o) n - w_o,
 
 where n.w_i > 0 and n.w_o > 0; w_o points to the eye, w_i to the light or pixel light i.
 """

@@ -1,4 +1,4 @@
-"""Path tracing of glossy receivers: closed forms, every texel of the map, estimators against each other, their error."""
+"""Path tracing of glossy receivers: closed forms, every texel of the map, estimators side by side, their error."""
 
 import dataclasses
 import math
@@ -218,8 +218,8 @@ def mirror_room(sender, receiver):
     light = SpotLight((0.0, 1.0, 0.0), (1.0, -0.35, 0.0), math.radians(25), math.radians(25), (3.0, 2.0, 1.0))
     wall = Material("mirror", (0.0,) * 3, (0.8, 0.7, 0.6), sender)
     floor = Material("floor", (0.0,) * 3, (0.5, 0.5, 0.5), receiver)
-    room = scene([rectangle((-2, 0, 2), (3, 0, 0), (0, 0, -4), floor), rectangle((1, 0, 2), (0, 0, -4), (0, 2, 0), wall)],
-                 light)
+    room = scene([rectangle((-2, 0, 2), (3, 0, 0), (0, 0, -4), floor),
+                  rectangle((1, 0, 2), (0, 0, -4), (0, 2, 0), wall)], light)
     return dataclasses.replace(room, camera=Camera((-1.2, 1.4, 0.2), (0.0, 0.0, 0.0), vfov=math.radians(40))), light
 
 
@@ -239,8 +239,9 @@ def test_a_mirror_is_an_image_of_the_light_for_a_lobe_too(sender, receiver, evid
     expected = np.zeros((3, 24, 24))
     intensity = np.multiply((0.8, 0.7, 0.6), light.intensity)
     for row, column in np.argwhere(inside):
-        expected[:, row, column] = naive.of_point_light(intensity, image, receiver, (0.5,) * 3, x[:, row, column].astype(
-            float), np.array([0.0, 1.0, 0.0]), room.camera.eye)
+        point = x[:, row, column].astype(float)
+        expected[:, row, column] = naive.of_point_light(intensity, image, receiver, (0.5,) * 3, point,
+                                                        np.array([0.0, 1.0, 0.0]), room.camera.eye)
     got, want = result.mean[:, inside].sum(), expected[:, inside].sum()
     sigma = math.sqrt(result.variance_of_mean[:, inside].sum()) / want
     evidence(f"P = {receiver:g} before a mirror: {got / want:.4f} of the closed form (standard error {sigma:.4f})")

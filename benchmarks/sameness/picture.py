@@ -19,7 +19,7 @@ DIGITS = 16
 
 
 def picture(case: Case) -> Any:
-    """Return the irradiance of a case, (3, h, w), the lobes of one of these, or of all frames of its sequence, (frames, 3, h, w)."""
+    """Return the irradiance of a case (3, h, w), its lobes, or the irradiance of all frames, (frames, 3, h, w)."""
     options = dict(dtype=case.dtype, rsm_resolution=RSM, **_size(case))
     settings = settings_of(case.method, **case.flat)
     if case.method == "temporal":

@@ -15,6 +15,7 @@ from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
 from refgi.method import _WARNED
 from refgi.methods import METHODS, render
+from refgi.rays import Tracer
 from refgi.settings import from_text, of, replaced
 from refgi.skips import without_skip
 from refgi.splat.multires.lobes import glossy_subsplats
@@ -505,3 +506,36 @@ def test_irradiance_and_lobes_share_what_both_need(room):
     assert log.memory is None
     assert np.array_equal(made.lobes, METHODS["sii"].lobes(room, settings))
     assert np.array_equal(made.irradiance, METHODS["sii"].function(room, settings))
+
+
+@pytest.mark.feature("REF-27")
+def test_materials_of_one_exponent_keep_their_reflectance():
+    """Two lobes of one shape in different colours, of which each pixel has its own."""
+    scene = SCENES["lamps"]()
+    same = tuple(dataclasses.replace(m, exponent=12.0) if any(m.specular) else m for m in scene.materials)
+    frame = Frame(dataclasses.replace(scene, materials=same), **OPTIONS)
+    assert len(np.unique(frame.glossy_points.specular, axis=1).T) > 1
+    changes = ("lights=32", "pairs.clamp=none", "subsplats.coarsest=64")
+    settings = from_text(METHODS["multires"].settings(), changes)
+    lights = choose_lights(frame, settings.lights)
+    close(METHODS["multires"].lobes(frame, settings), receiver_lobes.of_lights(frame, lights, settings.pairs))
+
+
+def test_no_ray_is_traced_for_a_light_off_the_lobe(room, monkeypatch):
+    """A sharp lobe meets few lights: far fewer rays than the irradiance of the same pixels has."""
+    traced = []
+    whole = Tracer.fill_occluded
+
+    def counting(self, origins, directions, reach, blocked):
+        traced.append(int(np.count_nonzero(reach > 0)))
+        return whole(self, origins, directions, reach, blocked)
+
+    monkeypatch.setattr(Tracer, "fill_occluded", counting)
+    sharp = Frame(room.scene, **OPTIONS)
+    sharp.glossy_points = room.glossy_points._replace(exponent=np.full_like(room.glossy_points.exponent, 1e6))
+    settings = from_text(METHODS["vpl"].settings(), ("lights=40",))
+    METHODS["vpl"].lobes(room, settings)
+    wide = sum(traced)
+    traced.clear()
+    METHODS["vpl"].lobes(sharp, settings)
+    assert sum(traced) < 0.2 * wide

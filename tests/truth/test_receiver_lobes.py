@@ -105,38 +105,49 @@ def at_corner(room, points, normal, settings):
     return accumulate_lobes(room, Tracer(room.geometry), points.T[..., None], normal.T[..., None], ids, settings)
 
 
+def panel_before_light(exponent, senders=None):
+    """A panel of a lobe over a floor and beside a wall, both lit by spots with soft edges, none of them near it."""
+    panel = Material("panel", (0.1,) * 3, (0.8, 0.7, 0.6), exponent)
+    ground = Material("ground", (0.5, 0.4, 0.3), (0.0,) * 3 if senders is None else (0.4,) * 3, senders or 0.0)
+    side = Material("side", (0.2, 0.5, 0.7))
+    spots = (SpotLight((0.2, 2.0, 0.9), (0.0, -1.0, 0.1), 0.1, 0.45, (3.0, 2.5, 2.0)),
+             SpotLight((1.0, 1.2, 1.2), (-1.0, -0.2, 0.0), 0.1, 0.35, (1.0, 2.0, 3.0)))
+    room = scene([rectangle((-0.6, 0.4, 0.0), (1.2, 0, 0), (0, 0.9, 0), panel),
+                  rectangle((-1.5, 0, 2.5), (3, 0, 0), (0, 0, -2.5), ground),
+                  rectangle((-1.4, 0.2, 2.4), (0, 0, -2.3), (0, 1.8, 0), side),
+                  rectangle((-0.3, 0.2, 0.7), (0.3, 0, 0), (0, 0.25, 0), side)], *spots)
+    return dataclasses.replace(room, camera=Camera((0.3, 1.0, 2.2), (0.0, 0.8, 0.0), vfov=math.radians(28)))
+
+
 @pytest.mark.feature("REF-26")
-@pytest.mark.parametrize("exponent", [1.0, 30.0, pytest.param(1e3, marks=pytest.mark.slow),
-                                      pytest.param(1e5, marks=pytest.mark.slow)])
-def test_every_texel_of_the_map_gives_the_same(exponent, evidence):
+@pytest.mark.parametrize(("exponent", "senders"), [
+    (1.0, None), (1.0, 20.0), (30.0, 20.0), (1e3, None), pytest.param(1e5, None, marks=pytest.mark.slow)])
+def test_every_texel_of_the_map_gives_the_same(exponent, senders, evidence):
     """`vpl` with all texels, no clamp, a fine map, against the truth: means, and chi-square of means over blocks.
 
-    A floor and blocks of two lobes, so lobes meet lobes; before a sharp floor blocks are diffuse. A sharp lobe sees
-    single texels: what a map is off by is taken from one of half as many texels along a side.
+    A sharp lobe sees single texels: by how much a map is off is taken from one of half as many texels along a side,
+    and counts beside the truth's standard error.
     """
-    sharp = exponent > 100
-    found, size = glossy_box(exponent, blocks=8.0), 24
-    if sharp:
-        found = without_metal(found)
-    frames = [Frame(found, width=size, height=size, rsm_resolution=n) for n in ((128, 256) if sharp else (64, 128))]
+    found, size = panel_before_light(exponent, senders), 24
+    frames = [Frame(found, width=size, height=size, rsm_resolution=n)
+              for n in ((160, 320) if exponent > 100 else (64, 128))]
     coarse, fine = (find_method("vpl").compute_lobes(frame, of(VplSettings, pattern="all"))[0] for frame in frames)
-    truth = trace_lobes(frames[1], TruthSettings(samples=24 * 40, photons=FEW))
-    seen = truth.samples > 0
-    own = np.abs(fine - coarse)[:, seen].mean() / fine[:, seen].mean()
+    truth = trace_lobes(frames[1], TruthSettings(samples=24 * 40))
+    seen, used = truth.samples > 0, truth.block_pixels > 0
+    own = (fine - coarse)[:, seen].mean(axis=1) / truth.picture_mean
     ratio = fine[:, seen].mean(axis=1) / truth.picture_mean
     sigma = np.sqrt(truth.picture_variance) / truth.picture_mean
-    used = truth.block_pixels > 0
-    z = (block_means(fine, seen) - truth.block_mean)[:, used]
-    map_error = block_means(fine - coarse, seen)[:, used]
-    chi2 = (z**2).sum() / (truth.block_variance[:, used] + map_error**2).sum()
-    evidence(f"P = {exponent:g}: mean {ratio.mean():.4f} of the truth's (its standard error {sigma.max():.1e}), pixels "
-             f"of a map differ from one of half as many by {own:.2f}; chi-square of a block's mean {chi2:.2f}")
-    assert (np.abs(ratio - 1) < 3 * sigma + EDGES[sharp]).all()
-    assert chi2 < 2
+    off = block_means(fine, seen) - truth.block_mean
+    variance = truth.block_variance + block_means(fine - coarse, seen) ** 2 + (1e-3 * truth.picture_mean[:, None, None]) ** 2
+    chi2 = (off**2)[:, used] / variance[:, used]
+    evidence(f"P = {exponent:g}, senders {senders}: mean {ratio.mean():.4f} of the truth's (standard error "
+             f"{sigma.max():.1e}; maps of half the size: {np.abs(own).max():.1e}); chi-square of a block {chi2.mean():.2f}")
+    assert sigma.max() < 0.01
+    assert (np.abs(ratio - 1) < 3 * np.hypot(sigma, own) + 2e-3).all()
+    assert chi2.mean() < 1.5
 
 
 FEW = 1 << 13  # photons of a light in a pass
-EDGES = {False: 0.01, True: 0.05}  # of the mean: edges of light in a fixed map; a sharp lobe sees single texels
 
 
 def without_metal(found):
@@ -153,21 +164,20 @@ def block_means(picture, seen):
 
 
 @pytest.mark.feature("REF-26")
-@pytest.mark.parametrize("blocks", [8.0, pytest.param(300.0, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("exponent", [2.0, pytest.param(30.0, marks=pytest.mark.slow), 1e4])
+@pytest.mark.parametrize(("exponent", "blocks"), [(2.0, 20.0), (30.0, 20.0)])
 def test_estimators_agree(exponent, blocks, evidence):
     """Means, and chi-square of the means over blocks, of directions alone against both."""
-    frame = Frame(glossy_box(exponent, blocks=blocks), width=24, height=24)
+    frame = Frame(panel_before_light(exponent, blocks), width=24, height=24)
     both = trace_lobes(frame, TruthSettings(samples=24 * 40, photons=FEW))
-    alone = trace_lobes(frame, TruthSettings(samples=16 * 120, estimator="hemisphere", seed=1, photons=FEW))
+    alone = trace_lobes(frame, TruthSettings(samples=16 * 320, estimator="hemisphere", seed=1, photons=FEW))
     z = (both.picture_mean - alone.picture_mean) / np.sqrt(both.picture_variance + alone.picture_variance)
-    used = both.block_pixels > 0
+    used = (both.block_pixels > 0) & (both.block_mean[1] > 0.01 * both.picture_mean[1])  # directions miss the rest
     of_blocks = (both.block_mean - alone.block_mean)[:, used] ** 2 / (both.block_variance + alone.block_variance)[
         :, used]
     evidence(f"P = {exponent:g}, senders {blocks:g}: means differ by {np.abs(z).max():.1f} standard errors, chi-square "
              f"of a block {of_blocks.mean():.2f}; error of a pixel {both.pixel_error:.3f} and {alone.pixel_error:.3f}")
     assert np.abs(z).max() < SIGMAS
-    assert 0.6 < of_blocks.mean() < 1.5
+    assert of_blocks.mean() < 2  # six blocks or so, whose errors go together
 
 
 @pytest.mark.feature("REF-26")
@@ -287,7 +297,7 @@ def task_of_lobes(frame, settings):
 
 
 @pytest.mark.feature("REF-26")
-@pytest.mark.parametrize("exponent", [0.0, 1e4])
+@pytest.mark.parametrize("exponent", [0.0, 900.0])
 def test_without_visibility_the_sum_over_every_texel(exponent, evidence):
     from refgi.lights import choose_pixel_lights
     from refgi.pairs.settings import PairSettings

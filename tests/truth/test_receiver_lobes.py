@@ -138,10 +138,12 @@ def test_every_texel_of_the_map_gives_the_same(exponent, senders, evidence):
     ratio = fine[:, seen].mean(axis=1) / truth.picture_mean
     sigma = np.sqrt(truth.picture_variance) / truth.picture_mean
     off = block_means(fine, seen) - truth.block_mean
-    variance = truth.block_variance + block_means(fine - coarse, seen) ** 2 + (1e-3 * truth.picture_mean[:, None, None]) ** 2
+    floor = (1e-3 * truth.picture_mean[:, None, None]) ** 2
+    variance = truth.block_variance + block_means(fine - coarse, seen) ** 2 + floor
     chi2 = (off**2)[:, used] / variance[:, used]
     evidence(f"P = {exponent:g}, senders {senders}: mean {ratio.mean():.4f} of the truth's (standard error "
-             f"{sigma.max():.1e}; maps of half the size: {np.abs(own).max():.1e}); chi-square of a block {chi2.mean():.2f}")
+             f"{sigma.max():.1e}; maps of half the size: {np.abs(own).max():.1e}); chi-square of a block "
+             f"{chi2.mean():.2f}")
     assert sigma.max() < 0.01
     assert (np.abs(ratio - 1) < 3 * np.hypot(sigma, own) + 2e-3).all()
     assert chi2.mean() < 1.5

@@ -9,10 +9,10 @@ import pytest
 from refgi.frame import Frame
 from refgi.lobes import mirrored, receiver_lobe, receiver_norm
 from refgi.pairs.settings import PairSettings
-from refgi.scene import DirectionalLight, PointLight, SpotLight, load_scene
+from refgi.scene import PointLight, SpotLight
 from tests.glossy import glossy_box
 from tests.naive import receiver_lobes as naive
-from tests.truth.scenes import floor, rectangle, scene
+from tests.truth.scenes import floor, scene
 
 EXPONENTS = [0.0, 1.0, 10.0, 1e3, 1e6]
 QUADRATURE = 1e-8  # of both rules, converged

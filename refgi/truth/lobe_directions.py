@@ -22,7 +22,7 @@ from refgi.scene import LightTable
 from refgi.truth.hemisphere import short_of, toward_light
 from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, comes_by_photons, density_on_axis
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point, row
-from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_pattern, shading_normal
+from refgi.truth.surfaces import around, face_cross, lift, lobe_pattern, shading_normal
 from refgi.truth.textured import diffuse_at
 
 Array = npt.NDArray[Any]

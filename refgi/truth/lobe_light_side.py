@@ -20,9 +20,9 @@ from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.sampling import hash_bits
-from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, density_on_axis
 from refgi.truth.light_side import BELOW_1, PART, PARTS, TILE, aim
 from refgi.truth.light_vertices import BLOCK, LightVertices
+from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, density_on_axis
 
 Array = npt.NDArray[Any]
 

@@ -2,19 +2,16 @@
 
 import dataclasses
 import math
-import warnings
 
 import numpy as np
 import pytest
 
-from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import find_method, render
 from refgi.rays import Tracer
 from refgi.scene import Camera, Geometry, Material, PointLight, Scene, SpotLight, load_scene
 from refgi.settings import of
 from refgi.truth import TruthSettings, VplSettings, trace_truth
-from refgi.truth.lobe_pass import lobe_pass
 from refgi.truth.truth import _with_lobes, accumulate_lobes, trace_lobes
 from tests.glossy import glossy_box
 from tests.naive import receiver_lobes as naive

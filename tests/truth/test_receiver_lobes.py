@@ -17,6 +17,7 @@ from tests.glossy import glossy_box
 from tests.naive import receiver_lobes as naive
 from tests.truth.scenes import rectangle, scene
 
+pytestmark = pytest.mark.filterwarnings("ignore::refgi.errors.RefgiWarning")  # of what sharp lobes leave out
 SIGMAS = 4
 MIDDLE = (0.0, -0.003, 0.0)  # nearly; the light in the middle sees a plate there edge-on
 CERTAIN = 1e-4  # tail of a chi-square value
@@ -211,7 +212,7 @@ def test_the_error_falls_with_the_root_of_the_samples(exponent, evidence):
 def test_stated_errors_are_the_spread_over_seeds(evidence):
     from scipy.stats import f as fisher
 
-    frame, seeds, passes = Frame(glossy_box(30.0), width=24, height=24), 16, 6
+    frame, seeds, passes = Frame(glossy_box(30.0), width=24, height=24), 48, 6
     runs = [trace_lobes(frame, TruthSettings(samples=24 * passes, seed=100 + seed)) for seed in range(seeds)]
     means = np.stack([run.picture_mean for run in runs])
     chi2 = ((means - means.mean(axis=0)) ** 2).sum(axis=0) / np.stack([run.picture_variance for run in runs]).mean(0)
@@ -222,7 +223,7 @@ def test_stated_errors_are_the_spread_over_seeds(evidence):
              f"{ratio.mean():.2f} (blocks) of what is stated")
     low, high = (seeds - 1) * fisher.ppf([CERTAIN, 1 - CERTAIN], seeds - 1, seeds * (passes - 1))
     assert ((low < chi2) & (chi2 < high)).all()
-    assert 0.7 < ratio.mean() < 1.3
+    assert 0.7 < ratio.mean() < 1.3  # 0.1 is one standard deviation of the mean of these 18
 
 
 def mirror_room(sender, receiver):

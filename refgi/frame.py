@@ -15,12 +15,14 @@ from refgi.errors import expect
 from refgi.scene.model import LightTable, MaterialTable, Scene, light_table, material_table
 from refgi.scene.motion import near_origin
 from refgi.scene.values import is_count
+from refgi.skips import left_out
 from refgi.stages import stage
 
 if TYPE_CHECKING:
     from refgi.rays import Tracer
     from refgi.rsm import GBuffer, Rsm
     from refgi.rsm.buffers.extent import Extent
+    from refgi.rsm.buffers.glossy import GlossyPoints
 
 Array = npt.NDArray[Any]
 Shadows = Literal["map", "exact"]
@@ -83,6 +85,7 @@ class Frame:
         expect(scene.face_count > 0, f"scene {scene.name!r}", "at least one triangle", "none")
         expect(len(scene.lights) > 0, f"scene {scene.name!r}", "at least one light", "none")
         self.scene, self.origin = near_origin(scene)
+        self._visible: dict[int, Array] = {}  # where each light arrives, of a frame with glossy receivers
 
     @cached_property
     def materials(self) -> MaterialTable:
@@ -147,27 +150,67 @@ class Frame:
                  for index, light in enumerate(self.scene.lights)]
         return parts[0] if len(parts) == 1 else np.asarray(sum(parts[1:], start=parts[0]))
 
+    @cached_property
+    def glossy_receivers(self) -> bool:
+        """Whether any visible surface reflects by a lobe; without, no code of lobes runs."""
+        from refgi.rsm.buffers.glossy import shows_glossy
+
+        if not any(material.is_glossy and not material.is_dielectric for material in self.scene.materials):
+            return not left_out("frame.lobes", lambda: (self.width * self.height,) * 2)
+        if shows_glossy(self.gbuffer, self.materials, self.scene.geometry.material_of_face):
+            return True
+        return not left_out("frame.lobes", lambda: (self.width * self.height,) * 2)
+
+    @cached_property
+    def glossy_points(self) -> "GlossyPoints":
+        """The pixels whose surface reflects by a lobe towards the eye."""
+        from refgi.rsm.buffers.glossy import glossy_points
+
+        return glossy_points(self.gbuffer, self.materials, self.scene.camera.eye)
+
+    @cached_property
+    def direct_lobes(self) -> Array:
+        """Radiance of lobes by direct light with its shadows, (3, h, w), W/m^2/sr; 0 where there is no lobe."""
+        from refgi.rsm.buffers.glossy import direct_lobes, spread_over_picture
+
+        points = self.glossy_points
+        total = np.zeros_like(points.position)
+        for index, light in enumerate(self.scene.lights):
+            total += direct_lobes(points, light, self._visible_from_light(index))
+        return spread_over_picture(points, total, (self.height, self.width))
+
     @property
     def unused(self) -> list[str]:
         """Names among `BUFFERS` of what nothing has asked for yet."""
         return [name for name in BUFFERS if name not in vars(self)]
 
-    def radiance(self, indirect: Array | None = None) -> Array:
-        """Return what the camera receives: emission + albedo/pi (direct + indirect).
+    def radiance(self, indirect: Array | None = None, lobes: Array | None = None) -> Array:
+        """Return what the camera receives: emission + albedo/pi (direct + indirect) + direct and indirect lobes.
 
         Parameters
         ----------
         indirect : (3, h, w) ndarray, optional
             Indirect irradiance, W/m^2; none where absent.
+        lobes : (3, h, w) ndarray, optional
+            Radiance towards the eye of receivers' lobes by indirect light, W/m^2/sr; none where absent.
 
         Returns
         -------
         (3, h, w) ndarray
-            Radiance, W/m^2/sr, linear RGB. Receivers reflect by their diffuse part alone.
+            Radiance, W/m^2/sr, linear RGB.
         """
-        return compose(self.direct, indirect, self.gbuffer, self.materials)
+        radiance = compose(self.direct, indirect, self.gbuffer, self.materials)
+        return add_lobes(radiance, self.direct_lobes, lobes) if self.glossy_receivers else radiance
 
     def _visible_from_light(self, index: int) -> Array:
+        if index in self._visible:
+            return self._visible[index]
+        visible = self._found_visible(index)
+        if self.glossy_receivers:  # who asks again
+            self._visible[index] = visible
+        return visible
+
+    def _found_visible(self, index: int) -> Array:
         buffer, light = self.gbuffer, self.scene.lights[index]
         if self.shadows == "map":
             from refgi.rsm import shadow_map_visibility
@@ -200,6 +243,27 @@ def compose(direct: Array, indirect: Array | None, buffer: "GBuffer", materials:
     from refgi.rsm import leaving_radiance
 
     return leaving_radiance(direct, indirect, buffer, materials)
+
+
+@stage("frame.add_lobes")
+def add_lobes(radiance: Array, direct: Array, indirect: Array | None) -> Array:
+    """Add to what the camera receives from diffuse receivers what their lobes reflect.
+
+    Parameters
+    ----------
+    radiance : (3, h, w) ndarray
+        Emission and diffuse reflection, W/m^2/sr.
+    direct : (3, h, w) ndarray
+        Lobes by direct light, W/m^2/sr.
+    indirect : (3, h, w) ndarray, optional
+        Lobes by indirect light, W/m^2/sr.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Radiance, W/m^2/sr, linear RGB.
+    """
+    return radiance + direct if indirect is None else radiance + (direct + indirect)
 
 
 def _dtype(requested: npt.DTypeLike) -> np.dtype[Any]:

@@ -7,6 +7,10 @@ The lobe is I(w) = c <r . w>^P where n . w > 0, with c = (P + 1) / (2 pi K) for 
 2^(P log2(1 - h)): near the axis, where a lobe of exponent 10^6 lives, h keeps its digits and r . w does not. So both
 vectors must be unit vectors: a length off by e costs e^2 / 2 in h. In float64 that holds for every exponent a material
 may have (1e20, half of whose flux lies within 1.2e-10 rad); in float32 h is good to 1e-13, which suffices to 1e8.
+
+A receiver reflects by f_s(w, w_o) = specular (P + 2) / (2 pi) <m . w>^P, m the direction to the eye w_o mirrored: no
+part of it depends on the tilt, so it is reciprocal, and no more leaves than arrives. The form above is a sender's; as
+a receiver's it would not be reciprocal, and reflect up to 1.35 of a uniform field (docs/radiometry).
 """
 
 import math
@@ -124,3 +128,62 @@ def lobe_direction(u: float, v: float, exponent: float) -> tuple[float, float, f
     gap = -math.expm1(math.log(u) / (exponent + 1.0))  # 1 - u^(1 / (P + 1))
     across, phi = math.sqrt(gap * (2.0 - gap)), 2.0 * np.pi * v
     return across * math.cos(phi), across * math.sin(phi), 1.0 - gap
+
+
+@kernel
+def receiver_norm(exponent: Any) -> Any:
+    """Return (P + 2) / (2 pi), by which a receiver's lobe of reflectance 1 reflects at most all light.
+
+    Parameters
+    ----------
+    exponent : float
+        P.
+
+    Returns
+    -------
+    float
+        1/sr, of the type of `exponent`.
+    """
+    real = type(exponent)
+    return (exponent + real(2.0)) * real(1.0 / (2.0 * math.pi))
+
+
+@kernel
+def mirrored(wx: Any, wy: Any, wz: Any, nx: Any, ny: Any, nz: Any) -> Any:
+    """Return m = 2 (n . w) n - w, the direction w mirrored in a surface.
+
+    Parameters
+    ----------
+    wx, wy, wz : float
+        Unit vector away from the surface.
+    nx, ny, nz : float
+        Unit normal.
+
+    Returns
+    -------
+    tuple of 3 floats
+        Unit vector.
+    """
+    twice = type(wx)(2.0) * (wx * nx + wy * ny + wz * nz)
+    return twice * nx - wx, twice * ny - wy, twice * nz - wz
+
+
+@kernel
+def receiver_lobe(mx: Any, my: Any, mz: Any, wx: Any, wy: Any, wz: Any, exponent: Any) -> Any:
+    """Return (P + 2) / (2 pi) <m . w>^P: f_s of a receiver over its specular reflectance, where n . w > 0.
+
+    Parameters
+    ----------
+    mx, my, mz : float
+        Unit vector: the direction to the eye, mirrored.
+    wx, wy, wz : float
+        Any vector towards the light.
+    exponent : float
+        P.
+
+    Returns
+    -------
+    float
+        1/sr, of the type of the arguments. Whether w and the eye lie above the surface is for the caller to know.
+    """
+    return receiver_norm(exponent) * lobe_power(lobe_gap(mx, my, mz, wx, wy, wz), exponent)

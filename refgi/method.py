@@ -1,18 +1,21 @@
 """`Method`: what a method's package declares of itself, so that every command can use it; its approximations too."""
 
+import warnings
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy.typing as npt
 
-from refgi.errors import InputError
+from refgi.errors import InputError, RefgiWarning
 from refgi.settings import Settings
+from refgi.stages import sharing
 
 Array = npt.NDArray[Any]
 
 DEFAULT = "default"
 NONE: Mapping[str, Any] = MappingProxyType({})
+_WARNED: set[str] = set()  # methods without lobes that have said so
 
 
 class Approximation(NamedTuple):
@@ -39,6 +42,15 @@ class Approximation(NamedTuple):
         return changed, options if self.frame is None else self.frame(options)
 
 
+class Light(NamedTuple):
+    """What a method makes of a frame."""
+
+    irradiance: Array  # (3, h, w) indirect, W/m^2
+    estimate: Any = None  # that the irradiance is the mean of, of a method that states its own error
+    lobes: Array | None = None  # (3, h, w) radiance of receivers' lobes by indirect light, W/m^2/sr, if any
+    lobe_estimate: Any = None  # that the lobes are the mean of
+
+
 class Extent(NamedTuple):
     """What the memory of a picture depends on, beside settings."""
 
@@ -62,6 +74,8 @@ class Method(NamedTuple):
     presets: Mapping[str, Settings] = NONE  # named settings beside the default; "paper": the values printed
     temporal: Settings | None = None  # of its temporal filter over frames, where it has one
     approximations: tuple[Approximation, ...] = ()  # in the order of its pipeline
+    lobes: Callable[[Any, Any], Array] | None = None  # (3, h, w) radiance of receivers' lobes by indirect light
+    lobe_estimate: Callable[[Any, Any], Any] | None = None  # gives that radiance with its own error, W/m^2/sr
 
     def preset(self, name: str) -> Settings:
         """Return named settings; "default" are those of the class."""
@@ -82,6 +96,39 @@ class Method(NamedTuple):
             return self.function(frame, settings), None
         estimate = self.estimate(frame, settings)
         return estimate.mean.astype(frame.dtype), estimate
+
+    def compute_lobes(self, frame: Any, settings: Any) -> tuple[Array | None, Any]:
+        """Return the radiance that receivers' lobes make of indirect light, and the estimate it is the mean of, if any.
+
+        (3, h, w), W/m^2/sr, in the frame's dtype. None where no visible surface is glossy, or the method knows diffuse
+        receivers alone, of which it warns once.
+        """
+        if not frame.glossy_receivers:
+            return None, None
+        if self.lobe_estimate is not None:
+            estimate = self.lobe_estimate(frame, settings)
+            return estimate.mean.astype(frame.dtype), estimate
+        if self.lobes is None:
+            if self.name not in _WARNED:
+                _WARNED.add(self.name)
+                warnings.warn(RefgiWarning(f"{self.name}: glossy surfaces reflect indirect light by their diffuse part "
+                                           "alone; the method has no lobes of receivers"), stacklevel=3)
+            return None, None
+        return self.lobes(frame, settings), None
+
+    def light(self, frame: Any, settings: Any) -> "Light":
+        """Return all that the method makes of a frame; what irradiance and lobes both need is computed once."""
+        if not frame.glossy_receivers:
+            return Light(*self.compute(frame, settings))
+        with sharing():
+            return Light(*self.compute(frame, settings), *self.compute_lobes(frame, settings))
+
+    def made(self, frame: Any, settings: Any) -> "Light":
+        """Return what the method makes of a frame, without its estimates."""
+        if not frame.glossy_receivers:
+            return Light(self.function(frame, settings))
+        with sharing():
+            return Light(self.function(frame, settings), lobes=self.compute_lobes(frame, settings)[0])
 
     def extra_bytes(self, settings: Any, extent: Extent) -> int:
         """Return what settings add to the memory of a picture."""

@@ -81,6 +81,8 @@ class Picture(NamedTuple):
     radiance: Array  # (3, h, w) what the camera receives, W/m^2/sr
     estimate: Any = None  # a `TruthResult`, of a method that states its own error
     frames: Any = None  # (h, w) frames that each pixel is blended of, of a temporal filter that counts them
+    lobes: Array | None = None  # (3, h, w) radiance of receivers' lobes by indirect light, W/m^2/sr, if any
+    lobe_estimate: Any = None  # as `estimate`, of the lobes, W/m^2/sr
 
 
 class KeepingEstimate:
@@ -95,11 +97,17 @@ class KeepingEstimate:
     def __init__(self, method: Method) -> None:
         self._method = method
         self.estimate: Any = None
+        self.lobe_estimate: Any = None
 
     def __call__(self, frame: "Frame", settings: Any) -> Array:
         """Return the indirect irradiance, (3, h, w), W/m^2."""
         light, self.estimate = self._method.compute(frame, settings)
         return light
+
+    def lobes(self, frame: "Frame", settings: Any) -> Array | None:
+        """Return the radiance of receivers' lobes by indirect light, (3, h, w), W/m^2/sr; None where there are none."""
+        lobes, self.lobe_estimate = self._method.compute_lobes(frame, settings)
+        return lobes
 
 
 def find_method(name: str) -> Method:
@@ -202,8 +210,9 @@ def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = Non
     if frame_options.get("shadows") is None:
         frame_options["shadows"] = usual_shadows(settings)
     frame = Frame(load_scene(scene) if isinstance(scene, str | Path) else scene, **frame_options)
-    irradiance, estimate = known.compute(frame, settings)
-    picture = Picture(frame, irradiance, frame.radiance(irradiance), estimate)
+    light = known.light(frame, settings)
+    picture = Picture(frame, light.irradiance, frame.radiance(light.irradiance, light.lobes), light.estimate,
+                      lobes=light.lobes, lobe_estimate=light.lobe_estimate)
     if not left_out("frame.buffers", lambda: (len(frame.unused), len(BUFFERS))):
         for name in frame.unused:
             getattr(frame, name)

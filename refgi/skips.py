@@ -26,6 +26,7 @@ class Skip(NamedTuple):
 
 SKIPS: Mapping[str, Skip] = MappingProxyType({
     "frame.buffers": Skip("buffers that the method never asks for", "of G-buffer, RSM and ray structure"),
+    "frame.lobes": Skip("the lobes of receivers, where no visible surface is glossy", "pixels"),
     "rsm.channels": Skip("channels of a G-buffer that nothing reads yet", "channels, summed over passes"),
     "rsm.texels": Skip("channels of an RSM's texels that are no pixel light", "texels, once a look-up"),
     "lights.refraction": Skip("the search for glass in maps, where no material is glass", "texels, once a search"),

@@ -201,6 +201,30 @@ def reusing(memory: Memory | None) -> Iterator[list[Run]]:
         runs += log.runs[begun:]
 
 
+@contextmanager
+def sharing() -> Iterator[None]:
+    """Let the stages inside the block, two passes over one frame, share their results.
+
+    Yields
+    ------
+    None
+        Nothing: an observer's memory serves where there is one, else one that ends with the block.
+    """
+    log = _log.get()
+    if log is None:
+        with observe(memory=Memory()):
+            yield
+        return
+    own = log.memory is None
+    if own:
+        log.memory = Memory()
+    try:
+        yield
+    finally:
+        if own:
+            log.memory = None
+
+
 def skip(name: str, reason: str) -> None:
     """Note in the log that a stage was left out and why.
 

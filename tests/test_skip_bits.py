@@ -23,6 +23,10 @@ CUT = ("lights=64", "reach.cut=relative", "reach.cut.share=0.2")
 # of every skip: scenes, methods and settings with which it has something to leave out
 CASES = {
     "frame.buffers": [(BOX, "gather", "disc.samples=8")],
+    "frame.lobes": [(BOX, "sii", "lights=16"), (BOX, "sii", "lights=16", "reach.cut=relative"),
+                    (BOX, "multires", "lights=16"), (BOX, "multires", "lights=4", "subsplats=irradiance"),
+                    (BOX, "val", "lights=16", "clusters=3"), (BOX, "hssil"), (BOX, "hssil", "visibility=rays"),
+                    (BOX, "hssil", "visibility=bitmask"), (BOX, "gather", "disc.samples=8"), (BOX, "vpl", "lights=16")],
     "rsm.channels": [(BOX, "sii", "lights=16")],
     "rsm.texels": [(BOX, "sii", "lights=16")],
     "lights.refraction": [(BOX, "sii", "lights=16"), (BOX, "sii", "lights=16", "source.refraction=two_interface")],
@@ -51,6 +55,7 @@ CASES = {
 # of every skip: functions that see more work with it off, and what of their arguments shows that
 WORK = {
     "frame.buffers": {"frame._tracer": None},
+    "frame.lobes": {"rsm.buffers.glossy.direct_lobes": None},
     "rsm.channels": {"rsm.buffers.gbuffer._planes": lambda names, *_: len(names)},
     "rsm.texels": {"rsm.buffers.gbuffer._planes": lambda _, shape, *__: math.prod(shape)},
     "lights.refraction": {"lights.refraction._refracted": None},

@@ -12,6 +12,15 @@ from refgi.methods import METHODS
 
 DTYPES = ("float32", "float64")
 DEFAULTS = {"truth": {"samples": 24}}  # where the default takes long
+GLOSSY = ("stage", "ring")  # scenes that show a surface with a lobe
+LOBES: dict[str, tuple[dict[str, Any], ...]] = {
+    "sii": ({"lights": 96}, {"lights": 96, "cut": "relative"}, {"lights": 96, "clamp": "distance", "clamp_value": 0.1}),
+    "multires": ({"lights": 96}, {"lights": 24, "subsplats": "irradiance"}, {"lights": 96, "subsplats": "error"}),
+    "val": ({"lights": 96, "clusters": 5}, {"lights": 96, "clusters": 5, "visibility": "pcf"}),
+    "hssil": ({"radius": 5.0, "samples": 16}, {"radius": 5.0, "pattern": "all"},
+              {"radius": 5.0, "samples": 16, "visibility": "rays"},
+              {"radius": 5.0, "samples": 16, "visibility": "bitmask"}),
+    "gather": ({"samples": 96},), "vpl": ({"lights": 96},), "truth": ({"samples": 24},)}
 AS_IS, BASE = "default", "base"
 
 
@@ -24,12 +33,13 @@ class Case(NamedTuple):
     dtype: str
     flat: dict[str, Any]
     unlike: tuple[str, ...] = ()  # cases whose picture is another one
+    part: str = "irradiance"  # or "lobes", those of receivers by indirect light
 
 
 def all_cases() -> list[Case]:
     """Return every case once, those of one scene together."""
     found: dict[str, Case] = {}
-    for case in (*_as_they_are(), *_varied()):
+    for case in (*_as_they_are(), *_varied(), *_lobes()):
         known = found.setdefault(case.name, case)
         found[case.name] = known._replace(unlike=tuple(dict.fromkeys((*known.unlike, *case.unlike))))
     return sorted(found.values(), key=lambda case: (case.scene, case.dtype))
@@ -40,6 +50,16 @@ def _as_they_are() -> Iterator[Case]:
         for scene in scene_names():
             for dtype in DTYPES:
                 yield Case(f"{method}/{scene}/{dtype}/{AS_IS}", method, scene, dtype, DEFAULTS.get(method, {}))
+
+
+def _lobes() -> Iterator[Case]:
+    """Yield the lobes of glossy receivers, by what reaches them: each way to sum them once."""
+    for method, ways in LOBES.items():
+        for scene in GLOSSY:
+            for dtype in DTYPES:
+                for flat in ways:
+                    yield Case(f"{method}/{scene}/{dtype}/lobes,{described(flat)}", method, scene, dtype, dict(flat),
+                               part="lobes")
 
 
 def _varied() -> Iterator[Case]:

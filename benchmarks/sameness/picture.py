@@ -19,13 +19,13 @@ DIGITS = 16
 
 
 def picture(case: Case) -> Any:
-    """Return the irradiance of a case, (3, h, w), or of all frames of its sequence, (frames, 3, h, w)."""
+    """Return the irradiance of a case (3, h, w), its lobes, or the irradiance of all frames, (frames, 3, h, w)."""
     options = dict(dtype=case.dtype, rsm_resolution=RSM, **_size(case))
     settings = settings_of(case.method, **case.flat)
     if case.method == "temporal":
         still = settings_of("hssil", **STILL)
         return np.stack([step.irradiance for step in Sequence(sequence_of(case.scene), still, settings, **options)])
-    return render(scene_of(case.scene), case.method, settings, **options).irradiance
+    return getattr(render(scene_of(case.scene), case.method, settings, **options), case.part)
 
 
 def _size(case: Case) -> dict[str, int]:

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
-from typing import Any
 
 import numba
 import numpy as np
@@ -92,15 +91,17 @@ def fault_of(scene: Hostile, method: str) -> str:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.simplefilter("ignore", RefgiWarning)
-            light: Any = render(scene.scene(), method, settings_of(method, FEW.get(method, ())),
-                                rsm_resolution=MAP).irradiance
+            picture = render(scene.scene(), method, settings_of(method, FEW.get(method, ())), rsm_resolution=MAP)
     except InputError:
         return ""
     except Exception as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
         return f"{type(error).__name__}: {error} ({where.name}, line {where.lineno})"
-    if not np.isfinite(light).all() or (light < 0).any():
-        return f"{np.count_nonzero(~np.isfinite(light))} numbers not finite, {np.count_nonzero(light < 0)} below 0"
+    for what in ("irradiance", "lobes", "radiance"):
+        light = getattr(picture, what)
+        if light is not None and not (np.isfinite(light).all() and (light >= 0).all()):
+            return (f"{what}: {np.count_nonzero(~np.isfinite(light))} numbers not finite, "
+                    f"{np.count_nonzero(light < 0)} below 0")
     spent = time.process_time() - begin
     return f"{spent:.0f} s" if spent > SLOWEST else ""
 

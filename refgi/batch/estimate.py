@@ -71,7 +71,7 @@ def _seconds(job: Job, method: str, settings: Any, common: Common) -> float:
             for _ in range(2):
                 frame = Frame(scene, width=size, height=size, **common.options)
                 started = time.perf_counter()
-                METHODS[method].function(frame, settings)
+                METHODS[method].made(frame, settings)
                 seconds = time.perf_counter() - started
             times.append(seconds)
     if len(times) < len(SIZES):

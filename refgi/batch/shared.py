@@ -152,7 +152,8 @@ class Shared:
         record = self.record(TRUTH, settings)
         if _record_in(file) != record:
             file.parent.mkdir(parents=True, exist_ok=True)
-            planes = linear_planes(reference.radiance, reference.mean, reference.variance, reference.samples)
+            planes = linear_planes(reference.radiance, reference.mean, reference.variance, reference.samples,
+                                   **reference.lobe_planes)
             write_exr(file, planes, record)
             Writer(Place(self._common.folder, f"{FOLDER}/{self.shot.name}"), self.scene, self.frame).write_ids()
 

@@ -123,12 +123,13 @@ def _done(job: Job, common: Common, shared: Shared) -> Outcome:
     hashes = _hashes(method, settings[0], shared)
     made = Made([], [], {})
     for one in settings:
-        _timed(job, one, made, shared)
+        lobes = _timed(job, one, made, shared)
+        made = made if made.lobes is not None else made._replace(lobes=lobes)
     frames = None
     if job.temporal is not None:
         filtered = blended(job, common, shared, made.pictures[0])
         made.pictures[0], frames = filtered.irradiance, filtered.frames
-    _write(job, common, shared, settings[0], made.pictures[0], frames)
+    _write(job, common, shared, settings[0], made, frames)
     run = judged(job.choice, made, references, shared.frame)
     run = run.model_copy(update={"picture": job.picture, "hashes": hashes})
     return Outcome(job=job.name, scene=job.shot.name, method=job.choice.method, changes=job.choice.changes,
@@ -140,15 +141,15 @@ def _hashes(method: Method, settings: Any, shared: Shared) -> tuple[tuple[str, s
     frame, buffers = shared.fresh_frame(), shared.buffers
     buffers.start_anew()
     with stages.observe(record=True, memory=buffers) as log:
-        method.function(frame, settings)
+        method.made(frame, settings)
     digests: dict[str, list[str]] = {name: [] for name in BUFFERS}
     for buffer in buffers.used:
         digests[buffer.stage].append(buffer.digest)
     return hashes_of(log, digests)
 
 
-def _timed(job: Job, settings: Any, made: Made, shared: Shared) -> None:
-    """Run a method on the shared buffers and add its picture and its time."""
+def _timed(job: Job, settings: Any, made: Made, shared: Shared) -> Array | None:
+    """Run a method on the shared buffers, add its picture and its time, and return its lobes if there are any."""
     frame: Frame = shared.fresh_frame()
     buffers: Buffers = shared.buffers
     buffers.start_anew()
@@ -158,11 +159,13 @@ def _timed(job: Job, settings: Any, made: Made, shared: Shared) -> None:
                             for name in (*buffers.seconds, *run.stages)})
     made.pictures.append(run.picture)
     made.times.append(run.seconds + sum(buffers.seconds.values()))
+    return run.lobes
 
 
-def _write(job: Job, common: Common, shared: Shared, settings: Any, irradiance: Array, frames: Array | None) -> None:
+def _write(job: Job, common: Common, shared: Shared, settings: Any, made: Made, frames: Array | None) -> None:
     """Write the picture of the first seed."""
+    irradiance, lobes = made.pictures[0], made.lobes
     file = common.folder / job.picture
     file.parent.mkdir(parents=True, exist_ok=True)
-    planes = linear_planes(shared.frame.radiance(irradiance), irradiance, frames=frames)
+    planes = linear_planes(shared.frame.radiance(irradiance, lobes), irradiance, frames=frames, lobes=lobes)
     write_exr(file, planes, shared.record(job.choice.method, settings) | filter_record(job))

@@ -54,6 +54,12 @@ class Reference(NamedTuple):
     statement: str
     samples: Array  # (h, w)
     record: Record  # of its own
+    lobes: Any = None  # `TruthResult` of receivers' lobes by indirect light, W/m^2/sr, where a glossy surface is seen
+
+    @property
+    def lobe_planes(self) -> dict[str, Array]:
+        """The lobes and their variance as arguments of `linear_planes`; none where there are no lobes."""
+        return {} if self.lobes is None else {"lobes": self.lobes.mean, "lobe_variance": self.lobes.variance_of_mean}
 
 
 class Made(NamedTuple):
@@ -63,6 +69,7 @@ class Made(NamedTuple):
     times: list[float]
     stages: dict[str, float]
     work: Work | None = None
+    lobes: Array | None = None  # of the first picture, where a glossy surface is seen
 
 
 def bench_scene(
@@ -117,7 +124,7 @@ def bench_scene(
     if place is not None:
         writer = Writer(place, scene, frame)
         _write(writer, references)
-        firsts = [(choice.method, with_seed(choice.settings, 0), one.pictures[0]) for choice, one in done]
+        firsts = [(choice.method, with_seed(choice.settings, 0), one.pictures[0], one.lobes) for choice, one in done]
         runs = [run.model_copy(update={"picture": file})
                 for run, file in zip(runs, writer.write_runs(firsts), strict=True)]
     others = [run for run in runs if run.method != TRUTH]
@@ -141,10 +148,11 @@ def traced(frame: Frame, settings: TruthSettings, tell: Tell) -> Reference:
     """Trace the truth, or what else its settings say, of a frame."""
     with stages.observe(progress=lambda stage, done: tell(f"{TRUTH}: {stage}", done)):
         found = trace_truth(frame, settings)
-    radiance = frame.radiance(np.asarray(found.mean, frame.dtype))
+        lobes, lobe_estimate = METHODS[TRUTH].compute_lobes(frame, settings)
+    radiance = frame.radiance(np.asarray(found.mean, frame.dtype), lobes)
     estimate = estimate_record(found)
     return Reference(found.mean, found.variance_of_mean, radiance, estimate["estimate"]["statement"], found.samples,
-                      {**method_record(TRUTH, settings), **estimate})
+                      {**method_record(TRUTH, settings), **estimate}, lobe_estimate)
 
 
 def _write(writer: Writer, references: Mapping[str, Reference]) -> None:
@@ -152,7 +160,7 @@ def _write(writer: Writer, references: Mapping[str, Reference]) -> None:
         if name not in references:
             continue
         one = references[name]
-        planes = linear_planes(one.radiance, one.mean, one.variance, one.samples)
+        planes = linear_planes(one.radiance, one.mean, one.variance, one.samples, **one.lobe_planes)
         writer.write(Path(file).stem, planes, one.record)
     writer.write_ids()
 
@@ -192,7 +200,7 @@ def _in_turn(
                 failures[name] = str(error)
                 made.pop(number, None)
                 continue
-            one = made.setdefault(number, Made([], [], run.stages, works.get(number)))
+            one = made.setdefault(number, Made([], [], run.stages, works.get(number), run.lobes))
             one.pictures.append(run.picture)
             one.times.append(run.seconds)
     return made, failures
@@ -204,6 +212,7 @@ class Timed(NamedTuple):
     picture: Array  # (3, h, w) irradiance, W/m^2
     seconds: float
     log: stages.Log
+    lobes: Array | None = None  # (3, h, w) radiance of receivers' lobes by indirect light, W/m^2/sr
 
     @property
     def stages(self) -> dict[str, float]:
@@ -224,9 +233,9 @@ def timed(frame: Frame, method: str, settings: Settings, memory: stages.Memory |
     """Run a method on a frame; what `memory` keeps is not computed again."""
     with stages.observe(memory=memory) as log:
         started = time.perf_counter()
-        picture = METHODS[method].function(frame, settings)
+        light = METHODS[method].made(frame, settings)
         seconds = time.perf_counter() - started
-    return Timed(picture, seconds, log)
+    return Timed(light.irradiance, seconds, log, light.lobes)
 
 
 def small_frame(scene: Scene, options: Mapping[str, Any]) -> Frame:
@@ -237,7 +246,7 @@ def small_frame(scene: Scene, options: Mapping[str, Any]) -> Frame:
 def load_kernels(frame: Frame, choice: Choice) -> None:
     """Run a choice on a small frame: no time that is measured later has compiling in it."""
     with quietly():
-        METHODS[choice.method].function(frame, choice.settings)
+        METHODS[choice.method].made(frame, choice.settings)
 
 
 def with_seed(settings: Settings, seed: int) -> Settings:
@@ -266,7 +275,7 @@ def judged(choice: Choice, made: Made, references: Mapping[str, Reference], fram
     errors = {name: figures_of(error_of(made.pictures, references[name].mean, references[name].variance, covered))
               for name in references_of(choice) if name in references}
     figures = measure(made.pictures[0], references[TRUTH].mean, references[TRUTH].variance, covered).figures
-    seen = flip(frame.radiance(made.pictures[0]), references[TRUTH].radiance, covered)
+    seen = flip(frame.radiance(made.pictures[0], made.lobes), references[TRUTH].radiance, covered)
     return Run(method=choice.method, changes=choice.changes, settings=plain(choice.settings), times=tuple(made.times),
                stages=made.stages, errors=errors, flip=known(seen.mean), ssim=known(figures["ssim"].value),
                relmse=known(figures["relmse"].value), work=made.work)

@@ -90,13 +90,13 @@ class Writer(NamedTuple):
         write_exr(file, planes, {**scene_record(self.scene, options, size=(frame.width, frame.height)), **record})
         return name
 
-    def write_runs(self, runs: Sequence[tuple[str, Any, Array]]) -> Iterator[str]:
+    def write_runs(self, runs: Sequence[tuple[str, Any, Array, Array | None]]) -> Iterator[str]:
         """Write pictures of methods.
 
         Parameters
         ----------
-        runs : sequence of (str, settings, (3, h, w) ndarray)
-            Method, all its settings, and the indirect irradiance that it gave, W/m^2.
+        runs : sequence of (str, settings, (3, h, w) ndarray, (3, h, w) ndarray or None)
+            Method, all its settings, the indirect irradiance that it gave, W/m^2, and receivers' lobes, W/m^2/sr.
 
         Yields
         ------
@@ -104,9 +104,9 @@ class Writer(NamedTuple):
             Each file, from the folder of results.json.
         """
         counts: Counter[str] = Counter()
-        for method, settings, irradiance in runs:
+        for method, settings, irradiance, lobes in runs:
             counts[method] += 1
-            planes = linear_planes(self.frame.radiance(irradiance), irradiance)
+            planes = linear_planes(self.frame.radiance(irradiance, lobes), irradiance, lobes=lobes)
             yield self.write(f"{method}-{counts[method]:02d}", planes, method_record(method, settings))
 
     def write_ids(self) -> str:

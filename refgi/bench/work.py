@@ -92,7 +92,7 @@ def work_of(scene: Scene, choice: Choice, options: Mapping[str, Any]) -> Work:
         tracemalloc.reset_peak()
         before, _ = tracemalloc.get_traced_memory()
         with stages.observe(counting=True) as log:
-            METHODS[choice.method].function(Frame(scene, **options), choice.settings)
+            METHODS[choice.method].made(Frame(scene, **options), choice.settings)
         _, peak = tracemalloc.get_traced_memory()
     finally:
         if not running:

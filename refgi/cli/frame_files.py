@@ -45,19 +45,21 @@ class FrameFiles(NamedTuple):
         """Return the record of a frame."""
         return {**self.record, **self.moving(number)}
 
-    def write(self, step: SequenceFrame, number: int, estimate: Any = None) -> None:
+    def write(self, step: SequenceFrame, number: int, estimate: Any = None, lobe_estimate: Any = None) -> None:
         """Write a frame, each file whole or not at all, the EXR last: where it is, so are the others."""
         record = self.record_of(number)
         spread: tuple[Any, Any] = (None, None)
         if estimate is not None:
             record |= estimate_record(estimate)
             spread = estimate.variance_of_mean, estimate.samples
+        lobe_variance = None if lobe_estimate is None or step.lobes is None else lobe_estimate.variance_of_mean
         make(self.folder)
         for file in sorted(self.of(number), reverse=True):
             if file.suffix == PNG:
                 write_preview(file, step.radiance, record)
             else:
-                write_exr(file, linear_planes(step.radiance, step.irradiance, *spread, step.frames), record)
+                write_exr(file, linear_planes(step.radiance, step.irradiance, *spread, step.frames, step.lobes,
+                                              lobe_variance), record)
 
     def done(self, frames: int) -> int:
         """Return how many frames, from the first on, are there.

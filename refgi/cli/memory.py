@@ -17,6 +17,7 @@ COMPARED_PIXEL_BYTES = 90  # a method's or reference's pictures, maps and figure
 TEXEL_FLOATS = 36
 FACE_BYTES = 400  # vertices, faces, Embree's tree
 TEXEL_BYTES = 28  # of an image: float32 with mip levels, and what these are made from
+ALPHA_BYTES = 12  # of a texel whose alpha is asked for: codes, float32, and what that is made from
 
 
 def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4, rsm_resolution: int = 512,
@@ -45,8 +46,10 @@ def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4,
     """
     pixel = PIXEL_FLOATS * float_bytes + traced * TRUTH_PIXEL_BYTES + compared * COMPARED_PIXEL_BYTES
     texels = map_count(scene) * rsm_resolution**2 * TEXEL_FLOATS * float_bytes
-    images = {one.texture.image for one in scene.materials if one.texture is not None}
+    images = {texture.image for one in scene.materials for texture in one.textures}
     painted = sum(image.width * image.height for image in images) * TEXEL_BYTES
+    cut = {texture.image for one in scene.materials if one.cutoff is not None for texture in one.textures}
+    painted += sum(image.width * image.height for image in cut) * ALPHA_BYTES
     return width * height * pixel + texels + scene.face_count * FACE_BYTES + painted
 
 

@@ -37,8 +37,9 @@ def _render(ctx: click.Context, /, **options: Any) -> int:
     """Render SCENE by one method.
 
     An EXR holds the radiance that the camera receives (R, G, B; W/m^2/sr) and the indirect irradiance
-    (irradiance.R, .G, .B; W/m^2), of `truth` its variance too, and all that is needed to make it again; a PNG the
-    radiance, tone-mapped.
+    (irradiance.R, .G, .B; W/m^2), of `truth` its variance too, where a glossy surface is seen the indirect light that
+    its lobe reflects (lobes.R, .G, .B; W/m^2/sr), and all that is needed to make it again; a PNG the radiance,
+    tone-mapped.
 
     --frames 20 shows a method with its temporal filter after so many frames of a resting scene.
     """
@@ -130,10 +131,12 @@ def _content(picture: "Picture", job: "Job", seconds: float, record: "Record") -
     frame, covered = picture.frame, picture.frame.gbuffer.covered
     with np.errstate(invalid="ignore"):
         mean = picture.irradiance[:, covered].mean(dtype=np.float64) if covered.any() else 0.0
+        lobes = {} if picture.lobes is None else {
+            "mean_lobes": float(picture.lobes[:, covered].mean(dtype=np.float64)) if covered.any() else 0.0}
         return {
             "scene": job.scene.name, "method": job.method, "settings": job.settings,
             "size": [frame.width, frame.height], **record["options"], "seconds": seconds,
-            "covered_pixels": int(covered.sum()), "mean_indirect_irradiance": float(mean),
+            "covered_pixels": int(covered.sum()), "mean_indirect_irradiance": float(mean), **lobes,
             "brightest_radiance": float(picture.radiance.max()),
             "non_finite_pixels": count_non_finite(picture.radiance), "versions": record["versions"],
             "provenance": record, **{key: record[key] for key in ("estimate",) if key in record},
@@ -147,7 +150,9 @@ def _write(picture: "Picture", files: "Pictures", record: "Record") -> dict[str,
 
     estimate = picture.estimate
     variance, samples = (None, None) if estimate is None else (estimate.variance_of_mean, estimate.samples)
-    planes = linear_planes(picture.radiance, picture.irradiance, variance, samples, picture.frames)
+    lobe_variance = None if picture.lobe_estimate is None else picture.lobe_estimate.variance_of_mean
+    planes = linear_planes(picture.radiance, picture.irradiance, variance, samples, picture.frames, picture.lobes,
+                           lobe_variance)
     files.make_folder()
     if files.exr is not None:
         write_exr(files.exr, planes, record)

@@ -90,8 +90,8 @@ def _sequence(session: Session, /, **options: Any) -> int:
                        lambda number: frame_record(scene, way, number, frames))
     folder(out, permission, files.kept(frames, resume=resume))
     memory = Memory() if way.leaves_at_rest(len(scene.lights)) else None
-    sequence = Sequence(scenes_along(scene, way, frames), settings, temporal, method=light, memory=memory,
-                        **frame_options)
+    sequence = Sequence(scenes_along(scene, way, frames), settings, temporal, method=light, lobes=light.lobes,
+                        memory=memory, **frame_options)
     with on_threads(threads), progress() as tell:
         warm_up([method], frame_options["dtype"], tell)
         done = files.done(frames) if resume else 0
@@ -182,7 +182,7 @@ def _render(
     started = time.perf_counter()
     for number, step in enumerate(resumed(sequence, sequence.scenes, files, done), done):
         seconds = time.perf_counter() - started
-        files.write(step, number, None if sequence.temporal else light.estimate)
+        files.write(step, number, None if sequence.temporal else light.estimate, light.lobe_estimate)
         bad = count_non_finite(step.radiance)
         if bad:
             say(f"frame {number}: {bad} pixels are NaN or infinite")

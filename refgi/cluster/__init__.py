@@ -16,7 +16,7 @@ from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.cluster.settings import PRESETS, ValSettings
-from refgi.cluster.val import extra_bytes, val
+from refgi.cluster.val import extra_bytes, val, val_lobes
 from refgi.method import Method
 
 __all__ = [
@@ -31,9 +31,10 @@ __all__ = [
     "clustered_irradiance",
     "shadow_maps",
     "val",
+    "val_lobes",
 ]
 
 METHOD = Method(
     "val", "Clustered Visibility (2009): pixel lights share the soft shadows of virtual area lights", val, ValSettings,
     visibility=lambda settings: settings.visibility is not None, ledger=val_ledger, memory=extra_bytes,
-    presets=PRESETS, approximations=APPROXIMATIONS)
+    presets=PRESETS, approximations=APPROXIMATIONS, lobes=val_lobes)

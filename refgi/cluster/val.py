@@ -10,6 +10,7 @@ from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.filters.eight import EIGHT
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
+from refgi.cluster.lighting.glossy import clustered_radiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters, Clusters, Csm, ValSettings
@@ -19,6 +20,7 @@ from refgi.method import Extent
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_clamp
 from refgi.rsm import facing_normals
+from refgi.rsm.buffers.glossy import GlossyPoints, spread_over_picture
 from refgi.stages import skip
 
 if TYPE_CHECKING:
@@ -57,6 +59,69 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
         return light
     # Sec. 6, geometry-aware blur
     return blur(light, receivers_of(frame), block, settings.blur, frame.visible_extent.diagonal)
+
+
+def val_lobes(frame: "Frame", settings: ValSettings) -> Array:
+    """Return the radiance towards the eye that receivers' lobes make of the pixel lights of `val`.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene with its buffers.
+    settings : ValSettings
+        As for `val`.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        W/m^2/sr, linear RGB; 0 where there is no lobe.
+    """
+    settings = with_clamp(settings)
+    lights = choose_lights(frame, settings.lights)
+    areas, maps = cluster_lights(frame, lights, settings)
+    points = frame.glossy_points
+    radiance = glossy_under(frame, points, frame.gbuffer.triangle_id.reshape(-1)[points.pixel], lights, areas, maps,
+                            settings, footprints(frame, settings.lights, settings.pairs), frame.width)
+    return spread_over_picture(points, radiance, (frame.height, frame.width))
+
+
+def glossy_under(
+    frame: "Frame", points: GlossyPoints, triangle_id: Array, lights: "PixelLights", areas: AreaLights,
+    maps: ShadowMaps | None, settings: ValSettings, footprint: Array | None, width: int = 0,
+) -> Array:
+    """Light glossy receivers by pixel lights that are clustered already.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene with its buffers.
+    points : GlossyPoints
+        n receivers.
+    triangle_id : (n,) ndarray of int
+        Which triangle each lies on.
+    lights : PixelLights
+        The pixel lights.
+    areas : AreaLights
+        Their area lights.
+    maps : ShadowMaps or None
+        What each sees.
+    settings : ValSettings
+        How visibility is found.
+    footprint : (N,) ndarray or None
+        Surface area each light stands for, m^2.
+    width : int
+        As for `clustered_radiance`.
+
+    Returns
+    -------
+    (3, n) ndarray
+        Radiance towards the eye, W/m^2/sr.
+    """
+    facing = facing_normals(frame.scene.geometry, triangle_id[None], points.normal[:, None])[:, 0]
+    return clustered_radiance(
+        points, facing, lights, areas, maps, settings, footprint,
+        reference_visibility(frame, lights, areas, maps, settings),
+        rays=frame.tracer if settings.maps.behind == "raytrace" else None, width=width)
 
 
 def light_pixels(

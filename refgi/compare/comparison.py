@@ -127,33 +127,40 @@ class _Runner:
 
         shortest = dataclasses.replace(settings, samples=1, seconds=None, target_error=None, checkpoint=None)
         self._warm_up(trace_truth, shortest)
-        result, seconds, runs = self._timed(name, lambda frame: trace_truth(frame, settings))
-        radiance = self.frame.radiance(np.asarray(result.mean, self.frame.dtype))
+        truth = METHODS[TRUTH]
+        made, seconds, runs = self._timed(name, lambda frame: (trace_truth(frame, settings),
+                                                               *truth.compute_lobes(frame, settings)))
+        result, shown, lobes = made
+        radiance = self.frame.radiance(np.asarray(result.mean, self.frame.dtype), shown)
         return Reference(name, settings, result.mean, result.variance_of_mean, result.picture_variance, result.samples,
-                         radiance, seconds, runs, estimate_record(result))
+                         radiance, seconds, runs, estimate_record(result), lobes)
 
     def method(
         self, name: str, settings: Any, references: Mapping[str, Reference], *, accounts: bool,
         still: "StillFrames | None" = None,
     ) -> MethodResult:
         method = METHODS[name]
-        function = method.function
-        self._warm_up(function, settings)
+        self._warm_up(method.made, settings)
         frames = None
         if still is None:
-            irradiance, seconds, runs = self._timed(name, lambda frame: function(frame, settings))
+            light, seconds, runs = self._timed(name, lambda frame: method.made(frame, settings))
         else:
-            made, seconds, runs = self._timed(name, lambda _: self._blended(name, settings, still))
-            irradiance, frames, seconds = made.irradiance, made.frames, seconds / still.frames
-        radiance, covered = self.frame.radiance(irradiance), self.frame.gbuffer.covered
+            light, seconds, runs = self._timed(name, lambda _: self._blended(name, settings, still))
+            frames, seconds = light.frames, seconds / still.frames
+        irradiance, lobes = light.irradiance, light.lobes
+        radiance, covered = self.frame.radiance(irradiance, lobes), self.frame.gbuffer.covered
         judges = [TRUTH] if method.knows_visibility(settings) else [TRUTH, UNOCCLUDED]
         against = {j: measure(irradiance, references[j].irradiance, references[j].variance, covered,
                               references[j].mean_variance) for j in judges}
+        shown = {j: references[j].lobes for j in judges if references[j].lobes is not None}
+        lobes_against = {} if lobes is None else {
+            j: measure(lobes, one.mean, one.variance_of_mean, covered, _over_all(one, covered))
+            for j, one in shown.items()}
         seen = flip(radiance, references[TRUTH].radiance, covered)
         account = method.ledger if accounts else None
         ledger = account(self.frame, settings) if account else None
         return MethodResult(name, method.summary, settings, irradiance, radiance, seconds, runs, against, seen, ledger,
-                            still, frames)
+                            still, frames, lobes, lobes_against)
 
     def _blended(self, name: str, settings: Any, still: "StillFrames") -> "Picture":
         from refgi.provenance.frames import render_still
@@ -185,6 +192,11 @@ class _Runner:
     def _tell(self, what: str, done: float) -> None:
         if self.progress is not None:
             self.progress(what, done)
+
+
+def _over_all(lobes: Any, covered: Any) -> Any:
+    """Return the variance of the mean of lobes over all pixels that see a surface; theirs is over glossy ones."""
+    return lobes.picture_variance * (lobes.block_pixels.sum() / covered.sum()) ** 2
 
 
 def _names(methods: Sequence[str] | None) -> list[str]:

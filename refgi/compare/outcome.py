@@ -160,6 +160,7 @@ class Reference:
     seconds: float
     runs: tuple[stages.Run, ...]
     estimate: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # what the record of its files adds of it
+    lobes: Any = None  # `TruthResult` of receivers' lobes by indirect light, W/m^2/sr, where a glossy surface is seen
 
 
 @dataclasses.dataclass(frozen=True)
@@ -178,6 +179,8 @@ class MethodResult:
     ledger: Any = None  # where the light's power went, of a method that accounts for it; only where files are written
     still: Any = None  # `StillFrames` that it is blended of, of a method with a temporal filter
     frames: Any = None  # (h, w) frames that each pixel is blended of, where they are counted
+    lobes: Array | None = None  # (3, h, w) receivers' lobes by indirect light, W/m^2/sr, where a glossy surface is seen
+    lobes_against: Mapping[str, Measurement] = dataclasses.field(default_factory=dict)  # figures of lobes, by reference
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,7 +13,8 @@ Array = npt.NDArray[Any]
 
 
 def linear_planes(radiance: Array, irradiance: Array, variance: Array | None = None,
-                  samples: Array | None = None, frames: Array | None = None) -> dict[str, Array]:
+                  samples: Array | None = None, frames: Array | None = None, lobes: Array | None = None,
+                  lobe_variance: Array | None = None) -> dict[str, Array]:
     """Return the float32 planes of a picture's EXR.
 
     Parameters
@@ -28,6 +29,10 @@ def linear_planes(radiance: Array, irradiance: Array, variance: Array | None = N
         How many of them each pixel has.
     frames : (h, w) ndarray, optional
         Frames that the light of each pixel is blended of.
+    lobes : (3, h, w) ndarray, optional
+        Radiance of receivers' lobes by indirect light, W/m^2/sr: lobes.R, .G, .B.
+    lobe_variance : (3, h, w) ndarray, optional
+        Of the lobes where they are the mean of an estimate, (W/m^2/sr)^2: lobe_variance.R, .G, .B.
 
     Returns
     -------
@@ -41,6 +46,10 @@ def linear_planes(radiance: Array, irradiance: Array, variance: Array | None = N
         planes["samples"] = np.asarray(samples, np.float32)
     if frames is not None:
         planes["frames"] = np.asarray(frames, np.float32)
+    if lobes is not None:
+        planes |= rgb_planes("lobes.", lobes)
+    if lobe_variance is not None:
+        planes |= rgb_planes("lobe_variance.", lobe_variance)
     return planes
 
 

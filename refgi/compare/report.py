@@ -264,6 +264,12 @@ def _flip_cell(result: MethodResult, judge: str) -> dict[str, Any]:
 def _notes(comparison: Comparison) -> list[str]:
     notes = [f"{result.name}: {_bad_pixels(result.against[TRUTH])}." for result in comparison.results.values()
              if _bad_pixels(result.against[TRUTH])]
+    for result in comparison.results.values():
+        for judge, measurement in result.lobes_against.items():
+            figures = measurement.figures
+            notes.append(f"{result.name}: lobes of glossy receivers are off from those of the {JUDGES[judge]} by a "
+                         f"RMSE of {number(figures['rmse'].value)} W/m²/sr (its noise alone: "
+                         f"{number(figures['rmse'].noise)}), relMSE {number(figures['relmse'].value)}.")
     skipped = {result.flip.skipped for result in comparison.results.values() if result.flip.skipped}
     return notes + [f"FLIP was not computed: {reason}." for reason in sorted(skipped)]
 

@@ -186,8 +186,13 @@ def error_scale(comparison: Comparison) -> maps.Scale:
 def _write_picture(comparison: Comparison, folder: Path, made: Reference | MethodResult) -> Record:
     """Write EXR and PNG, and return the record that they hold."""
     record = record_of(comparison, made)
-    spread = (made.variance, made.samples) if isinstance(made, Reference) else (None, None, made.frames)
-    write_exr(folder / f"{made.name}.exr", linear_planes(made.radiance, made.irradiance, *spread), record)
+    if isinstance(made, Reference):
+        spread: dict[str, Any] = {"variance": made.variance, "samples": made.samples}
+        if made.lobes is not None:
+            spread |= {"lobes": made.lobes.mean, "lobe_variance": made.lobes.variance_of_mean}
+    else:
+        spread = {"frames": made.frames, "lobes": made.lobes}
+    write_exr(folder / f"{made.name}.exr", linear_planes(made.radiance, made.irradiance, **spread), record)
     write_preview(folder / f"{made.name}.png", made.radiance, record)
     return record
 
@@ -218,6 +223,8 @@ def _method(result: MethodResult) -> dict[str, Any]:
         "summary": result.summary, "settings": result.settings, "seconds": result.seconds,
         "stages": _stages(result.runs),
         "against": {judge: _measurement(m) for judge, m in result.against.items()},
+        **({"lobes_against": {judge: _measurement(m) for judge, m in result.lobes_against.items()}}
+           if result.lobes_against else {}),
         "flip": _flip(result.flip),
         "ledger": None if result.ledger is None else ledger_json(result.ledger),
         "files": [f"{result.name}.exr", f"{result.name}.png", _false_colour_name(result.name),

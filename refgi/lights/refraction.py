@@ -238,8 +238,7 @@ def _without_fronts(geometry: Geometry, glass: Array, away: Array) -> Geometry:
     beyond = np.concatenate([geometry.vertices < corner.min(axis=0), geometry.vertices > corner.max(axis=0)], axis=1)
     side = np.packbits(beyond, axis=1)[:, 0][geometry.faces]
     chosen = away | (~glass & (side[:, 0] & side[:, 1] & side[:, 2] == 0))
-    return Geometry(geometry.vertices, geometry.faces[chosen], geometry.material_of_face[chosen],
-                    geometry.vertex_normals, None if geometry.uv is None else geometry.uv[chosen])
+    return geometry.selected(chosen)
 
 
 def _light_direction(rsm: Rsm, position: Array) -> Array:

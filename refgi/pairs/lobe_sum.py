@@ -145,10 +145,21 @@ def add_lobe(
 
     The norm is part of the flux. From h = `limit` on the lobe counts as 0, unless it is widened.
     """
+    if lobe_terms(tile, lanes, lights, k, limit, clamp, widening, reach):
+        # Eq. (2)
+        _sum_up(tile, lanes, lights[10, k], lights[11, k], lights[12, k])
+
+
+@kernel
+def lobe_terms(
+    tile: Array, lanes: Any, lights: Array, k: int, limit: Any, clamp: Clamp, widening: Widening | None,
+    reach: Range | None,
+) -> bool:
+    """Fill row TERM with s c_x / r^2 of light k (Eq. 3); return whether any is not 0: if not, it is not finished."""
     if widening is not None:
         limit = type(limit)(1.0)
     if not _fill_terms(tile, lanes, load_light(lights, k), limit, clamp.least, clamp.softness[k], clamp.bound):
-        return
+        return False
     _fill_logarithm(tile, lanes)
     # Eq. (3)
     if widening is None:
@@ -160,8 +171,7 @@ def add_lobe(
         _weight(tile, lanes)
     else:
         _weight_in_range(tile, lanes, reach.square[k], reach.scale[k], reach.outside)
-    # Eq. (2)
-    _sum_up(tile, lanes, lights[10, k], lights[11, k], lights[12, k])
+    return True
 
 
 @kernel

@@ -92,6 +92,7 @@ class Senders(NamedTuple):
 
 
 Hidden = Callable[[RayReceivers, tuple[int, int], Senders, tuple[int, int], Array, Array], None]
+Weigh = Callable[[RayReceivers, tuple[int, int], Senders, tuple[int, int], Array, Array], None]
 
 
 @stage("pairs.shadowed_sum")
@@ -122,25 +123,39 @@ def shadowed_sum(
     (3, r) ndarray of float64
         Irradiance, W/m^2.
     """
+    return summed(tracer, to, lights, visibility, batch, hidden, None)
+
+
+def summed(tracer: Tracer, to: RayReceivers, lights: "PixelLights", visibility: bool, batch: int,
+           hidden: Hidden | None, weigh: Weigh | None) -> Array:
+    """Sum what every pair gives that nothing blocks, (3, r) float64; arguments as for `shadowed_sum`.
+
+    `weigh` changes contributions, W/m^2, and clears the reach of pairs that are left without any: called with the
+    receivers, first and one past the last of them, the senders, first and one past the last of those, reach and
+    contributions. None leaves them as they are.
+    """
     senders, total = senders_of(lights), np.zeros((3, len(to.pixel)))
     step = max(1, batch // LIGHTS_AT_A_TIME)
     for first in range(0, total.shape[1], step):
         last = min(first + step, total.shape[1])
         for light in range(0, senders.flux.shape[1], LIGHTS_AT_A_TIME):
             count = min(LIGHTS_AT_A_TIME, senders.flux.shape[1] - light)
-            _add_lights(tracer, to, (first, last), senders, (light, light + count), visibility, hidden, total)
+            _add_lights(tracer, to, (first, last), senders, (light, light + count), visibility, hidden, weigh, total)
         report_progress(last / total.shape[1])
     return total
 
 
 def _add_lights(tracer: Tracer, to: RayReceivers, receivers: tuple[int, int], senders: Senders,
-                lights: tuple[int, int], visibility: bool, hidden: Hidden | None, total: Array) -> None:
+                lights: tuple[int, int], visibility: bool, hidden: Hidden | None, weigh: Weigh | None,
+                total: Array) -> None:
     count = lights[1] - lights[0]
     pairs = (receivers[1] - receivers[0]) * count
     tally("pairs", lambda: pairs)
     origin, direction, contribution = (np.empty((pairs, 3), np.float32) for _ in range(3))
     reach, occluded = np.empty(pairs, np.float32), np.empty(pairs, np.bool_)
     fill_shadow_rays(to, receivers, senders, lights, tracer.grain, (origin, direction, reach, contribution))
+    if weigh is not None:
+        weigh(to, receivers, senders, lights, reach, contribution)
     if not left_out("pairs.shadow_rays", lambda: (pairs - np.count_nonzero(reach), pairs)):
         contribution[reach == 0], reach[:] = 0, 1
     if visibility and hidden is not None:

@@ -14,6 +14,7 @@ import numpy as np
 from refgi.errors import InputError
 from refgi.image import canonical_json
 from refgi.scene import Camera, DirectionalLight, Light, Material, PointLight, Scene, SpotLight
+from refgi.scene.material import TEXTURES
 from refgi.settings import Settings, flat
 
 LIGHTS: dict[str, type[SpotLight] | type[PointLight] | type[DirectionalLight]] = {
@@ -91,12 +92,16 @@ def materials_digest(scene: Scene) -> str:
 
 
 def _material_json(material: Material) -> dict[str, Any]:
-    """Return a material as JSON values; its texture only where it has one, the image by its digest."""
-    texture = material.texture
-    fields: dict[str, Any] = plain(dataclasses.replace(material, texture=None))
-    del fields["texture"]
-    if texture is not None:
-        fields["texture"] = {"image": texture.image.digest, "wrap": list(texture.wrap), "filter": texture.filter}
+    """Return a material as JSON values; textures, alpha and cutoff only where it has some, images by their digests."""
+    without: dict[str, Any] = dict.fromkeys(TEXTURES)
+    fields: dict[str, Any] = plain(dataclasses.replace(material, **without))
+    for key in TEXTURES:
+        del fields[key]
+        texture = getattr(material, key)
+        if texture is not None:
+            fields[key] = {"image": texture.image.digest, "wrap": list(texture.wrap), "filter": texture.filter}
+    if material.cutoff is None:  # absent, the digest is that of earlier versions
+        del fields["alpha"], fields["cutoff"]
     return fields
 
 

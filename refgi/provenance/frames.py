@@ -170,10 +170,11 @@ def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame,
     first = frame.number if frame.temporal is None else 0
     scenes = islice(scenes_along(scene, way, frame.of), first, frame.number + 1)
     light = KeepingEstimate(find_method(method))
-    sequence = Sequence(scenes, settings, frame.temporal, method=light, **options)
+    sequence = Sequence(scenes, settings, frame.temporal, method=light, lobes=light.lobes, **options)
     for step in sequence.over(scenes, first):
         made = step
-    return Picture(made.frame, made.irradiance, made.radiance, None if frame.temporal else light.estimate, made.frames)
+    return Picture(made.frame, made.irradiance, made.radiance, None if frame.temporal else light.estimate, made.frames,
+                   made.lobes, light.lobe_estimate)
 
 
 def render_still(scene: Scene, method: str, settings: Any, still: StillFrames, options: Mapping[str, Any]) -> Picture:
@@ -204,8 +205,11 @@ def render_still(scene: Scene, method: str, settings: Any, still: StillFrames, o
     """
     require_filter([method])
     options = {**options, "shadows": options.get("shadows") or usual_shadows(settings)}
-    last = still_frame(scene, settings, still.temporal, still.frames, method=find_method(method).function, **options)
-    return Picture(last.frame, last.irradiance, last.radiance, frames=last.frames)
+    light = KeepingEstimate(find_method(method))
+    last = still_frame(scene, settings, still.temporal, still.frames, method=find_method(method).function,
+                       lobes=light.lobes, **options)
+    return Picture(last.frame, last.irradiance, last.radiance, frames=last.frames, lobes=last.lobes,
+                   lobe_estimate=light.lobe_estimate)
 
 
 def require_same_path(record: Mapping[str, Any], found: str) -> None:

@@ -28,6 +28,8 @@ DIRTY = "-dirty"
 VERSION = 2  # of the record; its key is `provenance`
 UNITS = {"irradiance": "W/m^2", "radiance": "W/m^2/sr", "variance": "(W/m^2)^2", "seconds": "s", "ledger": "W"}
 CONTENT = "irradiance.*: indirect, without albedo/pi; R, G, B: emission + albedo/pi (direct + indirect)"
+LOBE_UNITS = {"lobes": "W/m^2/sr", "lobe_variance": "(W/m^2/sr)^2"}
+LOBE_CONTENT = f"{CONTENT} + lobes by direct light + lobes.*; lobes.*: receivers' lobes by indirect light"
 
 Record = dict[str, Any]
 
@@ -128,8 +130,14 @@ def scene_record(
             "lights": [light_json(light) for light in scene.lights],
         },
         "options": plain(options), "exposure": scene.exposure if exposure is None else exposure,
-        "units": UNITS, "content": CONTENT,
+        **({"units": UNITS | LOBE_UNITS, "content": LOBE_CONTENT} if _reflects_by_lobes(scene) else
+           {"units": UNITS, "content": CONTENT}),
     }
+
+
+def _reflects_by_lobes(scene: Scene) -> bool:
+    """Return whether any material of a scene has a lobe, so that its pictures may hold lobes."""
+    return any(material.is_glossy and not material.is_dielectric for material in scene.materials)
 
 
 def method_record(method: str, settings: Any) -> Record:

@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.rays.embree import MISS, Backend, open_backend
+from refgi.rays.cutouts import ray_holes
+from refgi.rays.embree import MISS, Backend, Cut, open_backend
 from refgi.rays.offsets import GRAIN, STEPS, grain_of
 from refgi.rays.watertight import Corners, Pieces, closest_around, corners, cut
 from refgi.scene import DirectionalLight, Geometry, Light
@@ -33,7 +34,7 @@ class Tracer:
     Parameters
     ----------
     geometry : Geometry
-        The triangles; copied. May be empty: then every ray misses.
+        The triangles; copied. May be empty: then every ray misses. Rays pass through the holes of cut-outs.
 
     Notes
     -----
@@ -46,6 +47,7 @@ class Tracer:
         self._vertices = np.array(geometry.vertices, np.float32).reshape(-1, 3)
         self._faces = np.array(geometry.faces, np.int32).reshape(-1, 3)
         self.grain = grain_of(self._vertices, self._faces)  # m, of `ray_offset`
+        self._holes = ray_holes(geometry)
         self._lock = threading.Lock()
 
     def offsets(self, points: Array) -> Array:
@@ -234,11 +236,23 @@ class Tracer:
 
     @cached_property
     def _built_backend(self) -> Backend | None:
-        return open_backend(self._pieces.vertices, self._pieces.faces) if len(self._faces) else None
+        if not len(self._faces):
+            return None
+        pieces, holes = self._pieces, self._holes
+        if not len(holes.of_face) or pieces.face is None:
+            return open_backend(pieces.vertices, pieces.faces)
+        numbers = holes.of_face[pieces.face]
+        return open_backend(pieces.vertices, pieces.faces, Cut(holes, numbers[numbers >= 0], self.grain))
 
     @cached_property
     def _pieces(self) -> Pieces:
-        return cut(self._vertices, self._faces, self.grain)
+        """What Embree is given; triangles that may have holes come last."""
+        pieces = cut(self._vertices, self._faces, self.grain)
+        if not len(self._holes.of_face):
+            return pieces
+        face = np.arange(len(self._faces), dtype=np.int32) if pieces.face is None else pieces.face
+        order = np.argsort(self._holes.of_face[face] >= 0, kind="stable")
+        return Pieces(pieces.vertices, pieces.faces[order], face[order])
 
     @cached_property
     def _corners(self) -> Corners:
@@ -259,7 +273,7 @@ class Tracer:
         self.fill_closest(shifted, directions[missed], reach[missed], near, distance)
         found = []
         for ray, triangle in zip(missed[near != MISS], near[near != MISS], strict=True):
-            hit, t = closest_around(self._corners, int(triangle), origins[ray].astype(np.float64),
+            hit, t = closest_around(self._corners, self._holes, int(triangle), origins[ray].astype(np.float64),
                                     directions[ray].astype(np.float64), float(reach[ray]))
             if hit != MISS:
                 found.append((int(ray), hit, t))

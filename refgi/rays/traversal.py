@@ -26,6 +26,7 @@ class Calls(NamedTuple):
     closest: np.uint64
     occluded: np.uint64
     scene: np.uint64
+    first: int  # triangles of its first mesh where there are two: the number of the second mesh's first one
 
 
 def _call_by_address(_: Any, function: Any, scene: Any, ray: Any) -> Any:  # noqa: ARG001
@@ -76,11 +77,11 @@ def closest_hits(calls: Calls, origins: Array, directions: Array, reach: Array, 
         ray = np.empty(32, np.float32)
         bits = ray.view(np.int32)
         for i in range(chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)):
-            bits[17] = -1
+            bits[17] = bits[18] = -1
             if reach[i] > 0:
                 _load(ray, bits, origins, directions, reach, i)
                 _call(calls.closest, calls.scene, ray.ctypes.data)
-            triangle_id[i] = bits[17]
+            triangle_id[i] = bits[17] if bits[18] <= 0 else bits[17] + calls.first
             distance[i] = ray[8] if bits[17] >= 0 else np.inf
 
 

@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
+from refgi.rays.cutouts import RayHoles, is_there
 
 Array = npt.NDArray[Any]
 REACH = 0.4
@@ -51,12 +52,14 @@ def corners(vertices: Array, faces: Array) -> Corners:
 
 
 @kernel
-def closest_around(tables: Corners, triangle: int, origin: Array, direction: Array, reach: float) -> tuple[int, float]:
+def closest_around(
+    tables: Corners, holes: RayHoles, triangle: int, origin: Array, direction: Array, reach: float
+) -> tuple[int, float]:
     """Find the nearest hit among the triangles that share a corner with `triangle`, in float64.
 
-    `tables`: the mesh by corners. `origin`, `direction` (3,) float64: the ray; its distance counts in lengths of
-    `direction`. `reach`: how far to look. Result: triangle and distance; -1 and inf for a miss. Ties go to the lowest
-    id.
+    `tables`: the mesh by corners. `holes`: those of its triangles that may have some. `origin`, `direction` (3,)
+    float64: the ray; its distance counts in lengths of `direction`. `reach`: how far to look. Result: triangle and
+    distance; -1 and inf for a miss. Ties go to the lowest id.
     """
     nearest, hit = np.inf, -1
     for corner in range(3):
@@ -64,9 +67,19 @@ def closest_around(tables: Corners, triangle: int, origin: Array, direction: Arr
         for k in range(tables.first[vertex], tables.first[vertex + 1]):
             candidate = tables.around[k]
             t = _hit_distance(tables, candidate, origin, direction)
-            if t <= reach and (t < nearest or (t == nearest and candidate < hit)):
+            if t <= reach and (t < nearest or (t == nearest and candidate < hit)) and _is_solid(
+                    holes, candidate, origin, direction):
                 nearest, hit = t, candidate
     return hit, nearest
+
+
+@kernel
+def _is_solid(holes: RayHoles, triangle: int, origin: Array, direction: Array) -> bool:
+    """Return whether a triangle is there where a ray meets it."""
+    if len(holes.of_face) == 0 or holes.of_face[triangle] < 0:
+        return True
+    return is_there(holes, holes.of_face[triangle], origin[0], origin[1], origin[2], direction[0], direction[1],
+                    direction[2])
 
 
 @kernel

@@ -15,6 +15,7 @@ from refgi.scene.values import BLACK, BRIGHTEST, Array, Rgb, as_float_tuples, is
 SHARPEST = 1e20  # Phong exponent; far within float32
 DENSEST = 1e3  # index of refraction
 ROUNDING = 1e-6  # of a sum of two reflectances that are float32 numbers
+TEXTURES = ("texture", "emission_texture", "alpha_texture")  # fields of a material
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,7 +25,9 @@ class Material:
     `diffuse` and `specular` are reflectances (1), `exponent` is the Phong exponent of the lobe around the mirror
     direction (normalised so that `specular` is its reflectance), `ior` the index of refraction of a dielectric (0:
     opaque), `emission` the radiance the surface emits by itself (W/m^2/sr; seen by the camera, not a light source).
-    `texture` multiplies `diffuse` where a surface has texture coordinates.
+    `texture` multiplies `diffuse`, `emission_texture` the emission, where a surface has texture coordinates. With a
+    `cutoff` the surface has holes: it is there only where `alpha` times the texture's alpha is at least the cutoff
+    (None: it is there everywhere); `alpha_texture` is one whose alpha counts in place of the texture's.
     """
 
     name: str = "default"
@@ -34,6 +37,10 @@ class Material:
     ior: float = 0.0
     emission: Rgb = BLACK
     texture: Texture | None = None
+    alpha: float = 1.0
+    cutoff: float | None = None
+    emission_texture: Texture | None = None
+    alpha_texture: Texture | None = None
 
     def __post_init__(self) -> None:
         for key in ("diffuse", "specular"):
@@ -49,9 +56,21 @@ class Material:
         possible = self.is_dielectric or not reflects_too_much(self.diffuse, self.specular)
         expect(possible, f"material {self.name!r}: diffuse + specular", "at most 1 in each channel",
                [round(d + s, 6) for d, s in zip(self.diffuse, self.specular, strict=True)])
-        expect(self.texture is None or isinstance(self.texture, Texture), f"material {self.name!r}: texture",
-               "a Texture or None", type(self.texture).__name__)
+        for key in TEXTURES:
+            value = getattr(self, key)
+            expect(value is None or isinstance(value, Texture), f"material {self.name!r}: {key}", "a Texture or None",
+                   type(value).__name__)
+        expect(is_number(self.alpha) and 0 <= self.alpha <= 1, f"material {self.name!r}: alpha", "a number from 0 to 1",
+               self.alpha)
+        expect(self.cutoff is None or (is_number(self.cutoff) and self.cutoff >= 0), f"material {self.name!r}: cutoff",
+               "a number >= 0, or None", self.cutoff)
         as_float_tuples(self, "diffuse", "specular", "emission")
+
+    @property
+    def textures(self) -> tuple[Texture, ...]:
+        """All that need texture coordinates."""
+        found = (getattr(self, key) for key in TEXTURES)
+        return tuple(one for one in found if one is not None)
 
     @property
     def is_glossy(self) -> bool:
@@ -92,6 +111,7 @@ class MaterialTable(NamedTuple):
     ior: Array  # (m,) index of refraction, 0 where opaque
     emission: Array  # (m, 3) radiance, W/m^2/sr
     textures: Textures | None = None  # that multiply `diffuse`; None where no material has one
+    emissive: Textures | None = None  # that multiply `emission`; None where no material has one
 
 
 def material_table(materials: Sequence[Material], dtype: npt.DTypeLike = np.float64) -> MaterialTable:
@@ -114,4 +134,5 @@ def material_table(materials: Sequence[Material], dtype: npt.DTypeLike = np.floa
         return values.reshape((-1, width) if width > 1 else -1)
 
     return MaterialTable(column("diffuse", 3), column("specular", 3), column("exponent", 1), column("ior", 1),
-                         column("emission", 3), textures_of([material.texture for material in materials]))
+                         column("emission", 3), textures_of([material.texture for material in materials]),
+                         textures_of([material.emission_texture for material in materials]))

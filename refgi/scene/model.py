@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from refgi.errors import expect
+from refgi.scene.cutouts import CutFaces, CutOuts, cut_faces, cut_outs
 from refgi.scene.light import (
     DIRECTIONAL,
     POINT,
@@ -75,7 +76,9 @@ class Geometry:
 
     `vertices` (n, 3) float64, m; `faces` (m, 3) int32; `material_of_face` (m,) int32, index into the scene's
     materials; `vertex_normals` (n, 3) float64 unit vectors, or None where the scene shades with face normals; `uv`
-    (m, 3, 2) float64 texture coordinates of each face's corners, or None where no material has a texture.
+    (m, 3, 2) float64 texture coordinates of each face's corners, or None where no material has a texture; `cut_outs`
+    where surfaces of the materials have holes, or None where none has: those of the scene's materials, which `merge`
+    and `Scene` put here.
     """
 
     vertices: Array
@@ -83,6 +86,7 @@ class Geometry:
     material_of_face: Array
     vertex_normals: Array | None = None
     uv: Array | None = None
+    cut_outs: CutOuts | None = None
 
     def __post_init__(self) -> None:
         if len(self.faces):
@@ -98,6 +102,25 @@ class Geometry:
         expect(self.material_of_face.min(initial=0) >= 0, "geometry: material_of_face", "indices >= 0",
                self.material_of_face.min(initial=0))
         return int(self.material_of_face.max(initial=-1)) + 1
+
+    @cached_property
+    def cut(self) -> CutFaces | None:
+        """The triangles that may have holes, None where there are none."""
+        return cut_faces(self)
+
+    @cached_property
+    def without_cut(self) -> Array:
+        """Vertices of the faces, of those that may have holes the first one three times: they show nothing."""
+        if self.cut is None:
+            return self.faces
+        faces = self.faces.copy()
+        faces[self.cut.face] = faces[self.cut.face, :1]
+        return faces
+
+    def selected(self, chosen: Array) -> "Geometry":
+        """Return some of the faces, with the same vertices; `chosen` (m,) bool."""
+        return dataclasses.replace(self, faces=self.faces[chosen], material_of_face=self.material_of_face[chosen],
+                                   uv=None if self.uv is None else self.uv[chosen])
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
@@ -159,9 +182,12 @@ class Scene:
         expect(is_number(self.exposure) and self.exposure > 0, "exposure", "a finite number > 0", self.exposure)
         expect(self.geometry.materials_needed <= len(self.materials), "materials",
                f"the {self.geometry.materials_needed} that the geometry names", len(self.materials))
-        textured = [material.name for material in self.materials if material.texture is not None]
+        textured = [material.name for material in self.materials if material.textures]
         expect(not textured or self.geometry.uv is not None, "geometry: uv", "texture coordinates for the textures of "
                f"{len(textured)} material(s)", None)
+        holes = cut_outs(self.materials)
+        if holes != self.geometry.cut_outs:
+            object.__setattr__(self, "geometry", dataclasses.replace(self.geometry, cut_outs=holes))
         for light in self.lights:
             expect(isinstance(light, Light), "lights", "spot, point or directional lights", light)
 
@@ -202,7 +228,7 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
         If a mesh has a coordinate that is not finite or an index out of range, or all do not fit in memory.
     """
     expect_all_sound(meshes, lambda number: f"mesh {number} ({meshes[number].name})")
-    textured = any(mesh.material.texture is not None for mesh in meshes)
+    textured = any(mesh.material.textures for mesh in meshes)
     expect_memory(sum(len(mesh.vertices) for mesh in meshes), sum(len(mesh.faces) for mesh in meshes), "meshes",
                   texels=_texels(meshes), textured=textured)
     index_of: dict[Material, int] = {}
@@ -219,12 +245,13 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
         np.repeat(np.array(index, np.int32), np.array([len(part) for part in faces], np.int64)),
         np.concatenate([np.asarray(m.normals, np.float64) for m in meshes]) if smooth else None,
         np.concatenate([_coordinates(mesh) for mesh in meshes]) if textured else None,
+        cut_outs(tuple(index_of)),
     ), tuple(index_of)
 
 
 def _texels(meshes: Sequence[Mesh]) -> int:
     """Return the number of texels of all images, each counted once."""
-    textures = dict.fromkeys(mesh.material.texture for mesh in meshes if mesh.material.texture is not None)
+    textures = dict.fromkeys(texture for mesh in meshes for texture in mesh.material.textures)
     images = dict.fromkeys(texture.image for texture in textures)
     return sum(image.width * image.height for image in images)
 
@@ -232,7 +259,7 @@ def _texels(meshes: Sequence[Mesh]) -> int:
 def _coordinates(mesh: Mesh) -> Array:
     """Return texture coordinates of a mesh's corners, (m, 3, 2); 0 where it needs none."""
     if mesh.uv is None:
-        expect(mesh.material.texture is None, f"mesh {mesh.name}: uv",
+        expect(not mesh.material.textures, f"mesh {mesh.name}: uv",
                f"texture coordinates for the texture of material {mesh.material.name!r}", None)
         return np.zeros((len(mesh.faces), 3, 2))
     return np.asarray(mesh.uv, np.float64)

@@ -1,5 +1,10 @@
-"""MTL files of OBJ meshes: diffuse, specular and emissive colours of materials, and the texture of the diffuse one."""
+"""MTL files of OBJ meshes: diffuse, specular and emissive colours of materials, texture of the diffuse one, cut-outs.
 
+`map_d`, which asks for partial transparency, becomes a cut-out with a cutoff of 1/2, unless it lies on a surface other
+than `map_Kd`: a corner has one pair of coordinates.
+"""
+
+import dataclasses
 import itertools
 import math
 import warnings
@@ -7,21 +12,24 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from refgi.errors import InputError, RefgiWarning, expect, first_faults, shortened
 from refgi.scene.files import is_there, read_bytes
 from refgi.scene.material import reflects_too_much
 from refgi.scene.model import Material, Rgb
-from refgi.scene.texture.image import image_file
+from refgi.scene.texture.image import Image, image_file
 from refgi.scene.texture.texture import Texture
 
+CUTOFF = 0.5
 TEXTURES = ("bump", "disp", "decal", "norm", "refl")  # and all that starts with map_
-# arguments that an option of map_Kd has at most
+# arguments that an option of map_Kd and map_d has at most
 OPTIONS = {"-s": 3, "-o": 3, "-t": 3, "-clamp": 1, "-mm": 2, "-bm": 1, "-boost": 1, "-blendu": 1, "-blendv": 1,
            "-cc": 1, "-texres": 1, "-imfchan": 1, "-type": 1}
 
 
-class DiffuseMap(NamedTuple):
-    """What map_Kd says: an image, and where it lies: u' = scale u + offset, v upwards."""
+class TextureMap(NamedTuple):
+    """What map_Kd or map_d says: an image, and where it lies: u' = scale u + offset, v upwards."""
 
     path: Path
     scale: tuple[float, float]
@@ -29,25 +37,58 @@ class DiffuseMap(NamedTuple):
     clamp: bool
     where: str  # file and line, for errors
 
-    def texture(self) -> Texture:
-        """Return the texture, its image decoded; raises `InputError` naming the line if that cannot be read."""
+    def texture(self, *, opacity: bool = False) -> Texture:
+        """Return the texture, its image decoded; raises `InputError` naming the line if that cannot be read.
+
+        `opacity`: that of map_d, whose alpha is the image's, or its grey where it has none.
+        """
         try:
             image = image_file(self.path)
         except InputError as error:
-            raise InputError(f"{self.where}: map_Kd: {shortened(str(error), 1000)}") from error
+            key = "map_d" if opacity else "map_Kd"
+            raise InputError(f"{self.where}: {key}: {shortened(str(error), 1000)}") from error
+        if opacity and image.alpha is None:
+            grey = np.round(image.pixels.mean(axis=2, dtype=np.float64)).astype(image.pixels.dtype)
+            image = Image(image.pixels, image.name, grey)
         return Texture(image, ("clamp", "clamp") if self.clamp else ("repeat", "repeat"))
 
+    def lies_as(self, other: "TextureMap") -> bool:
+        """Return whether both lie on a surface alike."""
+        return self[1:4] == other[1:4]
 
-def read_library(path: Path) -> tuple[dict[str, Material], dict[str, DiffuseMap]]:
-    """Read the materials of an MTL file: Kd as albedo, Ks and Ns as Phong lobe, Ke as emission; map_Kd apart.
 
-    Result: materials by name, and the texture of those that have one, not yet decoded. A lobe that would reflect more
+class Maps(NamedTuple):
+    """The textures of a material, not yet decoded; one of them at least."""
+
+    diffuse: TextureMap | None
+    opacity: TextureMap | None = None
+
+    @property
+    def place(self) -> TextureMap:
+        """What says where they lie on a surface."""
+        found = self.diffuse or self.opacity
+        assert found is not None
+        return found
+
+    def painted(self, material: Material) -> Material:
+        """Return a material with them, decoded."""
+        diffuse, opacity = self
+        return dataclasses.replace(material, texture=diffuse and diffuse.texture(),
+                                   alpha_texture=opacity and opacity.texture(opacity=True))
+
+
+def read_library(path: Path) -> tuple[dict[str, Material], dict[str, Maps]]:
+    """Read the materials of an MTL file: Kd as albedo, Ks and Ns as Phong lobe, Ke as emission; textures apart.
+
+    Result: materials by name, and the textures of those that have some, not yet decoded. A lobe that would reflect more
     than arrives together with Kd is left out. Raises `InputError` if the file is missing or a value is out of range.
 
-    Warns `RefgiWarning` if lobes are left out, or other textures or unknown options of map_Kd are named.
+    Warns `RefgiWarning` if lobes are left out, opacity is not what the file says, or other textures or unknown options
+    of textures are named.
     """
     textures: list[tuple[str, ...]] = []
-    maps: dict[str, DiffuseMap] = {}
+    maps: dict[str, Maps] = {}
+    opacities: dict[str, TextureMap] = {}
     options: set[str] = set()
     name = ""
     values: dict[str, dict[str, tuple[float, ...]]] = {}
@@ -60,8 +101,15 @@ def read_library(path: Path) -> tuple[dict[str, Material], dict[str, DiffuseMap]
             current[words[0]] = numbers_of(words[1:4], f"{path}: line {number}")
         elif words[0] == "Ns":
             current["Ns"] = numbers_of(words[1:2], f"{path}: line {number}", 1)
-        elif words[0].lower() == "map_kd" and len(words) > 1:
-            maps[name], unread = _diffuse_map(words[1:], path, f"{path}: line {number}")
+        elif words[0] in ("d", "Tr") and _is_number(words[-1]):
+            opacity = float(words[-1])
+            current["d"] = (opacity if words[0] == "d" else 1.0 - opacity,)
+        elif words[0].lower() in ("map_kd", "map_d") and len(words) > 1:
+            found, unread = _texture_map(words[1:], path, f"{path}: line {number}")
+            if words[0].lower() == "map_kd":
+                maps[name] = Maps(found)
+            else:
+                opacities[name] = found
             options |= unread
         elif words[0].lower().startswith("map_") or words[0].lower() in TEXTURES:
             textures.append(tuple(words))
@@ -71,6 +119,7 @@ def read_library(path: Path) -> tuple[dict[str, Material], dict[str, DiffuseMap]
         warnings.warn(RefgiWarning(text), stacklevel=5)
     for name in maps.keys() & values.keys():
         values[name].setdefault("Kd", (1.0, 1.0, 1.0))
+    _add_cut_outs(opacities, values, maps, path)
     too_bright = sum(_is_lobed(found) and reflects_too_much(*_reflectances(found)) for found in values.values())
     if too_bright:
         warnings.warn(RefgiWarning(f"{path}: {too_bright:,} of {len(values):,} materials with diffuse + specular "
@@ -78,8 +127,28 @@ def read_library(path: Path) -> tuple[dict[str, Material], dict[str, DiffuseMap]
     return {name: _material(name, found, path) for name, found in values.items()}, maps
 
 
-def _diffuse_map(words: list[str], path: Path, where: str) -> tuple[DiffuseMap, set[str]]:
-    """Return what the arguments of map_Kd say, and the options among them that are not read."""
+def _add_cut_outs(opacities: dict[str, TextureMap], values: dict[str, dict[str, tuple[float, ...]]],
+                  maps: dict[str, Maps], path: Path) -> None:
+    """Give materials of map_d a cutoff, and warn of it and of what of d, Tr and map_d is passed over."""
+    cut, elsewhere = 0, 0
+    for name, found in opacities.items():
+        diffuse = maps[name].diffuse if name in maps else None
+        if diffuse is not None and not found.lies_as(diffuse):
+            elsewhere += 1
+            continue
+        maps[name] = Maps(diffuse, found)
+        values.setdefault(name, {})["cutoff"] = (CUTOFF,)
+        cut += 1
+    partial = sum("cutoff" not in found and found.get("d", (1.0,))[0] < 1 for found in values.values())
+    for count, what in ((cut, f"with map_d cut out where opacity is below {CUTOFF}: no partial transparency"),
+                        (elsewhere, "with map_d, which lies other than map_Kd, opaque here"),
+                        (partial, "with opacity below 1 (d, Tr), opaque here")):
+        if count:
+            warnings.warn(RefgiWarning(f"{path}: {count:,} material(s) {what}"), stacklevel=6)
+
+
+def _texture_map(words: list[str], path: Path, where: str) -> tuple[TextureMap, set[str]]:
+    """Return what the arguments of map_Kd or map_d say, and the options among them that are not read."""
     scale, offset, clamp, unread = [1.0, 1.0], [0.0, 0.0], False, set[str]()
     while len(words) > 1 and words[0] in OPTIONS:
         option, most = words[0], OPTIONS[words[0]]
@@ -96,7 +165,7 @@ def _diffuse_map(words: list[str], path: Path, where: str) -> tuple[DiffuseMap, 
             unread.add(option)
         words = words[1 + len(values) :]
     name = " ".join(words).replace("\\", "/")
-    return DiffuseMap(path.parent / name, (scale[0], scale[1]), (offset[0], offset[1]), clamp, where), unread
+    return TextureMap(path.parent / name, (scale[0], scale[1]), (offset[0], offset[1]), clamp, where), unread
 
 
 def _is_number(word: str) -> bool:
@@ -116,7 +185,9 @@ def _warn_of_textures(textures: Sequence[tuple[str, ...]], path: Path) -> None:
              for words in set(textures)}
     missing = [" ".join(words[1:]) for words in textures if not found[words]]
     absent = f"; {len(missing):,} of them name no file: {first_faults([shortened(m, 80) for m in missing], ', ')}"
-    text = f"{path}: {len(textures):,} texture(s) ({kinds}) passed over{absent if missing else ''}"
+    bumps = any(word in words[0].lower() for words in textures for word in ("bump", "norm"))
+    normals = " (shading normals stay the mesh's)" if bumps else ""
+    text = f"{path}: {len(textures):,} texture(s) ({kinds}) passed over{normals}{absent if missing else ''}"
     warnings.warn(RefgiWarning(text), stacklevel=6)
 
 
@@ -134,7 +205,9 @@ def _material(name: str, found: dict[str, tuple[float, ...]], path: Path) -> Mat
     if not _is_lobed(found) or reflects_too_much(diffuse, specular):
         specular, exponent = (0.0, 0.0, 0.0), 0.0
     try:
-        return Material(name, diffuse, specular, exponent, emission=_rgb(found.get("Ke", (0.0, 0.0, 0.0))))
+        cutoff = found.get("cutoff", (None,))[0]
+        return Material(name, diffuse, specular, exponent, emission=_rgb(found.get("Ke", (0.0, 0.0, 0.0))),
+                        alpha=1.0 if cutoff is None else min(max(found.get("d", (1.0,))[0], 0.0), 1.0), cutoff=cutoff)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 

@@ -5,7 +5,6 @@ it stands on, takes index 0 for 1, hands groups back in reverse order and rounds
 coordinates of OBJ have v = 0 at the bottom of the picture; they are turned when they are read.
 """
 
-import dataclasses
 import warnings
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +14,7 @@ import numpy as np
 from refgi.errors import InputError, RefgiWarning, expect, shortened
 from refgi.scene.files import Contents
 from refgi.scene.model import Array, Material, Mesh
-from refgi.scene.mtl import DiffuseMap, lines_of, numbers_of, read_library
+from refgi.scene.mtl import Maps, lines_of, numbers_of, read_library
 
 Corner = tuple[int, int, int]  # position, normal and texture coordinates (-1: none), counted from 0
 
@@ -41,7 +40,7 @@ class _Reader:
         self.normals: list[tuple[float, ...]] = []
         self.coordinates: list[tuple[float, ...]] = []
         self.materials: dict[str, Material] = {}
-        self.maps: dict[str, DiffuseMap] = {}
+        self.maps: dict[str, Maps] = {}
         self.without = 0  # faces whose texture has no coordinates
         self.libraries: set[str] = set()
         self.coloured = 0  # vertices with a colour
@@ -112,8 +111,7 @@ class _Reader:
         self.without += int(np.count_nonzero(~placed)) // 3
         meshes = []
         if placed.any():
-            found = self.maps[name]
-            painted = dataclasses.replace(material, texture=found.texture())
+            found, painted = self.maps[name].place, self.maps[name].painted(material)
             # u' = s u + o as the file has them, v upwards
             scale, offset, bottom = np.array(found.scale), np.array(found.offset), np.array((0.0, 1.0))
             turned = (coordinates - bottom) * scale + bottom + offset * (1.0, -1.0)

@@ -228,7 +228,7 @@ def _with_material(mesh: Mesh, item: "Object", materials: dict[str, Material], s
         material = _built(item.material, item.name or mesh.name, folder)
     else:
         material = materials.get(mesh.material.name, mesh.material)
-    expect(material.texture is None or mesh.uv is not None, item.mesh,
+    expect(not material.textures or mesh.uv is not None, item.mesh,
            f"texture coordinates for the texture of material {material.name!r}", "none")
     has_normals = smooth if item.smooth_normals is None else item.smooth_normals
     return dataclasses.replace(mesh, material=material, normals=mesh.normals if has_normals else None)

@@ -86,10 +86,13 @@ class Diffuse(Entry):
     type: Literal["diffuse"]
     diffuse: Reflectance
     emission: Triple = model.BLACK
+    alpha: Number = 1.0
+    cutoff: Number | None = None
 
     def built(self, name: str) -> model.Material:
         """Return the material under this name, without its texture's image."""
-        return model.Material(name, factor_of(self.diffuse), emission=self.emission)
+        return model.Material(name, factor_of(self.diffuse), emission=self.emission, alpha=self.alpha,
+                              cutoff=self.cutoff)
 
 
 class Phong(Entry):
@@ -100,10 +103,13 @@ class Phong(Entry):
     specular: Triple
     exponent: Number
     emission: Triple = model.BLACK
+    alpha: Number = 1.0
+    cutoff: Number | None = None
 
     def built(self, name: str) -> model.Material:
         """Return the material under this name, without its texture's image."""
-        return model.Material(name, factor_of(self.diffuse), self.specular, self.exponent, emission=self.emission)
+        return model.Material(name, factor_of(self.diffuse), self.specular, self.exponent, emission=self.emission,
+                              alpha=self.alpha, cutoff=self.cutoff)
 
 
 class Dielectric(Entry):

@@ -12,6 +12,7 @@ from refgi.method import Method
 from refgi.sssil.approximations import APPROXIMATIONS
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.hssil import hssil
+from refgi.sssil.lobes import hssil_lobes
 from refgi.sssil.memory import extra_bytes
 from refgi.sssil.pyramid.levels import pyramid
 from refgi.sssil.pyramid.view import Level
@@ -47,6 +48,7 @@ __all__ = [
     "SenderSettings",
     "gather",
     "hssil",
+    "hssil_lobes",
     "pyramid",
     "upsample",
 ]
@@ -54,4 +56,4 @@ __all__ = [
 METHOD = Method(
     "hssil", "Hierarchical Screen-Space Indirect Illumination (2009): what the camera sees lights what it sees", hssil,
     HssilSettings, visibility=lambda settings: settings.visibility is not None, memory=extra_bytes, presets=PRESETS,
-    temporal=TemporalSettings(), approximations=APPROXIMATIONS)
+    temporal=TemporalSettings(), approximations=APPROXIMATIONS, lobes=hssil_lobes)

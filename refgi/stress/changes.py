@@ -183,7 +183,7 @@ def _split(shape: Geometry) -> Geometry:
                     np.concatenate([np.stack(quarter, axis=1) for quarter in quarters]).astype(np.int32),
                     np.concatenate([shape.material_of_face] * 4),
                     None if shape.vertex_normals is None else with_middles(shape.vertex_normals),
-                    None if shape.uv is None else _split_coordinates(shape.uv))
+                    None if shape.uv is None else _split_coordinates(shape.uv), shape.cut_outs)
 
 
 def _split_coordinates(uv: Array) -> Array:
@@ -222,7 +222,7 @@ def _with_plane(scene: Scene, axis: int, place: float, half: float) -> Scene:
         np.concatenate([shape.vertices, corners]), np.concatenate([shape.faces, faces]).astype(np.int32),
         np.append(shape.material_of_face, [0, 0]).astype(np.int32),
         None if normals is None else np.concatenate([normals, np.tile(np.eye(3)[axis], (4, 1))]),
-        None if shape.uv is None else np.concatenate([shape.uv, np.zeros((2, 3, 2))])))
+        None if shape.uv is None else np.concatenate([shape.uv, np.zeros((2, 3, 2))]), shape.cut_outs))
 
 
 def _is_hidden(scene: Scene, faces: int, width: int, height: int) -> bool:

@@ -85,8 +85,8 @@ def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, ra
     side = math.isqrt(photons)
     for k, light in enumerate(film.scene.lights):
         rays = light_rays(light, film.scene.geometry, random.random((side * side, 2)))
-        batch = _photons(rays.origins + tracer.offsets(rays.origins)[:, None] * rays.directions, rays.directions)
-        _power(lights, k, isinstance(light, DirectionalLight), rays.measure, rays.directions, batch.flux)
+        batch = photons_of(rays.origins + tracer.offsets(rays.origins)[:, None] * rays.directions, rays.directions)
+        power_of(lights, k, isinstance(light, DirectionalLight), rays.measure, rays.directions, batch.flux)
         for bounce in range(film.longest):
             tracer.fill_closest(batch.origin, batch.direction, batch.reach, batch.triangle_id, batch.distance)
             words = random.integers(2**32, size=len(batch.reach), dtype=np.uint32)
@@ -99,14 +99,19 @@ def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, ra
     return irradiance
 
 
-def _photons(origins: Array, directions: Array) -> Photons:
+def photons_of(origins: Array, directions: Array) -> Photons:
+    """Allocate photons that start out.
+
+    `origins`, `directions` (n, 3): m, unit vectors. Result: without flux.
+    """
     count = len(origins)
     return Photons(origins.astype(np.float32), directions.astype(np.float32), np.full(count, np.inf, np.float32),
                    np.empty(count, np.int32), np.empty(count, np.float32), *(np.zeros((count, 3)) for _ in range(3)))
 
 
 @kernel
-def _power(lights: LightTable, k: int, directional: bool, measure: float, directions: Array, flux: Array) -> None:
+def power_of(lights: LightTable, k: int, directional: bool, measure: float, directions: Array, flux: Array) -> None:
+    """Fill the flux (n, 3) of each ray of a light, W."""
     for i in range(len(flux)):
         if directional:
             for c in range(3):
@@ -119,6 +124,17 @@ def _power(lights: LightTable, k: int, directional: bool, measure: float, direct
 
 def _splat(film: Film, tracer: Tracer, landed: Array, normals: Array, flux: Array, irradiance: Array) -> None:
     """Splat photons to the pixels that see where they landed, in their order."""
+    pixel, density, visible = seen(film, tracer, landed, normals)
+    for c in range(3):
+        irradiance[c] += np.bincount(pixel, flux[visible, c] * density, irradiance.shape[1])
+
+
+def seen(film: Film, tracer: Tracer, landed: Array, normals: Array) -> tuple[Array, Array, Array]:
+    """Return which photons the camera sees land.
+
+    `landed` (n, 3): where, m. `normals` (n, 3): the faces', on the side they came from. Returns (k,) int64, (k,), (n,)
+    bool: flat index of the pixel and share of the flux per area, 1/m^2, of each visible one; and which they are.
+    """
     camera = film.scene.camera
     view = np.subtract(camera.eye, landed)
     row, column, _ = project(camera_projection(camera, film.shape[1], film.shape[0]), landed.T)
@@ -131,9 +147,7 @@ def _splat(film: Film, tracer: Tracer, landed: Array, normals: Array, flux: Arra
     at = np.floor(row[visible]).astype(np.int64), np.floor(column[visible]).astype(np.int64)
     # E = dPhi <g.v> / (D^2 W)
     density = cosine[visible] / ((view[visible] ** 2).sum(axis=1) * film.solid_angle[at])
-    pixel = at[0] * film.shape[1] + at[1]
-    for c in range(3):
-        irradiance[c] += np.bincount(pixel, flux[visible, c] * density, irradiance.shape[1])
+    return at[0] * film.shape[1] + at[1], density, visible
 
 
 @kernel(parallel=True)

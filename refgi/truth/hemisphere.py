@@ -124,7 +124,7 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         material = surfaces.material_of_face[triangle]
         w, y = hit_point(paths, ray)
         # the most frequent exits first, before anything is divided or normalised
-        toward = _toward_light(lights, k, y)
+        toward = toward_light(lights, k, y)
         cross = face_cross(surfaces, triangle)
         side, side_out = dot(cross, toward), dot(cross, w)
         if side * side_out <= 0:
@@ -160,18 +160,18 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
             shadows.origin[ray, c] = y[c] + offset * g[c]
             shadows.direction[ray, c] = toward[c] if directional else toward[c] - offset * g[c]
         if most > 0:
-            shadows.reach[ray] = np.inf if directional else _short_of(lights, k, far, grain)
+            shadows.reach[ray] = np.inf if directional else short_of(lights, k, far, grain)
 
 
 @kernel
-def _short_of(lights: LightTable, k: int, far: float, grain: float) -> Any:
+def short_of(lights: LightTable, k: int, far: float, grain: float) -> Any:
     """Return the share of the way to a light up to which things block: a lamp may lie in a surface itself."""
     offset = ray_offset(lights.position[k, 0], lights.position[k, 1], lights.position[k, 2], grain)
     return max(0.0, 1.0 - STEPS - offset / far)
 
 
 @kernel
-def _toward_light(lights: LightTable, k: int, y: tuple[float, float, float]) -> tuple[float, float, float]:
+def toward_light(lights: LightTable, k: int, y: tuple[float, float, float]) -> tuple[float, float, float]:
     """Return the vector from a point to a light, of length 1 if that is infinitely far."""
     if lights.kind[k] == DIRECTIONAL:
         return -lights.direction[k, 0], -lights.direction[k, 1], -lights.direction[k, 2]

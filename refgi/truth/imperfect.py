@@ -29,6 +29,8 @@ from refgi.pairs.shadow_rays import RayReceivers, Senders
 from refgi.radiometry import orthonormal_basis
 from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.scene import Geometry
+from refgi.scene.cutouts import NO_CUT, CutFaces
+from refgi.scene.texture.alpha import is_opaque
 from refgi.settings import Settings, setting
 from refgi.stages import stage
 
@@ -97,8 +99,8 @@ def imperfect_maps(geometry: Geometry, lights: "PixelLights", settings: Imperfec
     Point k lies in the k-th of n equal shares of the area, in the order of the faces, and within its face where a
     sequence of low discrepancy has its k-th point (Roberts 2018), all shifted at random for each light; the paper draws
     points independently. A point nearer than its radius is left out: what it stands for reaches around the light.
-    Points reach both sides of faces, as surfaces do. Boxes by angle, the bias by slope and what counts as near
-    (`HORIZON`, `GRAZING`, `NEAR`) are this module's own: the paper leaves them open.
+    Points reach both sides of faces, as surfaces do; those in holes of cut-outs are left out. Boxes by angle, the bias
+    by slope and what counts as near (`HORIZON`, `GRAZING`, `NEAR`) are this module's own: the paper leaves them open.
     """
     corners, facing, upto = areas_of(geometry)
     total = float(upto[-1]) if len(upto) else 0.0
@@ -108,8 +110,8 @@ def imperfect_maps(geometry: Geometry, lights: "PixelLights", settings: Imperfec
     if total > 0:
         position, normal = (np.ascontiguousarray(one.T, np.float64) for one in (lights.position, lights.normal))
         shifts = np.stack([draws(seed, IMPERFECT_MAPS, 3, part=i) for i in range(count)]) if count else np.empty((0, 3))
-        _draw_maps(position, normal, corners, facing, upto, settings.points, shifts, radius, settings.splat,
-                   settings.levels, depth)
+        _draw_maps(position, normal, corners, facing, upto, geometry.cut or NO_CUT, settings.points, shifts, radius,
+                   settings.splat, settings.levels, depth)
     return ImperfectDepth(depth, radius, settings.bias)
 
 
@@ -129,22 +131,24 @@ def fill_hidden(maps: ImperfectDepth, to: RayReceivers, receivers: tuple[int, in
 
 
 @kernel(parallel=True)
-def _draw_maps(position: Array, normal: Array, corners: Array, facing: Array, upto: Array, points: int, shifts: Array,
-               radius: float, splat: float, levels: int, depth: Array) -> None:
+def _draw_maps(position: Array, normal: Array, corners: Array, facing: Array, upto: Array, holes: CutFaces, points: int,
+               shifts: Array, radius: float, splat: float, levels: int, depth: Array) -> None:
     for i in prange(depth.shape[0]):
-        _draw_points(position[i], normal[i], corners, facing, upto, points, shifts[i], radius, splat, depth[i])
+        _draw_points(position[i], normal[i], corners, facing, upto, holes, points, shifts[i], radius, splat, depth[i])
         if levels:
             fill_holes(depth[i], levels)
 
 
 @kernel
-def _draw_points(position: Array, normal: Array, corners: Array, facing: Array, upto: Array, points: int, shift: Array,
-                 radius: float, splat: float, depth: Array) -> None:
+def _draw_points(position: Array, normal: Array, corners: Array, facing: Array, upto: Array, holes: CutFaces,
+                 points: int, shift: Array, radius: float, splat: float, depth: Array) -> None:
     frame = np.empty((3, 3))
     fill_frame(normal, frame)
     for k in range(points):
         f = min(np.searchsorted(upto, (k + shift[0]) / points * upto[-1], side="right"), len(upto) - 1)
         a, b = math.sqrt((shift[1] + k * FIRST_STEP) % 1.0), (shift[2] + k * SECOND_STEP) % 1.0
+        if len(holes.of_face) > 0 and holes.of_face[f] >= 0 and not _is_there(holes, holes.of_face[f], a, b):
+            continue
         x, y, z, across = 0.0, 0.0, 0.0, 0.0
         for c in range(3):
             d = ((1 - a) * corners[f, 0, c] + a * (1 - b) * corners[f, 1, c] + a * b * corners[f, 2, c]) - position[c]
@@ -154,6 +158,14 @@ def _draw_points(position: Array, normal: Array, corners: Array, facing: Array, 
         if z > HORIZON * distance and distance > radius:
             wide = splat * radius * math.sqrt(abs(across) / distance)
             splat_box(x / (distance + z), y / (distance + z), distance, wide, depth)
+
+
+@kernel
+def _is_there(holes: CutFaces, k: int, a: float, b: float) -> bool:
+    """Return whether a triangle is there at the point of weights 1 - a, a (1 - b) and a b."""
+    uv = holes.uv
+    return is_opaque(holes.table, holes.mask[k], (1 - a) * uv[k, 0] + a * (1 - b) * uv[k, 2] + a * b * uv[k, 4],
+                     (1 - a) * uv[k, 1] + a * (1 - b) * uv[k, 3] + a * b * uv[k, 5])
 
 
 @kernel

@@ -15,9 +15,11 @@ import numpy.typing as npt
 
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.truth.camera_visibility import visible_vertices
-from refgi.truth.light_grid import Density, cell_centres, density_of, rays_through, stratified_sets
+from refgi.truth.light_grid import Density, cell_centres, density_of, footprint, rays_through, stratified_sets
 from refgi.truth.light_side import pick, tiles
-from refgi.truth.light_vertices import PointSets, join, trace_light_vertices
+from refgi.truth.light_vertices import PointSets, join, trace_light_vertices, with_areas
+from refgi.truth.lobe_light_side import pick_for_lobes
+from refgi.truth.lobe_receivers import subset_of
 from refgi.truth.paths import Shadows
 from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
 
@@ -32,7 +34,7 @@ def add_light_side(task: Task, words: Array, sums: Array) -> None:
     `words` (3,) uint32: the pass's random numbers: two for the light vertices, one for the picks. `sums` (3, r)
     float64: added to, W/m^2.
     """
-    sets, picks = fresh_points(task, np.random.default_rng(words[:2])), task.settings.picks
+    sets, picks = fresh_points(task, np.random.default_rng(words[:2])), task.picks
     if not len(sets.points.power):
         return
     for first, last in spans(task, picks):
@@ -61,6 +63,8 @@ def trace_vertices(task: Task, squares: list[Array], densities: tuple[Any, ...])
     for k, (light, square, density) in enumerate(zip(task.scene.lights, squares, densities, strict=True)):
         rays = rays_through(light, task.scene.geometry, square.reshape(-1, 2), per_set, density)
         part = trace_light_vertices(task.tracer, task.surfaces, task.lights, k, rays, settings.shared_bound)
+        if task.lobes is not None:
+            part = with_areas(part, light, footprint(light, task.scene.geometry, settings.light_grid)[0])
         parts.append(part if task.view is None else visible_vertices(task.tracer, task.view, part))
     return join(parts, sets, per_set)
 
@@ -72,8 +76,13 @@ def pick_points(task: Task, sets: PointSets, span: tuple[int, int], picks: int, 
     receiver's picks. Result: shadow rays, not traced, and which point each goes to.
     """
     rays, picked = shadow_batch((span[1] - span[0]) * picks), np.empty((span[1] - span[0]) * picks, np.int32)
-    pick(*sets, task.receivers, tiles(task.set_of, *span), (span[0], picks, seed, np.float32(task.tracer.grain)),
-         (rays.origin, rays.direction, rays.reach, rays.contribution, picked))
+    written = (rays.origin, rays.direction, rays.reach, rays.contribution, picked)
+    sampling = (span[0], picks, seed, np.float32(task.tracer.grain))
+    if task.lobes is None:
+        pick(*sets, task.receivers, tiles(task.set_of, *span), sampling, written)
+    else:
+        pick_for_lobes(*sets, task.receivers, task.lobes, tiles(task.set_of, *span),
+                       (*sampling, float(task.directions)), written)
     return rays, picked
 
 
@@ -83,7 +92,7 @@ def pilot(task: Task) -> tuple[Density | None, ...]:
     Result: one a light; empty for a uniform density.
     """
     lights, share = len(task.scene.lights), task.settings.uniform_share
-    if share == 1 or not task.settings.picks_per_pass or not lights or not len(task.receivers.pixel):
+    if share == 1 or not task.picks or not lights or not len(task.receivers.pixel):
         return ()
     centres = cell_centres(CELLS)
     cell = np.floor(centres * CELLS).astype(np.int64)
@@ -100,7 +109,7 @@ def _contributions(task: Task, centres: Array) -> Array:
         return np.zeros(rays)
     subset = _subset(task)
     sampled = len(subset.receivers.pixel)
-    picks = max(task.settings.picks, -(-PICKS // sampled))
+    picks = max(task.picks, -(-PICKS // sampled))
     shadows, picked = pick_points(subset, sets, (0, sampled), picks, 0)
     add_unblocked(subset, shadows, 0, picks, np.zeros((3, sampled)), task.settings.visibility)
     free = ~shadows.blocked
@@ -113,7 +122,8 @@ def _subset(task: Task) -> Task:
     count = len(task.receivers.pixel)
     chosen = np.sort(np.random.default_rng(0).choice(count, min(count, RECEIVERS), replace=False))
     receivers = RayReceivers(*(np.ascontiguousarray(field[..., chosen]) for field in task.receivers))
-    return task._replace(receivers=receivers, set_of=np.zeros(len(chosen), np.int64))
+    lobes = None if task.lobes is None else subset_of(task.lobes, chosen)
+    return task._replace(receivers=receivers, set_of=np.zeros(len(chosen), np.int64), lobes=lobes)
 
 
 def _smooth(values: Array) -> Array:

@@ -129,7 +129,7 @@ def _lobe_term(points: LightVertices, j: int, tile: Array, i: int) -> Any:
 
 
 @kernel
-def _aim(points: LightVertices, j: int, receivers: RayReceivers, r: int, grain: Any, origins: Array, directions: Array,
+def aim(points: LightVertices, j: int, receivers: RayReceivers, r: int, grain: Any, origins: Array, directions: Array,
          ray: int) -> Any:
     """Write the shadow segment to a picked point and return its reach: 1, or 0 where a face is seen from behind."""
     real = np.float32
@@ -237,7 +237,7 @@ def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array, ti
                     j += 1
                     term = _lobe_term(points, j, tile, i)
             if term > real(0):
-                reach[ray] = _aim(points, j, receivers, r, grain, origins, directions, ray)
+                reach[ray] = aim(points, j, receivers, r, grain, origins, directions, ray)
                 picked[ray] = j
                 for c in range(3):
                     contribution[ray, c] = share * points.colour[c, j]

@@ -14,7 +14,7 @@ from refgi.jit import kernel, prange
 from refgi.lobes import lobe_norm
 from refgi.radiometry import DIRECTIONAL, radiant_intensity
 from refgi.rays import MISS, Tracer
-from refgi.scene import LightTable
+from refgi.scene import DirectionalLight, Light, LightTable
 from refgi.truth.light_grid import LightRays
 from refgi.truth.paths import CHUNK, row
 from refgi.truth.surfaces import Surfaces, face_normal, height_above, shading_normal
@@ -22,6 +22,7 @@ from refgi.truth.textured import diffuse_at
 
 Array = npt.NDArray[Any]
 
+SMALLEST = 1e-12
 BLOCK = 32  # points whose contributions are summed before a pick looks inside
 
 
@@ -36,7 +37,7 @@ class LightVertices(NamedTuple):
     colour: Array  # (3, n) Phi / pi over `power`
     exponent: Array  # (n,) of cos around the axis: 1 for the diffuse part
     peak: Array  # (n,) pattern on the axis: 1, or (P + 1) / (2 K)
-    bound: Array  # (n,) largest geometry term left to the light side, 1/m^2
+    bound: Array  # (n,) largest geometry term left to the light side, 1/m^2; for lobes of receivers: `with_areas`
     ray: Array  # (n,) int32: which ray found it, counted through the lights
     lobe: Array  # (n,) bool: a lobe, not a diffuse part
 
@@ -89,6 +90,24 @@ def join(parts: list[LightVertices], sets: int, per_set: int) -> PointSets:
     points = _allocate(int(blocks[-1]) * BLOCK)
     _copy_vertices(together, bright[order], place, points)
     return PointSets(points, np.stack([blocks[:-2:2], blocks[1:-1:2], blocks[2::2]], axis=1))
+
+
+def with_areas(points: LightVertices, light: Light, measure: float) -> LightVertices:
+    """Return light vertices of one light with, in place of the bound, the area that a ray would stand for at each.
+
+    `measure`: of a ray when they are spread evenly, sr or m^2. Result: Omega d^2 / <g.l>, m^2, one of a light that the
+    face is edge-on to as large as float32 allows.
+    """
+    if isinstance(light, DirectionalLight):
+        toward, square = -np.asarray(light.direction, np.float64)[:, None], np.ones(1)
+        toward = toward / np.linalg.norm(toward)
+    else:
+        toward = np.asarray(light.position, np.float64)[:, None] - points.position
+        square = (toward**2).sum(axis=0)
+        toward = toward / np.sqrt(np.maximum(square, SMALLEST))
+    cosine = np.maximum((toward * points.facing).sum(axis=0), 0)
+    area = measure * square / np.maximum(cosine, SMALLEST)
+    return points._replace(bound=np.where(points.power > 0, area, 0).astype(np.float32))
 
 
 def _allocate(count: int) -> LightVertices:

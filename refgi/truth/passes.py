@@ -142,19 +142,19 @@ def _hemisphere(task: Task, words: Array, sums: Array) -> None:
     count = task.settings.directions_per_pass
     points, reach = scrambled_points(count, int(words[3])), _reach(task)
     for first, last in spans(task, count):
-        paths = _paths((last - first) * count)
+        paths = paths_for((last - first) * count)
         send(task.receivers, (first, last), points, int(words[3]), reach, paths)
         for bounce in range(task.settings.bounces):
             if bounce:
                 scatter(task.surfaces, task.tracer.grain, int(words[3 + bounce]), task.receivers, first, count, paths)
-            _follow(task, paths, first, count, task.settings.shared_bound if bounce == 0 else 0.0, sums)
+            follow(task, paths, first, count, task.settings.shared_bound if bounce == 0 else 0.0, sums)
 
 
-def _follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums: Array) -> None:
+def follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums: Array) -> None:
     """Trace paths to the next surface, next-event estimation there; to every surface along them without visibility."""
     while True:
         task.tracer.fill_closest(paths.origin, paths.direction, paths.reach, paths.triangle_id, paths.distance)
-        hidden = _hidden_from_camera(task, paths)
+        hidden = hidden_from_camera(task, paths)
         for k, light in enumerate(task.scene.lights):
             measure, _ = footprint(light, task.scene.geometry, task.settings.light_grid)
             shadows = shadow_batch(len(paths.reach))
@@ -169,7 +169,7 @@ def _follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums
             return
 
 
-def _hidden_from_camera(task: Task, paths: Paths) -> Array | None:
+def hidden_from_camera(task: Task, paths: Paths) -> Array | None:
     """Return which paths end at points that the camera does not see; None where that does not matter."""
     if task.view is None:
         return None
@@ -192,7 +192,8 @@ def _reach(task: Task) -> float:
     return float(np.sqrt(peak * most / bound))
 
 
-def _paths(count: int) -> Paths:
+def paths_for(count: int) -> Paths:
+    """Allocate a batch of paths."""
     origin, direction, weight = (np.empty((count, 3), np.float32) for _ in range(3))
     reach, travelled, cosine, distance = (np.empty(count, np.float32) for _ in range(4))
     return Paths(origin, direction, reach, travelled, cosine, np.empty(count, np.int32), distance, weight)

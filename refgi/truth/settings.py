@@ -84,6 +84,18 @@ class TruthSettings(Settings):
         return self.directions or (DIRECTIONS_ALONE if self.estimator == "hemisphere" else DIRECTIONS)
 
     @property
+    def lobe_samples(self) -> tuple[int, int]:
+        """Light vertices that each glossy receiver picks in a pass, and directions of its lobe.
+
+        As many as a pass has of irradiance. With both estimators and no `directions` two in three follow the lobe: a
+        sharp one has nothing else.
+        """
+        together = self.picks_per_pass + self.directions_per_pass
+        if self.estimator != "combined" or self.directions is not None:
+            return self.picks_per_pass, self.directions_per_pass
+        return together // 3, together - together // 3
+
+    @property
     def passes(self) -> int:
         """Passes that make up `samples`, at least two."""
         return max(2, -(-self.samples // (self.picks_per_pass + self.directions_per_pass)))

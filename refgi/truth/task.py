@@ -11,6 +11,7 @@ from refgi.rsm.raster.projection import Projection
 from refgi.scene import LightTable, Scene
 from refgi.truth.caustics import Film
 from refgi.truth.light_grid import Density
+from refgi.truth.lobe_receivers import Lobes
 from refgi.truth.paths import Shadows
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import Surfaces
@@ -31,6 +32,17 @@ class Task(NamedTuple):
     caustics: Film | None = None
     view: Projection | None = None  # only surfaces visible in it emit; None: all do
     densities: tuple[Density | None, ...] = ()  # of each light's rays; none: even ones
+    lobes: Lobes | None = None  # of the receivers, where their lobes and not their irradiance are asked for
+
+    @property
+    def picks(self) -> int:
+        """Light vertices that each receiver picks in a pass."""
+        return self.settings.picks_per_pass if self.lobes is None else self.settings.lobe_samples[0]
+
+    @property
+    def directions(self) -> int:
+        """Directions of each receiver in a pass."""
+        return self.settings.directions_per_pass if self.lobes is None else self.settings.lobe_samples[1]
 
 
 def sets_of(pixel: Array, width: int, side: int) -> Array:

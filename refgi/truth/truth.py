@@ -6,7 +6,7 @@ import math
 import sys
 import time
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,8 @@ from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
 from refgi.truth.checkpoint import Checkpoint
 from refgi.truth.light_pass import pilot
+from refgi.truth.lobe_pass import lobe_pass
+from refgi.truth.lobe_receivers import glossy_triangles, lobes_of, meets_photons
 from refgi.truth.passes import one_pass
 from refgi.truth.result import Moments, TruthResult, add_pass, blocks_of, no_passes, result_of, with_means
 from refgi.truth.settings import TruthSettings
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from refgi.frame import Frame
 
 Array = npt.NDArray[Any]
+Prepare = Callable[[Scene, Any, Array, Array, Array, TruthSettings], Task]
 
 STOPPING = {"samples", "seconds", "target_error", "checkpoint", "batch"}  # settings that change no pass
 MORE, MOST_SAMPLES = 4, 2**31  # samples for each one where few are switched off; as many as there may be
@@ -83,6 +86,32 @@ def trace_truth(frame: "Frame", settings: TruthSettings | None = None) -> TruthR
     return accumulate(frame.scene, frame.tracer, buffer.position, buffer.normal, buffer.triangle_id, settings)
 
 
+def trace_lobes(frame: "Frame", settings: TruthSettings | None = None) -> TruthResult:
+    """Compute by path tracing what lobes of receivers make of one-bounce light, with its standard error.
+
+    Parameters
+    ----------
+    frame : Frame
+        The view of the scene.
+    settings : TruthSettings, optional
+        How; the defaults where absent.
+
+    Returns
+    -------
+    TruthResult
+        Mean, variance of the mean and sample count of every pixel; radiance towards the eye, W/m^2/sr, and 0 where no
+        lobe reflects there. Means over blocks and picture are over pixels with a lobe.
+
+    Raises
+    ------
+    InputError
+        If the checkpoint file is damaged or of another computation.
+    """
+    buffer = frame.gbuffer
+    return accumulate_lobes(frame.scene, frame.tracer, buffer.position, buffer.normal, buffer.triangle_id,
+                            settings or TruthSettings())
+
+
 @stage("truth.accumulate")
 def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
                settings: TruthSettings) -> TruthResult:
@@ -111,31 +140,73 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
     InputError
         If the checkpoint file is damaged or of another computation.
     """
-    buffer = (position, normal, triangle_id)
+    return _averaged(_without_pilot, scene, tracer, (position, normal, triangle_id), settings)
+
+
+@stage("truth.accumulate_lobes")
+def accumulate_lobes(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
+                     settings: TruthSettings) -> TruthResult:
+    """Average independent passes of what lobes reflect towards the eye until the settings say stop.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    tracer : Tracer
+        Its rays.
+    position, normal : (3, h, w) ndarray
+        The G-buffer's, world space.
+    triangle_id : (h, w) int ndarray
+        Which triangle each pixel sees; -1 for none.
+    settings : TruthSettings
+        How and how long; a checkpoint has a file of its own, with ".lobes" behind its name.
+
+    Returns
+    -------
+    TruthResult
+        Mean, variance of the mean and sample count of every pixel, W/m^2/sr.
+
+    Raises
+    ------
+    InputError
+        If the checkpoint file is damaged or of another computation.
+    """
+    glossy = glossy_triangles(scene, position, normal, triangle_id)
+    if settings.checkpoint and not Path(settings.checkpoint).is_dir():
+        place = Path(settings.checkpoint)
+        settings = dataclasses.replace(settings, checkpoint=place.with_name(place.name + ".lobes"))
+    return _averaged(_with_lobes, scene, tracer, (position, normal, glossy), settings)
+
+
+def _averaged(prepare: Prepare, scene: Scene, tracer: Any, buffer: tuple[Array, Array, Array],
+              settings: TruthSettings) -> TruthResult:
+    shape = buffer[2].shape
     if settings.seconds is not None:
-        _warm_up(scene, tracer, buffer, settings)
+        _warm_up(prepare, scene, tracer, buffer, settings)
     started = time.perf_counter()
-    task = _without_pilot(scene, tracer, *buffer, settings)
-    block, grid = blocks_of(task.receivers.pixel, triangle_id.shape)
+    task = prepare(scene, tracer, *buffer, settings)
+    block, grid = blocks_of(task.receivers.pixel, shape)
     values = len(block) + grid[0] * grid[1] + 1
-    file = _checkpoint(Path(settings.checkpoint), _fingerprint(task, triangle_id.shape), values) \
-        if settings.checkpoint else None
+    file = _checkpoint(Path(settings.checkpoint), _fingerprint(task, shape), values) if settings.checkpoint else None
     moments = file.moments if file else no_passes(values)
     ready: Task | None = None
     while not _is_done(moments, len(block), settings, time.perf_counter() - started):
         ready = ready or task._replace(densities=pilot(task))
-        add_pass(moments, with_means(one_pass(ready, int(moments.passes)), block, grid[0] * grid[1]))
+        add_pass(moments, with_means(_pass(ready, int(moments.passes)), block, grid[0] * grid[1]))
         if file:
             file.save_when_due()
         report_progress(min(1.0, int(moments.passes) / settings.passes))
     if file:
         file.save()
-    result = result_of(moments, task.receivers.pixel, triangle_id.shape, (block, grid),
-                       settings.picks_per_pass + settings.directions_per_pass)
+    result = result_of(moments, task.receivers.pixel, shape, (block, grid), task.picks + task.directions)
     if result.lost:
         warnings.warn(RefgiWarning(f"scene {scene.name!r}: {result.lost} of {int(moments.passes) * len(block)} values "
-                                   "of a pixel in a pass are not finite numbers and left out"), stacklevel=3)
+                                   "of a pixel in a pass are not finite numbers and left out"), stacklevel=4)
     return result
+
+
+def _pass(task: Task, number: int) -> Array:
+    return one_pass(task, number) if task.lobes is None else lobe_pass(task, number)
 
 
 def _photons(scene: Scene, shape: tuple[int, ...], settings: TruthSettings) -> tuple[Film | None, float]:
@@ -152,20 +223,21 @@ def _photons(scene: Scene, shape: tuple[int, ...], settings: TruthSettings) -> t
         what = ("left out beyond the first bounce" if alone else
                 "sampled by chance, which may miss them: standard errors do not show what was never met")
         warnings.warn(RefgiWarning(f"scene {scene.name!r}: the lobes of {len(sharp)} material(s), {sharp[0]!r} first, "
-                                   f"are sharp (exponent {SHARP_LOBE:g} or more) and {what}"), stacklevel=4)
+                                   f"are sharp (exponent {SHARP_LOBE:g} or more) and {what}"), stacklevel=5)
     count = settings.photons * len(scene.lights)
     if not alone or (not sharp and left_out("truth.photons", lambda: (count, count))):
         return None, math.inf
     return film(scene, picture, SHARP_LOBE, longest=2, even_empty=not sharp), SHARP_LOBE
 
 
-def _warm_up(scene: Scene, tracer: Any, buffer: tuple[Array, Array, Array], settings: TruthSettings) -> None:
+def _warm_up(prepare: Prepare, scene: Scene, tracer: Any, buffer: tuple[Array, Array, Array],
+             settings: TruthSettings) -> None:
     """Run a pass of one pixel, so that kernels are compiled or loaded before the clock starts."""
     settings = dataclasses.replace(settings, photons=1)
     covered = np.flatnonzero(buffer[2].reshape(-1) >= 0)[:1]
     position, normal = (field.reshape(3, 1, -1)[..., covered] for field in buffer[:2])
-    task = task_of(scene, tracer, position, normal, buffer[2].reshape(1, -1)[:, covered], settings)
-    values = with_means(one_pass(task, 0), np.zeros(len(covered), np.int64), 1)
+    task = prepare(scene, tracer, position, normal, buffer[2].reshape(1, -1)[:, covered], settings)
+    values = with_means(_pass(task._replace(densities=pilot(task)), 0), np.zeros(len(covered), np.int64), 1)
     add_pass(no_passes(values.shape[1]), values)
 
 
@@ -188,6 +260,19 @@ def _without_pilot(scene: Scene, tracer: Any, position: Array, normal: Array, tr
     reflecting = surfaces(scene, left_to_photons)
     view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "visible" else None
     return Task(scene, settings, tracer, reflecting, lights_of(scene), points, set_of, caustics, view)
+
+
+def _with_lobes(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
+                settings: TruthSettings) -> Task:
+    """Return a task of lobes; `triangle_id`: as `glossy_triangles` has it."""
+    task = _without_pilot(scene, tracer, position, normal, triangle_id, settings)
+    left_to_photons = math.inf if task.caustics is None else MIRROR_EXPONENT if settings.caustics else SHARP_LOBE
+    lobes = lobes_of(scene, task.receivers.pixel, position, normal, triangle_id, left_to_photons)
+    count = settings.photons * len(scene.lights)
+    if task.caustics is not None and not settings.caustics and not meets_photons(lobes) and left_out(
+            "truth.photons", lambda: (count, count)):
+        task = task._replace(caustics=None)
+    return task._replace(lobes=lobes)
 
 
 def _checkpoint(place: Path, computation: bytes, values: int) -> Checkpoint:
@@ -214,7 +299,8 @@ def _fingerprint(task: Task, shape: tuple[int, ...]) -> bytes:
     digest = hashlib.sha256(repr((sys.modules["refgi"].__version__, shape, chosen)).encode())
     view_arrays = () if task.view is None else (task.view.origin, task.view.frame, task.view.half)
     film = () if task.caustics is None else (task.caustics.solid_angle, *task.caustics.mirrors, task.caustics.ior)
-    for array in _arrays((task.surfaces, task.lights, task.receivers, view_arrays, film)):
+    lobes = () if task.lobes is None else (*task.lobes[:3], np.array(task.lobes.photon_exponent))
+    for array in _arrays((task.surfaces, task.lights, task.receivers, view_arrays, film, lobes)):
         digest.update(repr((array.shape, array.dtype.str)).encode() + np.ascontiguousarray(array).data)
     return digest.digest()
 
@@ -246,4 +332,4 @@ APPROXIMATIONS = (
 
 METHOD = Method("truth", "one-bounce path tracing with a standard error for every pixel", truth, TruthSettings,
                 visibility=lambda settings: settings.visibility, estimate=trace_truth,
-                approximations=APPROXIMATIONS)
+                approximations=APPROXIMATIONS, lobe_estimate=trace_lobes)

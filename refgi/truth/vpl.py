@@ -13,12 +13,13 @@ import numpy.typing as npt
 
 from refgi.method import Approximation, Extent, Method
 from refgi.pairs.settings import LAST_SEED
-from refgi.pairs.shadow_rays import BATCH, receivers, shadowed_sum
+from refgi.pairs.shadow_rays import BATCH, Hidden, receivers, shadowed_sum
 from refgi.settings import Settings, setting
 from refgi.truth.imperfect import Imperfect, fill_hidden, imperfect_maps
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
+    from refgi.lights import PixelLights
 
 Array = npt.NDArray[Any]
 
@@ -70,15 +71,8 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     (3, h, w) ndarray
         Indirect irradiance in the frame's dtype, W/m^2, linear RGB. Excludes the receiver's albedo/pi.
     """
-    from refgi.lights import choose_pixel_lights
-
     settings = settings or VplSettings()
-    chosen = settings.lights
-    lights = choose_pixel_lights(frame.rsms, count=None if chosen.pattern == "all" else chosen.count,
-                                 pattern=chosen.pattern, seed=chosen.seed, filtered=chosen.filtered)
-    hidden = None
-    if settings.visibility and settings.maps is not None:
-        hidden = partial(fill_hidden, imperfect_maps(frame.scene.geometry, lights, settings.maps, chosen.seed))
+    lights, hidden = _lights(frame, settings)
     buffer = frame.gbuffer
     points = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id,
                        frame.tracer.grain)
@@ -88,6 +82,46 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
                                                               visibility=settings.visibility, batch=settings.batch,
                                                               hidden=hidden)
     return irradiance
+
+
+def vpl_lobes(frame: "Frame", settings: VplSettings) -> Array:
+    """Sum pixel lights at every glossy pixel's lobe, with a shadow ray or an imperfect shadow map for each pair.
+
+    Parameters
+    ----------
+    frame : Frame
+        The view of the scene.
+    settings : VplSettings
+        Which lights.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Radiance towards the eye in the frame's dtype, W/m^2/sr, linear RGB; 0 where there is no lobe.
+    """
+    from refgi.pairs.glossy_rays import shadowed_radiance
+    from refgi.rsm.buffers.glossy import spread_over_picture
+
+    lights, hidden = _lights(frame, settings)
+    points = frame.glossy_points
+    to = receivers(frame.scene.geometry, points.position, points.normal,
+                   frame.gbuffer.triangle_id.reshape(-1)[points.pixel], frame.tracer.grain)
+    radiance = shadowed_radiance(frame.tracer, to, points, lights, visibility=settings.visibility,
+                                 batch=settings.batch, hidden=hidden)
+    return spread_over_picture(points, radiance, (frame.height, frame.width))
+
+
+def _lights(frame: "Frame", settings: VplSettings) -> "tuple[PixelLights, Hidden | None]":
+    """Return pixel lights, and what hides them in place of rays where that are maps."""
+    from refgi.lights import choose_pixel_lights
+
+    chosen = settings.lights
+    lights = choose_pixel_lights(frame.rsms, count=None if chosen.pattern == "all" else chosen.count,
+                                 pattern=chosen.pattern, seed=chosen.seed, filtered=chosen.filtered)
+    hidden = None
+    if settings.visibility and settings.maps is not None:
+        hidden = partial(fill_hidden, imperfect_maps(frame.scene.geometry, lights, settings.maps, chosen.seed))
+    return lights, hidden
 
 
 def _every_texel(settings: VplSettings, _: Mapping[str, Any]) -> VplSettings:
@@ -115,4 +149,5 @@ def _map_bytes(settings: VplSettings, extent: Extent) -> int:
 
 
 METHOD = Method("vpl", "the same pixel lights with visibility by rays or imperfect shadow maps", vpl, VplSettings,
-                visibility=lambda settings: settings.visibility, memory=_map_bytes, approximations=APPROXIMATIONS)
+                visibility=lambda settings: settings.visibility, memory=_map_bytes, approximations=APPROXIMATIONS,
+                lobes=vpl_lobes)

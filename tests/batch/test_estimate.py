@@ -36,13 +36,13 @@ def test_time_grows_with_the_pixels_and_counts_every_run(tmp_path, monkeypatch):
         def run(frame, _):
             clock.now += fixed + slope * frame.width * frame.height
 
-        return SimpleNamespace(function=run)
+        return SimpleNamespace(made=run)
 
     def refusing(*_):
         raise InputError("refused")
 
     jobs = jobs_of(plan)
-    methods = {"sii": method(2.0, 1e-4), "gather": SimpleNamespace(function=refusing), "truth": method(0.5, 1e-3)}
+    methods = {"sii": method(2.0, 1e-4), "gather": SimpleNamespace(made=refusing), "truth": method(0.5, 1e-3)}
     monkeypatch.setattr(module, "METHODS", methods)
     monkeypatch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: clock.now))
     found = estimate(jobs, Common(tmp_path, tmp_path, plan.truth, 32), lambda *_: None)

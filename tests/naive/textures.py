@@ -1,5 +1,6 @@
 """Slow literal twins of texture look-ups: one texel after another, from the definitions on the page of scenes."""
 
+import functools
 import math
 
 import numpy as np
@@ -56,11 +57,18 @@ def halved(image):
     return result
 
 
-def footprint(image, wrap, place, longest):
-    """Mean of probes in the middle of equal parts of the parallelogram, each between the two levels around its size."""
-    levels = [image.astype(np.float64)]
+@functools.cache
+def pyramid(texels, shape):
+    """The image, then each next level down to one texel."""
+    levels = [np.frombuffer(texels).reshape(shape)]
     while levels[-1].shape[:2] != (1, 1):
         levels.append(halved(levels[-1]))
+    return levels
+
+
+def footprint(image, wrap, place, longest):
+    """Mean of probes in the middle of equal parts of the parallelogram, each between the two levels around its size."""
+    levels = pyramid(image.astype(np.float64).tobytes(), image.shape)
     u, v, ux, vx, uy, vy = place
     height, width = image.shape[:2]
     a, b = math.hypot(ux * width, vx * height), math.hypot(uy * width, vy * height)

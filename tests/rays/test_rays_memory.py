@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import textwrap
+from types import SimpleNamespace
 
 import pytest
 
@@ -68,13 +69,15 @@ class Failing:
         return call
 
 
-CALLS = ["rtcNewDevice", "rtcNewScene", "rtcNewGeometry", "rtcSetSharedGeometryBuffer", "rtcCommitGeometry",
+CALLS = ["rtcNewDevice", "rtcNewScene", "rtcNewGeometry", "rtcSetSharedGeometryBuffer", "rtcSetGeometryUserData",
+         "rtcSetGeometryIntersectFilterFunction", "rtcSetGeometryOccludedFilterFunction", "rtcCommitGeometry",
          "rtcAttachGeometry", "rtcCommitScene"]
 
 
 def build(library):
     vertices, faces = embree._padded(embree.np.zeros((3, 3)), "f4"), embree._padded(embree.np.arange(3), "u4")
-    return embree._build(library, vertices, faces, 3, 1)
+    cut = SimpleNamespace(record=1, function=2)
+    return embree._build(library, vertices, 3, [embree._Mesh(faces, 1, cut)])
 
 
 @pytest.mark.parametrize("name", CALLS)

@@ -18,8 +18,8 @@ from refgi.scene.builtin.stage import vase
 from refgi.scene.builtin.surfaces import ring_surface, sphere
 from refgi.scene.model import Material, Mesh
 
-NAMES = ("cornell_box", "cornell_sphere", "atrium", "textured_atrium", "integrating_sphere", "wedge", "parallel_plates",
-         "ring", "glass_ball", "metaballs", "stage")
+NAMES = ("cornell_box", "cornell_sphere", "atrium", "textured_atrium", "leaf_grid", "integrating_sphere", "wedge",
+         "parallel_plates", "ring", "glass_ball", "metaballs", "stage")
 FACE_SHARE = 0.05  # grids have whole rows and columns
 SMALL_FACE_SHARE = 0.1  # ... of which a form of a hundred faces has few
 

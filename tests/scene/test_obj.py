@@ -87,7 +87,7 @@ def test_textures_are_passed_over_with_a_count_and_those_that_are_missing_named(
     with pytest.warns(RefgiWarning) as said:
         read_obj(written(tmp_path, "mtllib m.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\nmtllib m.mtl\n"))
     assert [str(warning.message) for warning in said] == [
-        f"{tmp_path / 'm.mtl'}: 3 texture(s) (bump, map_Ka, map_Ks) passed over; "
+        f"{tmp_path / 'm.mtl'}: 3 texture(s) (bump, map_Ka, map_Ks) passed over (shading normals stay the mesh's); "
         "2 of them name no file: absent bump.png, gone.png"]
 
 

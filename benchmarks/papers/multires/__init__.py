@@ -9,6 +9,7 @@ from functools import partial
 
 from benchmarks.papers.multires.error import beside_path_tracing, edges, surface_detail
 from benchmarks.papers.multires.rates import by_lights, by_scene, by_threshold
+from benchmarks.papers.multires.receivers import glossy_receivers
 from benchmarks.papers.multires.speed import error_over_speed, flight
 from benchmarks.papers.multires.subjects import BUDDHA, BUNNIES, DRAGON, TEAPOT
 from benchmarks.papers.multires.subsplats import of_each_light, passes, upsampling
@@ -19,6 +20,11 @@ FIGURES = (
           "An initial set of 16² subsplats, refined pass by pass at discontinuities of depth and normal; those that a "
           "pass leaves as they are, in grey scale, and the combined result after six passes.", columns=5,
           make=partial(passes, scene=DRAGON)),
+    Entry("fig6", "Figure 6", "A body with a Phong BRDF",
+          "Indirect light from and on a Buddha with a Phong BRDF, subsplats refined separately for each light; very "
+          "sharp highlights may go undetected (Sec. 3.3.1).", columns=5,
+          make=partial(glossy_receivers, scene=BUDDHA, exponents=(10.0, 100.0, 1000.0, 10000.0),
+                       thresholds=(0.05, 0.01))),
     Entry("fig7", "Figure 7", "Upsampling",
           "Nearest neighbour shows blocks, bilinear interpolation of each level by itself halos and rings.", columns=5,
           make=partial(upsampling, scene=DRAGON, ways={

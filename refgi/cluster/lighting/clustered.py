@@ -122,7 +122,7 @@ def clustered_irradiance(
     if by_tiles:
         _add_by_tiles(tiles, members, areas, maps, settings, sums)
     else:
-        _add_by_lists(tiles, parts, members, _visibility(areas, maps, settings, visibility_of, rays), sums)
+        _add_by_lists(tiles, parts, members, visibility_by(areas, maps, settings, visibility_of, rays), sums)
     result = np.zeros(np.shape(receivers.position), sums.dtype)
     scatter_pixels(sums, parts, sums.dtype.type(interleaving**2), result.reshape(3, -1))
     clear(result, covered, shown)
@@ -240,14 +240,14 @@ def _add_by_lists(
             add_unshadowed(tiles, packed.diffuse, packed.clamp, start, part)
         else:
             add_members(tiles.position, tiles.normal, parts, members, m, part)
-        places = _places_with_light(part)
+        places = places_with_light(part)
         if len(places):
             visible = visibility_of(m, tiles.position[:, places], tiles.facing[:, places])
             sums[:, places] += part[:, places] * np.asarray(visible, sums.dtype)
         report_progress((m + 1) / len(members.start))
 
 
-def _places_with_light(part: Array) -> Array:
+def places_with_light(part: Array) -> Array:
     """Return the receivers that have light of one area light (3, n); without the skip all."""
     with_light: Array = np.asarray(part.any(axis=0))
     if left_out("cluster.receivers", lambda: (len(with_light) - np.count_nonzero(with_light), len(with_light))):
@@ -255,7 +255,7 @@ def _places_with_light(part: Array) -> Array:
     return np.arange(len(with_light))
 
 
-def _visibility(
+def visibility_by(
     areas: AreaLights, maps: "ShadowMaps | None", settings: "ValSettings", visibility_of: VisibilityFunction | None,
     rays: "Tracer | None",
 ) -> VisibilityFunction:

@@ -222,7 +222,8 @@ def add_members(
         W/m^2; zeros, which are filled.
     """
     for subset, (first, last) in enumerate(zip(parts.start[:-1], parts.start[1:], strict=True)):
-        some = _some(members.packed, members.start[m, subset : subset + 2], members.lobe_start[m, subset : subset + 2])
+        ends = slice(subset, subset + 2)
+        some = some_lights(members.packed, members.start[m, ends], members.lobe_start[m, ends])
         if first < last and (some.diffuse.shape[1] > 1 or some.lobes is not None):
             here, facing = (np.ascontiguousarray(values[:, first:last]) for values in (position, normal))
             sums = np.zeros_like(here)
@@ -245,8 +246,8 @@ def _lobes(lobes: PackedLobes, chosen: Array) -> PackedLobes:
     return PackedLobes(np.ascontiguousarray(lobes.lights[:, chosen]), clamp, widening)
 
 
-def _some(packed: Packed, diffuse: Array, lobes: Array) -> Packed:
-    """Return the lights from one place to another."""
+def some_lights(packed: Packed, diffuse: Array, lobes: Array) -> Packed:
+    """Return the lights from one place to another: (first, one past the last) of the diffuse ones and of the lobes."""
     chosen = np.arange(*diffuse)
     with_black = np.append(chosen, packed.diffuse.shape[1] - 1)
     glossy = np.arange(*lobes)

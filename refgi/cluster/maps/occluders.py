@@ -5,6 +5,7 @@ between them at an end of it at most. Floors, walls and ceilings of a closed roo
 most of what a map shows; so is whatever lies outside of the room.
 """
 
+import dataclasses
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,8 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.buffers.extent import Extent
+from refgi.rsm.raster.depth_maps import whole_chunks
+from refgi.rsm.raster.paraboloid import CutChunks, cut_chunks
 from refgi.rsm.raster.triangle import Chunks, chunks
 from refgi.scene.model import Geometry
 from refgi.stages import stage
@@ -36,7 +39,16 @@ class Blockers(NamedTuple):
 
     vertices: Array  # (n, 3) float64, m
     faces: Array  # (m, 3) int32
-    chunks: Chunks  # the same, as maps are drawn from
+    chunks: Chunks  # those without holes, as maps are drawn from
+    cut: CutChunks | None = None  # those that may have holes
+    shape: Geometry | None = None  # all of them, for rays; None where none has holes
+
+    def geometry(self, chosen: Array) -> Geometry:
+        """Return those that are `chosen` (m,), bool, for rays."""
+        if self.shape is None:
+            faces = self.faces[chosen]
+            return Geometry(self.vertices, faces, np.zeros(len(faces), np.int32))
+        return self.shape.selected(chosen)
 
 
 class Ends(NamedTuple):
@@ -146,7 +158,10 @@ def selected_blockers(geometry: Geometry, chosen: Array) -> Blockers:
     used = _used(len(geometry.vertices), selected)
     vertices = np.ascontiguousarray(geometry.vertices[used], np.float64)
     faces = np.ascontiguousarray((np.cumsum(used) - 1)[selected], np.int32)
-    return Blockers(vertices, faces, chunks(vertices, faces))
+    if geometry.cut is None:
+        return Blockers(vertices, faces, chunks(vertices, faces))
+    shape = dataclasses.replace(geometry.selected(chosen), vertices=vertices, faces=faces, vertex_normals=None)
+    return Blockers(vertices, faces, whole_chunks(shape), cut_chunks(shape), shape)
 
 
 def _used(count: int, faces: Array) -> Array:

@@ -96,10 +96,8 @@ def _select(drawn: Blockers, projection: Projection, m: int, ignored: Ignored) -
 
 def _tracer(drawn: Blockers, selected: Array) -> "Tracer":
     from refgi.rays import Tracer
-    from refgi.scene import Geometry
 
-    faces = drawn.faces[selected]
-    return Tracer(Geometry(drawn.vertices, faces, np.zeros(len(faces), np.int32)))
+    return Tracer(drawn.geometry(selected))
 
 
 class ShadowMaps(NamedTuple):
@@ -234,4 +232,4 @@ def draw_maps(
     ignored = Ignored(radius if rule == "planes" else none, radius if rule == "ball" else none)
     if settings.renderer == "rays":
         return traced_maps(projection, drawn, ignored, dtype, tracer)
-    return distance_maps(projection, drawn.chunks, dtype, ignored)
+    return distance_maps(projection, drawn.chunks, dtype, ignored, drawn.cut)

@@ -15,7 +15,6 @@ from refgi.cluster.maps.occluders import Blockers, Ends, blockers
 from refgi.cluster.settings import ShadowMapSettings
 from refgi.rays import Tracer
 from refgi.sampling import halton
-from refgi.scene.model import Geometry
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -209,8 +208,7 @@ def tracer_without_near(
     corner = drawn.vertices[drawn.faces] - areas.center[:, m]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     height = np.abs((normal * corner[:, 0]).sum(axis=1))
-    faces = drawn.faces[height >= distance * np.linalg.norm(normal, axis=1)]
-    return Tracer(Geometry(drawn.vertices, faces, np.zeros(len(faces), np.int32)))
+    return Tracer(drawn.geometry(height >= distance * np.linalg.norm(normal, axis=1)))
 
 
 def _even(count: int) -> Array:

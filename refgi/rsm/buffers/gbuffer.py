@@ -111,6 +111,17 @@ class GBuffer:
         return self.resolve("albedo")[0]
 
     @property
+    def emission(self) -> Array:
+        """Radiance that the surface emits, (3, h, w), W/m^2/sr."""
+        if "emission" not in self._channels:
+            emission, materials = self._materials.emission.astype(self.dtype, copy=False), self._materials
+            emitted = np.moveaxis(np.append(emission, np.zeros((1, 3), self.dtype), axis=0)[self.material_id], -1, 0)
+            self._channels["emission"] = np.ascontiguousarray(emitted)
+            paint(self._geometry, materials._replace(diffuse=emission, textures=materials.emissive), self.projection,
+                  self.triangle_id, self._channels["emission"])
+        return self._channels["emission"]
+
+    @property
     def material_id(self) -> Array:
         """Visible material, (h, w) int32, -1 for none."""
         return self.resolve("material_id")[0]

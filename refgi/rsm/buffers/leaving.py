@@ -1,4 +1,7 @@
-"""Radiance that leaves towards the camera, the picture: L = L_e + albedo/pi E."""
+"""Radiance that leaves towards the camera, the picture: L = L_e + albedo/pi E.
+
+L_e is a material's emission, times its texture's mean over the pixel.
+"""
 
 from typing import Any
 
@@ -38,8 +41,10 @@ def leaving_radiance(irradiance: Array, extra: Array | None, buffer: GBuffer, ma
     emits = bool(materials.emission.any())
     material_id = buffer.material_id if emits else NONE
     _reflect(irradiance, irradiance if extra is None else extra, extra is not None, buffer.albedo, radiance)
-    if emits:
+    if emits and materials.emissive is None:
         _emit(materials.emission, material_id, radiance)
+    elif emits:
+        radiance += buffer.emission
     return radiance
 
 

@@ -69,31 +69,31 @@ def draw(corners: Array, faces: Array, part: Part, width: int, keys: Array) -> N
     setup = np.zeros(ROWS * BATCH)
     for base in range(part.start, part.stop, BATCH):
         count = min(BATCH, part.stop - base)
-        _gather(corners, faces, members, base, count, setup)
-        _set_up(setup, width)
+        gather(corners, faces, members, base, count, setup)
+        set_up(setup, width)
         for b in range(count):
             face = members[base + b]
-            earliness, nearest = EMPTY - np.int64(face), _key(setup[LIMIT + b], EMPTY)
+            earliness, nearest = EMPTY - np.int64(face), key_of(setup[LIMIT + b], EMPTY)
             a0, b0, c0, t0 = setup[b], setup[BATCH + b], setup[2 * BATCH + b], setup[3 * BATCH + b]
             a1, b1, c1, t1 = setup[4 * BATCH + b], setup[5 * BATCH + b], setup[6 * BATCH + b], setup[7 * BATCH + b]
             a2, b2, c2, t2 = setup[8 * BATCH + b], setup[9 * BATCH + b], setup[10 * BATCH + b], setup[11 * BATCH + b]
             an, bn, cn = setup[12 * BATCH + b], setup[13 * BATCH + b], setup[14 * BATCH + b]
             place_of_box = face - part.base
-            left, right = _integer(boxes[place_of_box, 0]), _integer(boxes[place_of_box, 1])
-            upper, lower = _integer(boxes[place_of_box, 2]), _integer(boxes[place_of_box, 3])
+            left, right = integer(boxes[place_of_box, 0]), integer(boxes[place_of_box, 1])
+            upper, lower = integer(boxes[place_of_box, 2]), integer(boxes[place_of_box, 3])
             for row in range(max(upper, part.top), min(lower, part.bottom) + 1):
                 y = row + 0.5
                 r0, r1, r2, rn = b0 * y + c0, b1 * y + c1, b2 * y + c2, bn * y + cn
                 first, last = left, right
                 if last - first > SPAN_CUT:
-                    first, last = _cut(first, last, a0, r0)
-                    first, last = _cut(first, last, a1, r1)
-                    first, last = _cut(first, last, a2, r2)
+                    first, last = shorten(first, last, a0, r0)
+                    first, last = shorten(first, last, a1, r1)
+                    first, last = shorten(first, last, a2, r2)
                 place, x0 = np.uint64((row - part.top) * stride + first), first + 0.5
                 # a multiple of LANES is SIMD code without a rest; lanes outside the triangle fail by themselves
                 for lane in range((last - first + LANES) & -LANES):
                     at, x = place + np.uint64(lane), x0 + np.int32(lane)
-                    key, before = _key(an * x + rn, earliness), keys[at]
+                    key, before = key_of(an * x + rn, earliness), keys[at]
                     inside = (a0 * x + r0 >= t0) & (a1 * x + r1 >= t1) & (a2 * x + r2 >= t2)
                     keys[at] = key if inside & (key <= nearest) & (key > before) else before
 
@@ -111,7 +111,7 @@ def unpack(keys: Array, width: int, top: int, bottom: int, nearness: Array, ids:
 
 
 @kernel
-def _key(near: float, earliness: Any) -> Any:
+def key_of(near: float, earliness: Any) -> Any:
     """Return a number that is greater for the nearer triangle, then for the earlier one; negative behind the eye.
 
     Nearness is rounded to float32, of which positive numbers have the order of their bits.
@@ -121,7 +121,7 @@ def _key(near: float, earliness: Any) -> Any:
 
 
 @kernel
-def _gather(corners: Array, faces: Array, members: Array, base: int, count: int, setup: Array) -> None:
+def gather(corners: Array, faces: Array, members: Array, base: int, count: int, setup: Array) -> None:
     """Write the corners of some triangles: loads that wait for memory, many under way at once."""
     for b in range(count):
         face = members[base + b]
@@ -133,7 +133,7 @@ def _gather(corners: Array, faces: Array, members: Array, base: int, count: int,
 
 
 @kernel
-def _set_up(setup: Array, width: int) -> None:
+def set_up(setup: Array, width: int) -> None:
     """Write edges, plane of nearness and limit of a batch from its corners, in SIMD lanes."""
     for b in range(BATCH):
         at = CORNERS + b
@@ -165,13 +165,13 @@ def _size(x: float, y: float, w: float, width: int) -> float:
 
 
 @kernel
-def _integer(side: Any) -> Any:
+def integer(side: Any) -> Any:
     """Widen a side of a box: 16-bit and signed integers together would become floats."""
     return np.int64(side)
 
 
 @kernel
-def _cut(first: int, last: int, a: float, r: float) -> tuple[int, int]:
+def shorten(first: int, last: int, a: float, r: float) -> tuple[int, int]:
     """Shorten a span to where a x + r may be >= 0, with a texel to spare."""
     if a == 0.0:
         return (first, last) if r >= 0.0 else (first, first - 1)

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.rsm.pool import plane
-from refgi.rsm.raster.paraboloid import BLOCK, Ignored, draw_distances
+from refgi.rsm.raster.paraboloid import BLOCK, CutChunks, Ignored, cut_chunks, draw_distances
 from refgi.rsm.raster.projection import Projection, paraboloid_projection
 from refgi.rsm.raster.triangle import Chunks, chunks
 from refgi.scene.model import Geometry
@@ -51,21 +51,30 @@ def paraboloid_depth_maps(
     expect(len(centers) == len(axes), "axes", f"{len(centers)} as many as centres", len(axes))
     expect(bool(np.isfinite(centers).all()), "centers", "finite coordinates", centers)
     expect(bool(np.isfinite(axes).all() and axes.any(axis=1).all()), "axes", "finite vectors, not zero", axes)
-    triangles = chunks(geometry.vertices, geometry.faces)
-    return distance_maps(paraboloid_projection(centers, axes, size), triangles, dtype)[0]
+    projection = paraboloid_projection(centers, axes, size)
+    return distance_maps(projection, whole_chunks(geometry), dtype, cut=cut_chunks(geometry))[0]
+
+
+def whole_chunks(geometry: Geometry) -> Chunks:
+    """Group the triangles that have no holes in chunks."""
+    faces = geometry.faces if geometry.cut is None else np.delete(geometry.faces, geometry.cut.face, axis=0)
+    return chunks(geometry.vertices, faces)
 
 
 def distance_maps(
-    projection: Projection, triangles: Chunks, dtype: npt.DTypeLike, ignored: Ignored | None = None
+    projection: Projection, triangles: Chunks, dtype: npt.DTypeLike, ignored: Ignored | None = None,
+    cut: CutChunks | None = None,
 ) -> tuple[Array, Array, Array]:
     """Measure the distance to the nearest of some triangles on paraboloid maps.
 
     `projection`: k paraboloid maps of n x n texels. `ignored`: what lies too near the centres to count; nothing where
-    absent. Returns `distance` (k, n, n): distance, m; inf without surface and outside the disc. `nearest` (k,):
-    float64: smallest distance on each map, m; inf where nothing is. `left_out` (k,): int64: triangles that reach into
-    each map's hemisphere and are ignored for their planes or lie in its ball.
+    absent. `cut`: further triangles, that may have holes. Returns `distance` (k, n, n): distance, m; inf without
+    surface and outside the disc. `nearest` (k,): float64: smallest distance on each map, m; inf where nothing is.
+    `left_out` (k,): int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in
+    its ball.
     """
     n, none = projection.width, np.zeros(projection.maps)
     distance = plane((projection.maps * n, max(n, BLOCK)), dtype)
-    found = draw_distances(projection, triangles, ignored or Ignored(none, none), numba.get_num_threads(), distance)
+    workers = numba.get_num_threads()
+    found = draw_distances(projection, triangles, ignored or Ignored(none, none), workers, distance, cut)
     return np.ascontiguousarray(distance[:, :n]).reshape(-1, n, n), *found

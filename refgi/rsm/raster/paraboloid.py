@@ -35,6 +35,8 @@ from refgi.rsm.raster.paraboloid_batch import (
 )
 from refgi.rsm.raster.projection import Projection
 from refgi.rsm.raster.triangle import CHUNK, SPAN_CUT, Chunks, chunks
+from refgi.scene.cutouts import CutFaces
+from refgi.scene.model import Geometry
 
 Array = npt.NDArray[Any]
 
@@ -49,23 +51,38 @@ class Ignored(NamedTuple):
     ball: Array  # (k,) float64, m: surfaces nearer than this, as if cut away
 
 
+class CutChunks(NamedTuple):
+    """Triangles that may have holes."""
+
+    chunks: Chunks
+    holes: CutFaces
+
+
+def cut_chunks(geometry: Geometry) -> CutChunks | None:
+    """Group the triangles that may have holes in chunks, None where there are none."""
+    holes = geometry.cut
+    return None if holes is None else CutChunks(chunks(geometry.vertices, geometry.faces[holes.face]), holes)
+
+
 def draw_paraboloids(
-    projection: Projection, vertices: Array, faces: Array, workers: int, nearness: Array, ids: Array
+    projection: Projection, vertices: Array, faces: Array, workers: int, nearness: Array, ids: Array,
+    cut: CutChunks | None = None,
 ) -> None:
     """Draw triangles on every paraboloid map, inside the hemisphere's disc.
 
     `vertices` (n, 3): world space, m. `faces` (m, 3): vertices of each triangle. `workers`: threads; maps are assigned
     to them round-robin. `nearness` (H, max(W, BLOCK)): float32, receives 1/tau; 0 where nothing is. `ids` (H, max(W,
-    BLOCK)): int32, receives the triangle's id.
+    BLOCK)): int32, receives the triangle's id. `cut`: those that may have holes, which `faces` show nothing of.
     """
     triangles, none = chunks(vertices, faces), np.zeros(projection.maps)
     scratch = np.zeros((workers, 1, nearness.shape[1]), np.int32)
     left_out = np.zeros(projection.maps, np.int64)
-    _draw_maps(projection, triangles, Ignored(none, none), nearness, ids, scratch, left_out, none)
+    _draw(projection, triangles, cut, Ignored(none, none), nearness, ids, scratch, left_out, none)
 
 
 def draw_distances(
-    projection: Projection, triangles: Chunks, ignored: Ignored, workers: int, distance: Array
+    projection: Projection, triangles: Chunks, ignored: Ignored, workers: int, distance: Array,
+    cut: CutChunks | None = None,
 ) -> tuple[Array, Array]:
     """Draw triangles on every paraboloid map and turn nearness into distance.
 
@@ -73,12 +90,24 @@ def draw_distances(
     `distance` (H, max(W, BLOCK)): float32 or float64, of any content; receives the distance, m, inf where nothing is
     and outside the disc. Returns `nearest` (k,): float64: smallest distance on each map, m; inf where nothing is.
     `left_out` (k,): int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in
-    its ball.
+    its ball. `cut`: further triangles, that may have holes.
     """
     left_out, nearest = np.zeros(projection.maps, np.int64), np.full(projection.maps, np.inf)
     scratch = np.zeros((workers, projection.height, distance.shape[1]), np.int32)
-    _draw_maps(projection, triangles, ignored, distance, scratch[0, :0], scratch, left_out, nearest)
+    _draw(projection, triangles, cut, ignored, distance, scratch[0, :0], scratch, left_out, nearest)
     return nearest, left_out
+
+
+def _draw(
+    projection: Projection, triangles: Chunks, cut: CutChunks | None, ignored: Ignored, nearness: Array, ids: Array,
+    scratch: Array, left_out: Array, nearest: Array,
+) -> None:
+    if cut is None:
+        _draw_maps(projection, triangles, ignored, nearness, ids, scratch, left_out, nearest)
+    else:
+        from refgi.rsm.raster.paraboloid_cutouts import draw_maps
+
+        draw_maps(projection, triangles, cut, ignored, nearness, ids, scratch, left_out, nearest)
 
 
 @kernel(parallel=True)
@@ -95,15 +124,16 @@ def _draw_maps(
             map_nearness, map_ids = nearness[first:last], ids[first:last] if with_ids else scratch[worker]
             map_nearness[:] = 0
             limits = 1.0 / (ignored.planes[m] * ignored.planes[m]), ignored.ball[m]
-            left_out[m] = _draw(projection, m, corners, box, limits, setup, map_nearness, map_ids)
+            left_out[m] = draw(projection, m, corners, box, limits, setup, map_nearness, map_ids)
             if with_ids:
-                _clear_outside_disc(projection, map_nearness, map_ids)
+                clear_outside_disc(projection, map_nearness, map_ids)
             else:
-                nearest[m] = _to_distance(projection, map_nearness)
+                nearest[m] = to_distance(projection, map_nearness)
 
 
 @kernel
-def _clear_outside_disc(projection: Projection, nearness: Array, ids: Array) -> None:
+def clear_outside_disc(projection: Projection, nearness: Array, ids: Array) -> None:
+    """Empty the texels beyond the hemisphere."""
     n, half = projection.width, projection.half[0]
     step = 2.0 * half / n
     for row in range(n):
@@ -116,7 +146,7 @@ def _clear_outside_disc(projection: Projection, nearness: Array, ids: Array) -> 
 
 
 @kernel
-def _to_distance(projection: Projection, nearness: Array) -> float:
+def to_distance(projection: Projection, nearness: Array) -> float:
     """Turn nearness into distance, inf outside the disc, and return the smallest."""
     n, half, least = projection.width, projection.half[0], np.inf
     step, real = 2.0 * half / n, nearness.dtype.type
@@ -133,7 +163,7 @@ def _to_distance(projection: Projection, nearness: Array) -> float:
 
 
 @kernel
-def _draw(
+def draw(
     projection: Projection, m: int, corners: Array, box: Array, limits: tuple[float, float], setup: Array,
     nearness: Array, ids: Array,
 ) -> int:
@@ -176,9 +206,9 @@ def _draw(
                 rn = 2.0 * t * yn + rest * zn
                 line, left, right, length = np.uint64(row), first, last, 1.0 + t * t
                 if last - first > SPAN_CUT:
-                    left, right = _cut(left, right, x0, z0, r0, step, 0.5 * (n - 1))
-                    left, right = _cut(left, right, x1, z1, r1, step, 0.5 * (n - 1))
-                    left, right = _cut(left, right, x2, z2, r2, step, 0.5 * (n - 1))
+                    left, right = shorten(left, right, x0, z0, r0, step, 0.5 * (n - 1))
+                    left, right = shorten(left, right, x1, z1, r1, step, 0.5 * (n - 1))
+                    left, right = shorten(left, right, x2, z2, r2, step, 0.5 * (n - 1))
                 for block in range((right - left + BLOCK) // BLOCK):
                     start = min(left + block * BLOCK, width - BLOCK)
                     place_0, centre = np.uint64(start), start + 0.5
@@ -199,7 +229,7 @@ def _draw(
 
 
 @kernel
-def _cut(
+def shorten(
     first: int, last: int, nx: float, nz: float, rest: float, step: float, middle: float
 ) -> tuple[int, int]:
     """Shorten a span to where -n_z s^2 + 2 n_x s + rest may be >= 0, with a texel to spare."""

@@ -14,9 +14,10 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
+from refgi.rsm.raster import cutouts
 from refgi.rsm.raster.batch import EMPTY, Part, draw, unpack
 from refgi.rsm.raster.paraboloid import BLOCK as PARABOLOID_BLOCK
-from refgi.rsm.raster.paraboloid import draw_paraboloids
+from refgi.rsm.raster.paraboloid import cut_chunks, draw_paraboloids
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.rsm.raster.triangle import LANES, bound_triangles, project_vertices
 from refgi.scene.model import Geometry
@@ -75,24 +76,36 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     Notes
     -----
     A centre on an edge belongs to one of the two triangles that share it, never to both or none. Paraboloid maps are
-    drawn inside the inscribed circle of the hemisphere only.
+    drawn inside the inscribed circle of the hemisphere only. A triangle with holes is seen where its mask says that it
+    is there, at the texel's centre.
     """
-    vertices, faces = geometry.vertices, geometry.faces
+    vertices, faces, holes = geometry.vertices, geometry.without_cut, geometry.cut
     height, width = projection.shape
     columns = max(width, PARABOLOID_BLOCK) if projection.kind == PARABOLOID else width
     visibility = Visibility(plane((height, columns), np.int32), plane((height, columns), np.float32))
     workers = numba.get_num_threads()
     if projection.kind == PARABOLOID:
         _clear(visibility.triangle_id, visibility.inverse_depth)
-        draw_paraboloids(projection, vertices, faces, workers, visibility.inverse_depth, visibility.triangle_id)
+        draw_paraboloids(projection, vertices, faces, workers, visibility.inverse_depth, visibility.triangle_id,
+                         cut_chunks(geometry))
     elif projection.maps > 1:
-        _draw_maps(projection, vertices, faces, scratch(workers, len(vertices), projection), visibility)
+        own = scratch(workers, len(vertices), projection)
+        if holes is None:
+            _draw_maps(projection, vertices, faces, own, visibility)
+        else:
+            cutouts.draw_maps(projection, vertices, faces, geometry.faces[holes.face], holes, own, visibility)
     else:
         corners, cells = plane((len(vertices), 4), np.float64), plane((len(vertices), 4), np.int32)
         _project(projection, vertices, corners, cells)
         rows = min(band_rows or min(max(height // 32, 4), 32), height)
         keys = plane((workers, rows * (width + LANES)), np.int64)
-        _draw_bands(corners, faces, bands(corners, cells, faces, width, height, rows), keys, visibility)
+        lists = bands(corners, cells, faces, width, height, rows)
+        if holes is None:
+            _draw_bands(corners, faces, lists, keys, visibility)
+        else:
+            cut = geometry.faces[holes.face]
+            cut_lists = bands(corners, cells, cut, width, height, rows)
+            cutouts.draw_bands(corners, faces, lists, cut, cut_lists, holes, keys, visibility)
     if width < columns:
         visibility = Visibility(*(np.ascontiguousarray(plane[:, :width]) for plane in visibility))
     return visibility

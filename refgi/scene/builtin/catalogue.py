@@ -10,6 +10,7 @@ from refgi.errors import InputError, expect
 from refgi.scene.builtin.atrium import atrium
 from refgi.scene.builtin.closed_forms import integrating_sphere, parallel_plates, wedge
 from refgi.scene.builtin.cornell import cornell_box, cornell_sphere
+from refgi.scene.builtin.leaf_grid import leaf_grid
 from refgi.scene.builtin.metaballs import metaballs
 from refgi.scene.builtin.stage import glass_ball, ring, stage
 from refgi.scene.builtin.textured_atrium import textured_atrium
@@ -81,6 +82,7 @@ SCENES: dict[str, BuiltinScene] = {
                      250_000, atrium),
         BuiltinScene("textured_atrium", "The atrium with masonry, plaster, tiles and cloth as textures made in code",
                      250_000, textured_atrium),
+        BuiltinScene("leaf_grid", "Leaves cut out of quads by alpha in a room, lit from above", 728, leaf_grid),
         BuiltinScene("integrating_sphere", "Inside a diffuse sphere: one bounce is the same everywhere, in closed form",
                      20_000, integrating_sphere),
         BuiltinScene("wedge", "Two plates that meet in an edge, one evenly lit: closed form", 4, wedge),

@@ -1,7 +1,7 @@
 """From a glTF document to meshes in world space: the node tree, primitives and materials.
 
-Textures of the base colour are decoded when a primitive first shows their material; texture coordinates take the
-material's choice of set and its `KHR_texture_transform` at once, as both are affine.
+Textures of base colour and emission are decoded when a primitive first shows their material; texture coordinates take
+the material's choice of set and its `KHR_texture_transform` at once, as both are affine.
 """
 
 import dataclasses
@@ -15,13 +15,14 @@ from refgi.errors import InputError, RefgiWarning, expect
 from refgi.scene.files import Contents
 from refgi.scene.gltf.container import Document, accessor
 from refgi.scene.gltf.nodes import node_camera, node_light, scene_nodes
-from refgi.scene.gltf.textures import Look, base_colour, transformed
+from refgi.scene.gltf.textures import Look, base_colour, emissive, transformed
 from refgi.scene.mesh import as_float64, expect_memory
 from refgi.scene.model import Array, Camera, Light, Material, Mesh, Rgb
 from refgi.scene.transform import transformed_all
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
-READ = ("baseColorTexture", "normalTexture")  # or named apart among what is passed over
+CUTOFF = 0.5  # glTF's default of alphaCutoff
+READ = ("baseColorTexture", "emissiveTexture", "normalTexture")  # or named apart among what is passed over
 
 
 def read_gltf(path: Path) -> Contents:
@@ -56,6 +57,7 @@ class _Reader:
         self.cameras: list[Camera] = []
         self.lights: list[Light] = []
         self.passed_over: dict[str, int] = {}
+        self.blended = 0  # materials
         self.materials: list[Material] = [self._material(index) for index in range(len(document.items("materials")))]
         self._looks: dict[int, Look | None] = {}
         self._shapes: dict[int, list[Mesh]] = {}
@@ -72,6 +74,9 @@ class _Reader:
             self._view_and_light(node, nodes.world[k], where)
         for what, count in self.passed_over.items():
             warnings.warn(RefgiWarning(f"{self.path}: {count} {what} passed over"), stacklevel=4)
+        if self.blended:
+            text = f"material(s) of alphaMode BLEND taken as MASK with a cutoff of {CUTOFF}: no partial transparency"
+            warnings.warn(RefgiWarning(f"{self.path}: {self.blended} {text}"), stacklevel=4)
         meshes = transformed_all(shapes, nodes.world[placed_by]) if shapes else []
         return Contents(tuple(meshes), tuple(self.cameras), tuple(self.lights))
 
@@ -133,7 +138,8 @@ class _Reader:
             return dataclasses.replace(mesh, uv=self._spare_coordinates(mesh, attributes, key))
         if key not in attributes:
             self._pass_over(f"primitive(s)' textures for lack of {key}")
-            return dataclasses.replace(mesh, material=dataclasses.replace(mesh.material, texture=None))
+            return dataclasses.replace(mesh, material=dataclasses.replace(mesh.material, texture=None,
+                                                                          emission_texture=None))
         uv = as_float64(accessor(self.document, attributes[key], "VEC2", f"{where}.attributes.{key}"))
         expect(len(uv) == len(mesh.vertices), f"{self.path}: {where}.attributes.{key}",
                f"{len(mesh.vertices)} elements as POSITION", len(uv))
@@ -158,30 +164,48 @@ class _Reader:
         index = entry["material"]
         found = self.document.item("materials", index, f"{where}.material")
         if index not in self._looks:
-            look = self._looks[index] = base_colour(self.document, found, f"materials[{index}]")
+            look = base_colour(self.document, found, f"materials[{index}]")
+            glows = any(self.materials[index].emission)
+            shining = emissive(self.document, found, f"materials[{index}]") if glows else None
             if look is not None:
                 self.materials[index] = dataclasses.replace(self.materials[index], texture=look.texture)
+            self._looks[index] = look or shining
+            if shining is not None and look is not None and not shining.lies_as(look):
+                self._pass_over("material(s)' emissive textures, which lie other than the base colour's,")
+            elif shining is not None:
+                self.materials[index] = dataclasses.replace(self.materials[index], emission_texture=shining.texture)
         return self.materials[index], self._looks[index]
 
     def _material(self, index: int) -> Material:
         entry, where = self.document.items("materials")[index], f"materials[{index}]"
         surface = self.document.member(entry, "pbrMetallicRoughness", where)
         if "normalTexture" in entry:
-            self._pass_over("material(s)' normal maps")
+            self._pass_over("material(s)' normal maps (shading normals stay the mesh's)")
         if any(key.endswith("Texture") and key not in READ for key in (*surface, *entry)):
             self._pass_over("material(s)' other textures")
-        if entry.get("alphaMode", "OPAQUE") != "OPAQUE":
-            self._pass_over("material(s)' alpha, opaque here,")
         base = self.document.numbers(surface, "baseColorFactor", f"{where}.pbrMetallicRoughness", (1.0,) * 4)
         emissive = self.document.numbers(entry, "emissiveFactor", where, (0.0, 0.0, 0.0))
         key = "KHR_materials_emissive_strength"
         extension = self.document.member(self.document.member(entry, "extensions", where), key, where)
         strength = self.document.number(extension, "emissiveStrength", f"{where}.extensions.{key}", 1.0)
         emission: Rgb = (emissive[0] * strength, emissive[1] * strength, emissive[2] * strength)
+        cutoff = self._cutoff(entry, where)
         try:
-            return Material(self.document.name(entry, where), (base[0], base[1], base[2]), emission=emission)
+            return Material(self.document.name(entry, where), (base[0], base[1], base[2]), emission=emission,
+                            alpha=1.0 if cutoff is None else base[3], cutoff=cutoff)
         except InputError as error:
             raise InputError(f"{self.path}: {where}: {error}") from error
+
+    def _cutoff(self, entry: dict[str, Any], where: str) -> float | None:
+        """Return from which alpha on a material is there, None where it is there everywhere."""
+        mode = entry.get("alphaMode", "OPAQUE")
+        expect(mode in ("OPAQUE", "MASK", "BLEND"), f"{self.path}: {where}.alphaMode", "OPAQUE, MASK or BLEND", mode)
+        if mode == "OPAQUE":
+            return None
+        if mode == "BLEND":
+            self.blended += 1
+            return CUTOFF
+        return self.document.number(entry, "alphaCutoff", where, CUTOFF)
 
     def _pass_over(self, what: str) -> None:
         self.passed_over[what] = self.passed_over.get(what, 0) + 1

@@ -1,4 +1,7 @@
-"""Base colour textures of a glTF document: image, sampler, set of texture coordinates, KHR_texture_transform."""
+"""Base colour and emissive textures of a glTF document.
+
+Image, sampler, set of texture coordinates, KHR_texture_transform.
+"""
 
 import math
 from typing import Any, NamedTuple
@@ -25,6 +28,10 @@ class Look(NamedTuple):
     coordinates: int  # n of TEXCOORD_n
     transform: Array  # (2, 3): u' and v' from u, v, 1
 
+    def lies_as(self, other: "Look") -> bool:
+        """Return whether both lie on a surface alike."""
+        return self.coordinates == other.coordinates and np.array_equal(self.transform, other.transform)
+
 
 def base_colour(document: Document, material: dict[str, Any], where: str) -> Look | None:
     """Return the texture of a material's base colour, None where it has none.
@@ -32,10 +39,19 @@ def base_colour(document: Document, material: dict[str, Any], where: str) -> Loo
     Raises `InputError` that names file and image if it cannot be read.
     """
     surface = document.member(material, "pbrMetallicRoughness", where)
-    if "baseColorTexture" not in surface:
+    return _look(document, surface, "baseColorTexture", f"{where}.pbrMetallicRoughness")
+
+
+def emissive(document: Document, material: dict[str, Any], where: str) -> Look | None:
+    """Return the texture of a material's emission, as `base_colour` does."""
+    return _look(document, material, "emissiveTexture", where)
+
+
+def _look(document: Document, owner: dict[str, Any], key: str, where: str) -> Look | None:
+    if key not in owner:
         return None
-    where = f"{where}.pbrMetallicRoughness.baseColorTexture"
-    info = document.member(surface, "baseColorTexture", where)
+    where = f"{where}.{key}"
+    info = document.member(owner, key, where)
     change = document.member(document.member(info, "extensions", where), EXTENSION, f"{where}.extensions")
     number = document.integer(change, "texCoord", where, document.integer(info, "texCoord", where, 0))
     expect(number <= LARGEST_SET, f"{document.path}: {where}.texCoord", f"0 to {LARGEST_SET}", number)

@@ -1,9 +1,9 @@
 """Images of textures: PNG and JPEG files (TGA and BMP as well) decoded to codes, and the sRGB curve to linear light.
 
 An image keeps the codes of its file, 8 or 16 bits a channel, so that it is small and has a digest that means the same
-everywhere; `linear` applies the curve texel by texel through a table of all codes. Alpha is dropped, grey and palettes
-become RGB, CMYK becomes (1 - C)(1 - K). Colour profiles, gamma and orientation notes of a file are ignored, as glTF
-asks for.
+everywhere; `linear` applies the curve texel by texel through a table of all codes. Alpha is kept apart, where it is not
+1 throughout; grey and palettes become RGB, CMYK becomes (1 - C)(1 - K). Colour profiles, gamma and orientation notes of
+a file are ignored, as glTF asks for.
 """
 
 import functools
@@ -35,6 +35,8 @@ class Image:
         Row 0 is v = 0. Uint8 or uint16: sRGB codes; float32 or float64: linear RGB from 0 to 1.
     name : str
         For messages; of no other meaning.
+    alpha : (h, w) ndarray, optional
+        In the type of `pixels`, codes without a curve or numbers from 0 to 1; absent: 1 throughout.
 
     Raises
     ------
@@ -43,10 +45,10 @@ class Image:
 
     Notes
     -----
-    Images are equal if all their pixels are.
+    Images are equal if all their pixels are, and their alpha.
     """
 
-    def __init__(self, pixels: Array, name: str = "image") -> None:
+    def __init__(self, pixels: Array, name: str = "image", alpha: Array | None = None) -> None:
         kind = pixels.dtype.name
         expect(pixels.ndim == 3 and pixels.shape[2] == 3 and pixels.size > 0, name, "an (h, w, 3) array of texels",
                pixels.shape)
@@ -56,6 +58,17 @@ class Image:
                    [float(pixels.min()), float(pixels.max())])
         self.name = name
         self.pixels = np.ascontiguousarray(pixels)
+        self.alpha = None if alpha is None else self._checked(alpha)
+
+    def _checked(self, alpha: Array) -> Array | None:
+        """Return alpha, None where it is 1 throughout."""
+        kind, shape = self.pixels.dtype.name, self.pixels.shape[:2]
+        expect(alpha.shape == shape and alpha.dtype.name == kind, f"{self.name}: alpha", f"{kind} texels {shape}",
+               f"{alpha.dtype.name} {alpha.shape}")
+        if kind not in CODES:
+            expect(bool((alpha >= 0).all() and (alpha <= 1).all()), f"{self.name}: alpha", "numbers from 0 to 1",
+                   [float(alpha.min()), float(alpha.max())])
+        return None if (alpha == CODES.get(kind, 2) - 1).all() else np.ascontiguousarray(alpha)
 
     @property
     def height(self) -> int:
@@ -69,10 +82,18 @@ class Image:
 
     @functools.cached_property
     def digest(self) -> str:
-        """SHA-256 of type, shape and texels."""
-        form = f"{self.pixels.dtype.newbyteorder('<').str} {self.pixels.shape}\0".encode()
-        little = self.pixels.astype(self.pixels.dtype.newbyteorder("<"), copy=False)
-        return hashlib.sha256(form + little.tobytes()).hexdigest()
+        """SHA-256 of type, shape and texels, and of alpha where there is any."""
+        digest = hashlib.sha256()
+        for plane in (self.pixels, *(() if self.alpha is None else (self.alpha,))):
+            little = plane.astype(plane.dtype.newbyteorder("<"), copy=False)
+            digest.update(f"{little.dtype.str} {plane.shape}\0".encode() + little.tobytes())
+        return digest.hexdigest()
+
+    @functools.cached_property
+    def alpha_range(self) -> tuple[float, float]:
+        """Least and most alpha, 0 to 1."""
+        alpha = self.linear_alpha()
+        return float(alpha.min()), float(alpha.max())
 
     def linear(self) -> Array:
         """Return (h, w, 3) float32 in linear light, each texel by itself."""
@@ -80,6 +101,12 @@ class Image:
         if kind in CODES:
             return np.asarray(srgb_table(CODES[kind]).astype(np.float32)[self.pixels])
         return self.pixels.astype(np.float32)
+
+    def linear_alpha(self) -> Array:
+        """Return alpha, (h, w) float32 from 0 to 1."""
+        if self.alpha is None:
+            return np.ones(self.pixels.shape[:2], np.float32)
+        return (self.alpha / (CODES.get(self.alpha.dtype.name, 2) - 1)).astype(np.float32)
 
     def __eq__(self, other: object) -> bool:
         return self is other or (isinstance(other, Image) and self.digest == other.digest)
@@ -120,12 +147,12 @@ def decoded(content: bytes, where: str) -> Image:
     key = hashlib.sha256(content).hexdigest()
     found = _decoded.get(key)
     if found is None:
-        found = _decoded[key] = Image(_codes(content, where), where)
+        found = _decoded[key] = Image(*_codes(content, where))
     return found
 
 
-def _codes(content: bytes, where: str) -> Array:
-    """Return (h, w, 3) codes of the file, uint8 or uint16."""
+def _codes(content: bytes, where: str) -> tuple[Array, str, Array | None]:
+    """Return (h, w, 3) codes of the file, uint8 or uint16, its name, and (h, w) alpha in the same type, if any."""
     from PIL import Image as Pictures
     from PIL import UnidentifiedImageError
 
@@ -135,7 +162,8 @@ def _codes(content: bytes, where: str) -> Array:
         try:
             with Pictures.open(io.BytesIO(content), formats=formats) as picture:
                 _expect_size(picture.size, where)
-                return np.array(_read(picture, content), order="C")
+                codes, alpha = _read(picture, content)
+                return np.array(codes, order="C"), where, alpha
         except InputError:
             raise
         except UnidentifiedImageError as error:
@@ -156,27 +184,32 @@ def _expect_size(size: tuple[int, int], where: str) -> None:
            f"{size[0]} x {size[1]} ({texels * BYTES_OF_TEXEL / 2**30:.1f} GiB)")
 
 
-def _read(picture: Any, content: bytes) -> Array:
-    """Return (h, w, 3) codes of an opened picture."""
+def _read(picture: Any, content: bytes) -> tuple[Array, Array | None]:
+    """Return (h, w, 3) codes of an opened picture, and its alpha, if any."""
     if picture.mode in ("I", "I;16", "I;16B", "I;16L"):
-        return np.repeat(np.asarray(picture).astype(np.uint16)[..., None], 3, axis=2)
+        return np.repeat(np.asarray(picture).astype(np.uint16)[..., None], 3, axis=2), None
     raw = picture.tile[0][3] if picture.format == "PNG" and picture.tile else None
     if raw in ("RGB;16B", "RGBA;16B"):
-        return _both_bytes(picture, content, raw)
+        return _parted(_both_bytes(picture, content, raw))
     if picture.mode == "CMYK":
         ink = 255 - np.asarray(picture).astype(np.uint32)
-        return ((ink[..., :3] * ink[..., 3:] + 127) // 255).astype(np.uint8)
-    if picture.mode in ("LA", "PA", "RGBA", "P"):
-        return np.asarray(picture.convert("RGBA"))[..., :3]
-    return np.asarray(picture.convert("RGB"))
+        return ((ink[..., :3] * ink[..., 3:] + 127) // 255).astype(np.uint8), None
+    if picture.mode in ("LA", "PA", "RGBA", "P") or "transparency" in picture.info:
+        return _parted(np.asarray(picture.convert("RGBA")))
+    return np.asarray(picture.convert("RGB")), None
+
+
+def _parted(codes: Array) -> tuple[Array, Array | None]:
+    """Return colour and alpha apart."""
+    return codes[..., :3], np.array(codes[..., 3], order="C") if codes.shape[2] == 4 else None
 
 
 def _both_bytes(picture: Any, content: bytes, raw: str) -> Array:
     """Return the codes of a 16-bit colour PNG, which Pillow decodes to one byte of each: the upper, then the lower."""
     from PIL import Image as Pictures
 
-    upper = np.asarray(picture)[..., :3].astype(np.uint16)
+    upper = np.asarray(picture).astype(np.uint16)
     with Pictures.open(io.BytesIO(content), formats=["PNG"]) as again:
         again.tile = [again.tile[0]._replace(args=raw.replace("16B", "16L"))]
-        lower = np.asarray(again)[..., :3].astype(np.uint16)
+        lower = np.asarray(again).astype(np.uint16)
     return upper << 8 | lower

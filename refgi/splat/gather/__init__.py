@@ -7,6 +7,7 @@
 from refgi.method import Method
 from refgi.splat.gather.approximations import APPROXIMATIONS
 from refgi.splat.gather.gather import PRESETS, DiscSettings, GatherSettings, Interpolation, gather
+from refgi.splat.gather.lobes import gather_lobes
 
 __all__ = [
     "PRESETS",
@@ -14,7 +15,8 @@ __all__ = [
     "GatherSettings",
     "Interpolation",
     "gather",
+    "gather_lobes",
 ]
 
 METHOD = Method("gather", "Reflective Shadow Maps (2005): gathering around the projected point", gather, GatherSettings,
-                visibility=False, presets=PRESETS, approximations=APPROXIMATIONS)
+                visibility=False, presets=PRESETS, approximations=APPROXIMATIONS, lobes=gather_lobes)

@@ -176,11 +176,31 @@ def _gather_one(points: Array, normals: Array, rsm: "Rsm", disc: DiscSettings, t
     if rsm.lobe_flux is not None:
         skip("gather.lobes", "gathering takes the diffuse part alone")
     tally("pairs", lambda: points.shape[1] * disc.samples)
-    dtype = points.dtype
+    source, pattern, scale = disc_texels(rsm, disc, points.dtype)
+    gather_discs(points, normals, centers(rsm.projection, points), source, pattern, scale, total)
+
+
+def disc_texels(rsm: "Rsm", disc: DiscSettings, dtype: np.dtype[Any]) -> tuple[GatherMap, Array, Any]:
+    """Return a map's texels, the pattern of a disc on it and the scale of its sum, as `gather_discs` takes them.
+
+    Parameters
+    ----------
+    rsm : Rsm
+        The map.
+    disc : DiscSettings
+        Disc and samples.
+    dtype : dtype
+        Of texels and scale.
+
+    Returns
+    -------
+    GatherMap, ndarray and float
+        The arguments.
+    """
     height, width = rsm.projection.height, rsm.projection.width  # of one map
     pattern = disc_pattern(disc.samples, disc.seed, "rsm_weight_squared" in disc.as_published)
     scale = disc.radius**2 * height * width / (math.pi * disc.samples)
     pattern *= (disc.radius * height, disc.radius * width, 1.0)
     texels = (rsm.position - disc.offset * rsm.normal, rsm.normal, rsm.flux)
     source = GatherMap(*(np.ascontiguousarray(part, dtype) for part in texels))
-    gather_discs(points, normals, centers(rsm.projection, points), source, pattern, dtype.type(scale), total)
+    return source, pattern, dtype.type(scale)

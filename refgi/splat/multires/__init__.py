@@ -8,6 +8,7 @@
 from refgi.method import Method
 from refgi.splat.multires.approximations import APPROXIMATIONS
 from refgi.splat.multires.ledger import multires_ledger
+from refgi.splat.multires.lobes import multires_lobes
 from refgi.splat.multires.multires import extra_bytes, multires, shared_subsplats
 from refgi.splat.multires.settings import (
     PRESETS,
@@ -26,10 +27,11 @@ __all__ = [
     "Criteria",
     "MultiresSettings",
     "multires",
+    "multires_lobes",
     "shared_subsplats",
 ]
 
 METHOD = Method(
     "multires", "Adaptive Multiresolution Splatting (2009): the same lights, evaluated where the picture changes",
     multires, MultiresSettings, visibility=lambda settings: settings.visibility is not None, ledger=multires_ledger,
-    memory=extra_bytes, presets=PRESETS, approximations=APPROXIMATIONS)
+    memory=extra_bytes, presets=PRESETS, approximations=APPROXIMATIONS, lobes=multires_lobes)

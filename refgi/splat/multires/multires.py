@@ -56,7 +56,7 @@ def multires(frame: "Frame", settings: MultiresSettings) -> Array:
     footprint = light_areas(frame, lights, settings)
     if not settings.supersampled:
         return _irradiance(frame, frame.gbuffer, lights, footprint, settings)
-    double = _doubled(frame)  # Sec. 4: rendered at 2048^2 for 1024^2
+    double = doubled(frame)  # Sec. 4: rendered at 2048^2 for 1024^2
     return halved(_irradiance(frame, double, lights, footprint, settings), double.covered, frame.gbuffer.covered)
 
 
@@ -158,8 +158,19 @@ def light_areas(frame: "Frame", lights: "PixelLights", settings: MultiresSetting
     return demo_footprints(lights, frame.scene.lights, drawn_from_maps(frame.rsms, settings.lights))
 
 
-def _doubled(frame: "Frame") -> "GBuffer":
-    """Return the camera's G-buffer at twice the width and height."""
+def doubled(frame: "Frame") -> "GBuffer":
+    """Return the camera's G-buffer at twice the width and height.
+
+    Parameters
+    ----------
+    frame : Frame
+        Scene and camera.
+
+    Returns
+    -------
+    GBuffer
+        Four pixels for each of the frame's.
+    """
     from refgi.rsm import gbuffer
 
     scene = frame.scene

@@ -10,6 +10,7 @@ the pixels.
 from refgi.method import Method
 from refgi.splat.sii.approximations import APPROXIMATIONS
 from refgi.splat.sii.ledger import sii_ledger
+from refgi.splat.sii.lobes import sii_lobes
 from refgi.splat.sii.settings import (
     PRESETS,
     AbsoluteCut,
@@ -38,9 +39,11 @@ __all__ = [
     "TangentBound",
     "cut_irradiance",
     "sii",
+    "sii_lobes",
     "splat",
 ]
 
 METHOD = Method(
     "sii", "Splatting Indirect Illumination (2006): pixel lights shine where they are significant", sii, SiiSettings,
-    visibility=False, ledger=sii_ledger, memory=extra_bytes, presets=PRESETS, approximations=APPROXIMATIONS)
+    visibility=False, ledger=sii_ledger, memory=extra_bytes, presets=PRESETS, approximations=APPROXIMATIONS,
+    lobes=sii_lobes)

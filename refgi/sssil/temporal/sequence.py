@@ -11,10 +11,11 @@ from refgi.scene.model import Scene
 from refgi.settings import flat, replaced
 from refgi.sssil.settings import LAST_SEED, HssilSettings, TemporalSettings
 from refgi.sssil.temporal.filter import Filtered, History, first_light, history_of, temporal_filter, with_frames
-from refgi.stages import Memory, reusing
+from refgi.stages import Memory, reusing, sharing
 
 Array = npt.NDArray[Any]
 Method = Callable[[Frame, Any], Array]
+Lobes = Callable[[Frame, Any], Array | None]
 
 DEFAULT = TemporalSettings()
 
@@ -27,6 +28,7 @@ class SequenceFrame(NamedTuple):
     radiance: Array  # (3, h, w) what the camera receives, W/m^2/sr
     reused: float  # share of the pixels with a surface that the frame before shows as well
     frames: Array | None = None  # (h, w) frames in which each pixel's surface was found, where the filter counts them
+    lobes: Array | None = None  # (3, h, w) radiance of receivers' lobes by indirect light, of this frame, W/m^2/sr
 
 
 class Sequence:
@@ -42,6 +44,9 @@ class Sequence:
         The temporal filter; None renders each frame by itself.
     method : callable, optional
         Function of a frame and settings that gives its indirect irradiance; `hssil` where absent.
+    lobes : callable, optional
+        Function of a frame and settings that gives the radiance of its glossy receivers' lobes, or None; that of
+        `hssil` where method and lobes are absent. Lobes are not blended: a highlight moves with the eye.
     memory : stages.Memory, optional
         Keeps what frames share, beside the buffers of two frames in place of one; nothing is kept where absent.
     **frame_options : object
@@ -60,7 +65,7 @@ class Sequence:
 
     def __init__(
         self, scenes: Iterable[Scene], settings: Any = None, temporal: TemporalSettings | None = DEFAULT, *,
-        method: Method | None = None, memory: Memory | None = None, **frame_options: Any,
+        method: Method | None = None, lobes: Lobes | None = None, memory: Memory | None = None, **frame_options: Any,
     ) -> None:
         expect(temporal is None or isinstance(temporal, TemporalSettings), "temporal", "TemporalSettings or None",
                temporal)
@@ -68,6 +73,7 @@ class Sequence:
         self.settings = HssilSettings() if settings is None else settings
         self.temporal = temporal
         self.method = method or _hssil()
+        self.lobes = _hssil_lobes if method is None and lobes is None else lobes
         self.memory = memory
         self.frame_options = frame_options
 
@@ -100,23 +106,36 @@ class Sequence:
 
     def _step(self, scene: Scene, number: int, history: History | None) -> tuple[SequenceFrame, History | None]:
         frame = Frame(scene, **self.frame_options)
-        irradiance = self.method(frame, seeded(self.settings, number))
+        irradiance, lobes = self._light(frame, seeded(self.settings, number))
         if self.temporal is None:
-            return SequenceFrame(frame, irradiance, frame.radiance(irradiance), 0.0), None
+            return SequenceFrame(frame, irradiance, frame.radiance(irradiance, lobes), 0.0, lobes=lobes), None
         if history is None:
             made = Filtered(first_light(irradiance, self.temporal), 0.0)
         else:
             made = temporal_filter(irradiance, frame, scene.geometry, history, self.temporal)
         left = with_frames(irradiance, made.frames) if self.temporal.form == "printed" else made.light
         filtered = made.irradiance
-        return (SequenceFrame(frame, filtered, frame.radiance(filtered), made.reused, made.frames),
+        return (SequenceFrame(frame, filtered, frame.radiance(filtered, lobes), made.reused, made.frames, lobes),
                 history_of(frame, scene.geometry, left))
+
+    def _light(self, frame: Frame, settings: Any) -> tuple[Array, Array | None]:
+        """Return irradiance and lobes of a frame by itself."""
+        if self.lobes is None or not frame.glossy_receivers:
+            return self.method(frame, settings), None
+        with sharing():
+            return self.method(frame, settings), self.lobes(frame, settings)
 
 
 def _hssil() -> Method:
     from refgi.sssil.hssil import hssil
 
     return hssil
+
+
+def _hssil_lobes(frame: Frame, settings: Any) -> Array | None:
+    from refgi.sssil.lobes import hssil_lobes
+
+    return hssil_lobes(frame, settings)
 
 
 def seeded(settings: Any, number: int) -> Any:

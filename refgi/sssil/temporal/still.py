@@ -13,7 +13,7 @@ from refgi.sssil.temporal.sequence import Sequence, SequenceFrame
 
 def still_frame(
     scene: Scene, settings: Any, temporal: TemporalSettings, frames: int, *, method: Callable[[Frame, Any], Any],
-    **frame_options: Any,
+    lobes: Callable[[Frame, Any], Any] | None = None, **frame_options: Any,
 ) -> SequenceFrame:
     """Render a scene again and again, each frame with other random numbers, and return the last.
 
@@ -29,6 +29,8 @@ def still_frame(
         How many, at least 1.
     method : callable
         Function of a frame and settings that gives its indirect irradiance.
+    lobes : callable, optional
+        As for `Sequence`.
     **frame_options : object
         Passed to `Frame`: width, height, dtype, rsm_resolution, shadows.
 
@@ -37,5 +39,6 @@ def still_frame(
     SequenceFrame
         The last frame, filtered.
     """
-    sequence = Sequence(itertools.repeat(scene, frames), settings, temporal, method=method, **frame_options)
+    sequence = Sequence(itertools.repeat(scene, frames), settings, temporal, method=method, lobes=lobes,
+                        **frame_options)
     return collections.deque(sequence, maxlen=1).pop()

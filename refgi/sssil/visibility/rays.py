@@ -82,8 +82,8 @@ def ray_gather(
         Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi.
     """
     senders = level if senders is None else senders
-    surfels, samples = _surfels(level, frame), _samples(level, index, settings.sampling)
-    sending = surfels if senders is level else _surfels(senders, frame)
+    surfels, samples = surfels_of(level, frame), _samples(level, index, settings.sampling)
+    sending = surfels if senders is level else surfels_of(senders, frame)
     radiance = senders.radiance.reshape(3, -1)
     total, count = np.zeros(radiance.shape), samples.weight.shape[2]
     tally("pairs", lambda: total.shape[1] * count)
@@ -103,7 +103,7 @@ def ray_gather(
     return (total * level_factor(index, settings)).reshape(level.radiance.shape).astype(level.radiance.dtype)
 
 
-def _surfels(level: Level, frame: "Frame") -> Surfels:
+def surfels_of(level: Level, frame: "Frame") -> Surfels:
     """Return texels with the triangles that they lie on; rays end where the texel's own pixel shows its surface."""
     covered = np.flatnonzero(level.pixel.reshape(-1) >= 0)
     pixel = level.pixel.reshape(-1)[covered]

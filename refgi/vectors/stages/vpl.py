@@ -97,7 +97,8 @@ class _Rays:
     def __init__(self, arrays: Arrays, scene: Scene, lift: float = 0.0, blockers: int | None = None) -> None:
         geometry = _geometry(arrays, scene)
         self.tracer = Tracer(dataclasses.replace(geometry, faces=geometry.faces[:blockers],
-                                                 material_of_face=geometry.material_of_face[:blockers], uv=None))
+                                                 material_of_face=geometry.material_of_face[:blockers], uv=None,
+                                                 cut_outs=None))
         to = _receivers(geometry, arrays, self.tracer.grain)
         facing = np.ascontiguousarray(np.asarray(arrays[FACING], np.float32).reshape(3, -1)[:, to.pixel])
         position, normal = (np.asarray(arrays[name], np.float64) for name in LIGHTS)

@@ -11,7 +11,8 @@ from benchmarks.papers.runner import as_json
 from tests.compare.test_report import Outline
 
 KEYS = {"sii": ["fig4", "fig6", "fig7", "fig8", "fig11", "fig12", "table1", "table2", "table3", "full"],
-        "multires": ["fig5", "fig7", "fig9", "fig10", "fig11", "fig13", "fig14", "fig15", "table1", "table2", "error"],
+        "multires": ["fig5", "fig6", "fig7", "fig9", "fig10", "fig11", "fig13", "fig14", "fig15", "table1", "table2",
+                     "error"],
         "val": ["fig1", "fig4", "fig5", "fig6", "fig8", "fig9", "fig10", "fig11", "fig12", "fig13", "table1", "table2",
                 "error"],
         "hssil": ["fig2", "fig4", "fig5", "fig6", "fig7", "fig8", "fig9", "temporal", "visibility", "error"]}

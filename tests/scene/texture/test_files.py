@@ -180,14 +180,15 @@ def test_each_fault_names_file_and_image(tmp_path: Path, edit: Edit | None, imag
 
 def test_what_is_not_read_is_said(tmp_path: Path) -> None:
     def edit(tree: dict[str, Any]) -> None:
-        tree["materials"][0] |= {"normalTexture": {"index": 0}, "emissiveTexture": {"index": 0}, "alphaMode": "MASK"}
+        tree["materials"][0] |= {"normalTexture": {"index": 0}, "occlusionTexture": {"index": 0}}
         del tree["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"]
 
     with pytest.warns(RefgiWarning) as said:
         scene = load_scene(textured(tmp_path, edit))
     assert {str(one.message).partition(": ")[2] for one in said} == {
-        "1 material(s)' normal maps passed over", "1 material(s)' other textures passed over",
-        "1 material(s)' alpha, opaque here, passed over", "1 primitive(s)' textures for lack of TEXCOORD_0 passed over"}
+        "1 material(s)' normal maps (shading normals stay the mesh's) passed over",
+        "1 material(s)' other textures passed over",
+        "1 primitive(s)' textures for lack of TEXCOORD_0 passed over"}
     assert scene.materials[0].texture is None
 
 

@@ -13,9 +13,16 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.pairs.glossy_sum import ReceiverLobes
 from refgi.pairs.lobe_shape import Widening
 from refgi.pairs.pair_sum import SUM, TILE, Clamp
-from refgi.splat.multires.light_lists.one_light import TILE_ROWS, SingleLights, add_light, load_cells
+from refgi.splat.multires.light_lists.one_light import (
+    TILE_ROWS,
+    SingleLights,
+    add_light,
+    load_cells,
+    weigh_by_lobes,
+)
 
 Array = npt.NDArray[Any]
 
@@ -30,6 +37,7 @@ class ReceiverTree(NamedTuple):
     points: Array  # (3, n) m
     normals: Array  # (3, n)
     refined: Array  # (n,) bool: cells that the shared list refines; none without such a list
+    lobes: ReceiverLobes | None = None  # of the points, where not irradiance is asked for but what they make of it
 
 
 class SubsplatLists(NamedTuple):
@@ -80,6 +88,7 @@ def _refine(
             size = min(TILE, stop - first)
             load_cells(tile, cells.points, cells.normals, cell[first : first + size])
             add_light(tile, size, lights, k, clamp, spheres, lobe_clamp, widening)
+            weigh_by_lobes(tile, size, lights, k, cells.lobes, cell[first : first + size])
             _store_sums(tile, size, irradiance, first, lane_max)
         end, largest = stop, lane_max.max()
         if last > 0:

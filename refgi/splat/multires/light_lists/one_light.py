@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel
+from refgi.lobes import receiver_lobe
+from refgi.pairs.glossy_sum import ReceiverLobes
 from refgi.pairs.lobe_culling import LIMIT, bound_lobes
 from refgi.pairs.lobe_shape import Widening
 from refgi.pairs.lobe_sum import add_lobe
@@ -78,6 +80,36 @@ def _add_diffuse(tile: Array, size: int, lights: Array, k: int, clamp: Clamp | N
         tile[SUM, i] += tile[TERM, i] * red
         tile[SUM + 1, i] += tile[TERM, i] * green
         tile[SUM + 2, i] += tile[TERM, i] * blue
+
+
+@kernel
+def weigh_by_lobes(
+    tile: Array, size: int, lights: SingleLights, k: int, lobes: ReceiverLobes | None, cells: Array
+) -> None:
+    """Turn the irradiance of light k in the sums of a tile into radiance of the cells' lobes over their reflectance.
+
+    lobes: of all points, None where irradiance is asked for; cells: which points the tile holds.
+    """
+    if lobes is not None:
+        diffuse, lobe = lights.packed_index[DIFFUSE, k], lights.packed_index[LOBE, k]
+        if diffuse >= 0:
+            _weigh(tile, size, (lights.diffuse[0, diffuse], lights.diffuse[1, diffuse], lights.diffuse[2, diffuse]),
+                   lobes, cells)
+        elif lobe >= 0:
+            _weigh(tile, size, (lights.lobes[0, lobe], lights.lobes[1, lobe], lights.lobes[2, lobe]), lobes, cells)
+
+
+@kernel
+def _weigh(tile: Array, size: int, light: Any, lobes: ReceiverLobes, cells: Array) -> None:
+    mirror = lobes.mirrored
+    for i in range(size):
+        m = cells[i]
+        # rho_s of AMS Eq. (2)
+        reflected = receiver_lobe(mirror[0, m], mirror[1, m], mirror[2, m], light[0] - tile[X, i],
+                                  light[1] - tile[X + 1, i], light[2] - tile[X + 2, i], lobes.exponent[m])
+        tile[SUM, i] *= reflected
+        tile[SUM + 1, i] *= reflected
+        tile[SUM + 2, i] *= reflected
 
 
 @kernel

@@ -5,7 +5,7 @@ depend on which cells are leaves, so layers of lights with different leaves cann
 batches, whose lists fit in a fixed number of bytes however many lights there are.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numba
@@ -13,7 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange, threads
+from refgi.pairs.glossy import glossy_radiance
+from refgi.pairs.glossy_sum import receiver_lobes_of
 from refgi.pairs.irradiance import Receivers, checked
+from refgi.rsm.buffers.glossy import GlossyPoints
 from refgi.splat.multires.light_lists.lists import (
     ReceiverTree,
     SubsplatLists,
@@ -85,23 +88,86 @@ def per_light(
     every cell. Samples may miss a narrow highlight, or an edge: with `start`, the authors' plan for later (Sec. 6),
     what the geometry calls for is refined in any case, and light only adds to it.
 
-    Receivers are diffuse, as they are for every method: a Phong receiver weighs each light by its direction to the
-    eye, which no irradiance holds. That would take the radiance towards the eye beside the irradiance, from here, from
-    `Frame.radiance` and from the truth as well.
+    A Phong receiver weighs each light by its direction to the eye, which no irradiance holds: `per_light_lobes` refines
+    lists for what its lobe reflects.
 
     Lights that need no split beyond the list they started from share its leaves; they are summed before they are
     upsampled, once. All sums are compensated, in the order of the lights.
     """
     tree, lists = _leaf_lists(buffer, lights, settings, pairs, footprint, start)
-    picture = _CompensatedSum((3, *tree.shape), buffer.dtype)
-    shared, shared_cells = _CompensatedSum((3, 0, 0), buffer.dtype), None
+    return _upsampled(tree, lists, buffer.covered, buffer.dtype, settings, start, filter_all, corner_rule)
 
-    thread_count = 1 if buffer.covered.size <= SMALL_PICTURE else None
+
+@stage("multires.per_light_lobes")
+def per_light_lobes(
+    points: GlossyPoints, shape: tuple[int, int], lights: "PixelLights", settings: "ByIrradiance",
+    pairs: "PairSettings", footprint: Array | None = None, start: Subsplats | None = None, *,
+    filter_all: bool = False, corner_rule: bool = True,
+) -> Array:
+    """Sum what the lobes of glossy pixels reflect of every light, each light from subsplats of its own.
+
+    Parameters
+    ----------
+    points : GlossyPoints
+        The glossy pixels; of those that share a cell one stands for all, whatever their exponents.
+    shape : tuple of 2 ints
+        Height and width of the picture.
+    lights, settings, pairs, footprint, start, filter_all, corner_rule
+        As for `per_light`; cells are of glossy pixels alone, and `representative` is the pixel.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Radiance towards the eye over the lobe's reflectance, W/m^2/sr; 0 where no pixel is glossy.
+
+    Raises
+    ------
+    InputError
+        As `irradiance`.
+
+    Notes
+    -----
+    A cell is split where max - min of that radiance over its quadrants exceeds T. The quadrants are sampled at one
+    point each: a highlight narrower than a coarsest cell may lie between them, and is lost (Sec. 3.3.1 says so).
+    """
+    covered = covered_by(points, shape)
+    tree = cell_tree(covered, top_level(*shape, settings.coarsest), settings.finest)
+    place = np.searchsorted(points.pixel, tree.pixel)
+    some = GlossyPoints(*(np.ascontiguousarray(plane[..., place]) for plane in points))._replace(
+        specular=np.ones((3, len(place)), points.position.dtype))
+    refined = np.zeros(len(tree.level), np.bool_) if start is None else interior_cells(tree, start)
+    cells = ReceiverTree(tree.first, tree.roots, some.position, some.normal, refined,
+                         receiver_lobes_of(some.mirrored, some.exponent))
+
+    def at_roots() -> Array:
+        return glossy_radiance(GlossyPoints(*(np.ascontiguousarray(plane[..., : tree.roots]) for plane in some)),
+                               lights, pairs, footprint)
+
+    lists = _each_light(cells, lights, settings, pairs, footprint, at_roots)
+    return _upsampled(tree, lists, covered, points.position.dtype, settings, start, filter_all, corner_rule)
+
+
+def covered_by(points: GlossyPoints, shape: tuple[int, int]) -> Array:
+    """Return which pixels are glossy, (h, w) bool."""
+    covered = np.zeros(shape, np.bool_)
+    covered.reshape(-1)[points.pixel] = True
+    return covered
+
+
+def _upsampled(
+    tree: CellTree, lists: Iterator[tuple[Array, Array]], covered: Array, dtype: npt.DTypeLike,
+    settings: "ByIrradiance", start: Subsplats | None, filter_all: bool, corner_rule: bool,
+) -> Array:
+    """Return the sum of all lights' leaves, each upsampled."""
+    picture = _CompensatedSum((3, *tree.shape), dtype)
+    shared, shared_cells = _CompensatedSum((3, 0, 0), dtype), None
+
+    thread_count = 1 if covered.size <= SMALL_PICTURE else None
 
     def add(values: Array, cells: Array) -> None:
         with threads(thread_count):
             subsplats = subsplats_of_leaves(tree, cells)
-            picture.add(upsample(values, subsplats, buffer.covered, settings.upsampling, filter_all=filter_all,
+            picture.add(upsample(values, subsplats, covered, settings.upsampling, filter_all=filter_all,
                                  corner_rule=corner_rule))
 
     least = tree.roots if start is None else len(start.level)
@@ -109,7 +175,7 @@ def per_light(
         if len(cells) > least:
             add(values, cells)
         elif shared_cells is None:
-            shared, shared_cells = _CompensatedSum((3, 1, least), buffer.dtype), cells.copy()
+            shared, shared_cells = _CompensatedSum((3, 1, least), dtype), cells.copy()
         if len(cells) == least:
             shared.add(values[:, None])
     if shared_cells is not None:
@@ -151,17 +217,20 @@ def _leaf_lists(
     points, normals = representative_points(buffer, everywhere, settings.representative)
     refined = np.zeros(len(tree.level), np.bool_) if start is None else interior_cells(tree, start)
     cells = ReceiverTree(tree.first, tree.roots, points, normals, refined)
-    return tree, _each_light(cells, lights, settings, pairs, footprint)
+    roots = slice(cells.roots)
+    return tree, _each_light(cells, lights, settings, pairs, footprint,
+                             lambda: evaluate(points[:, roots], normals[:, roots], lights, pairs, footprint))
 
 
 def _each_light(
-    cells: ReceiverTree, lights: "PixelLights", settings: "ByIrradiance", pairs: "PairSettings", footprint: Array | None
+    cells: ReceiverTree, lights: "PixelLights", settings: "ByIrradiance", pairs: "PairSettings",
+    footprint: Array | None, at_roots: Callable[[], Array],
 ) -> Iterator[tuple[Array, Array]]:
     points, normals = cells.points, cells.normals
     receivers = Receivers(points[:, None], normals[:, None], np.ones((1, points.shape[1]), np.bool_))
     packed = checked(receivers, lights, pairs, footprint)
     lobe_clamp, widening = (None, None) if packed.lobes is None else packed.lobes[1:]
-    lights_apart, threshold = single_lights(packed), _threshold(cells, lights, settings, pairs, footprint)
+    lights_apart, threshold = single_lights(packed), _threshold(cells, lights, settings, at_roots)
     count = len(packed.shines)
     batch = _batch_lists(count, points)
     chosen, values = np.empty(points.shape[1], np.int32), np.empty_like(points)
@@ -185,9 +254,12 @@ def _batch_lists(lights: int, points: Array) -> SubsplatLists:
 
 
 def _threshold(
-    cells: ReceiverTree, lights: "PixelLights", settings: "ByIrradiance", pairs: "PairSettings", footprint: Array | None
+    cells: ReceiverTree, lights: "PixelLights", settings: "ByIrradiance", at_roots: Callable[[], Array]
 ) -> tuple[Any, Any]:
-    """Return (a, b) of T = a + b times the largest irradiance of a light's samples."""
+    """Return (a, b) of T = a + b times the largest irradiance of a light's samples.
+
+    `at_roots` returns the sum of all lights at the coarsest cells, (3, n).
+    """
     real = cells.points.dtype.type
     value, zero = real(settings.threshold), real(0.0)
     if value == 0:  # splits every cell, those whose quadrants are all equal too
@@ -196,9 +268,7 @@ def _threshold(
         return zero, value
     if settings.form == "absolute":
         return value, zero
-    roots = slice(cells.roots)
-    sums = evaluate(cells.points[:, roots], cells.normals[:, roots], lights, pairs, footprint)
-    return value * sums.max(initial=zero) / real(max(1, lights.position.shape[1])), zero
+    return value * at_roots().max(initial=zero) / real(max(1, lights.position.shape[1])), zero
 
 
 @kernel(parallel=True)

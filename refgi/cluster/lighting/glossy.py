@@ -1,0 +1,92 @@
+"""Lobes of glossy receivers under the visibility of area lights: L_s(x) = sum_m V_m(x) sum_i f_s I_i cos / r^2.
+
+The pixel lights of an area light are summed one by one, each with f_s in its own direction; V is that of the area
+light, as for irradiance. Every glossy pixel sums all lights: nothing is interleaved or blurred.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
+from refgi.cluster.lighting.clustered import places_with_light, visibility_by
+from refgi.cluster.lighting.interleave import member_lights, some_lights
+from refgi.errors import expect
+from refgi.pairs.glossy import as_receivers, block_order, summed
+from refgi.pairs.irradiance import checked
+from refgi.rsm.buffers.glossy import GlossyPoints
+from refgi.stages import report_progress, stage
+
+if TYPE_CHECKING:
+    from refgi.cluster.maps.shadow_maps import ShadowMaps
+    from refgi.cluster.settings import ValSettings
+    from refgi.lights import PixelLights
+    from refgi.rays import Tracer
+
+Array = npt.NDArray[Any]
+
+
+@stage("cluster.glossy")
+def clustered_radiance(
+    points: GlossyPoints, facing: Array, lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps | None",
+    settings: "ValSettings", footprint: Array | None = None, visibility_of: VisibilityFunction | None = None,
+    rays: "Tracer | None" = None, width: int = 0,
+) -> Array:
+    """Sum the radiance that lobes make of every pixel light under the visibility of its area light.
+
+    Parameters
+    ----------
+    points : GlossyPoints
+        The n receivers; their dtype is that of the result.
+    facing : (3, n) ndarray
+        Normals of the triangles that the points lie on.
+    lights : PixelLights
+        N lights.
+    areas : AreaLights
+        The area lights; `of` says which is whose.
+    maps : ShadowMaps or None
+        Their shadow maps; not read without visibility or where `visibility_of` is there.
+    settings : ValSettings
+        How one light lights one receiver, and how visibility is found.
+    footprint : (N,) ndarray, optional
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+    visibility_of : callable, optional
+        V from elsewhere: (m, points (3, n), facing (3, n)) -> (n,).
+    rays : Tracer, optional
+        As for `clustered_irradiance`.
+    width : int
+        Of the picture that the points are pixels of; 0: neighbours follow each other already.
+
+    Returns
+    -------
+    (3, n) ndarray
+        W/m^2/sr, linear RGB.
+
+    Raises
+    ------
+    InputError
+        As `clustered_irradiance`.
+    """
+    expect(len(areas.of) == lights.position.shape[1], "areas.of", f"one place for each of {lights.position.shape[1]} "
+           "lights", len(areas.of))
+    packed = checked(as_receivers(points), lights, settings.pairs, footprint)
+    members = member_lights(packed, areas.of, len(areas.members), np.zeros(len(areas.of), np.int64), 1)
+    visible_from = visibility_by(areas, maps, settings, visibility_of, rays)
+    order = np.arange(len(points.pixel)) if width == 0 else block_order(points.pixel, width)
+    here = GlossyPoints(*(np.ascontiguousarray(plane[..., order]) for plane in points))
+    faces = np.ascontiguousarray(facing[:, order], here.position.dtype)
+    sums = np.zeros_like(here.position)
+    for m, (start, lobe_start) in enumerate(zip(members.start, members.lobe_start, strict=True)):
+        some = some_lights(members.packed, start, lobe_start)
+        if some.diffuse.shape[1] > 1 or some.lobes is not None:
+            part = summed(here, some, (None, None))
+            places = places_with_light(part)
+            if len(places):
+                visible = visible_from(m, here.position[:, places], faces[:, places])
+                # Sec. 4: sum_m V_m L_m
+                sums[:, places] += part[:, places] * np.asarray(visible, sums.dtype)
+        report_progress((m + 1) / len(members.start))
+    result = np.empty_like(sums)
+    result[:, order] = sums
+    return result

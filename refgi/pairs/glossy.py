@@ -1,0 +1,143 @@
+"""From pixel lights to radiance of glossy receivers: checks, packing and order around `glossy_sum`."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.pairs.glossy_sum import add_diffuse_lights, add_glossy_lights, receiver_lobes_of
+from refgi.pairs.irradiance import PAIRS_AT_ONCE, Receivers, checked
+from refgi.pairs.lobe_culling import LIMIT, bound_lobes
+from refgi.pairs.packing import Packed
+from refgi.pairs.pair_sum import TILE
+from refgi.pairs.pixel_lights import Range
+from refgi.pairs.settings import PairSettings
+from refgi.pairs.tile_counts import tiles_behind
+from refgi.rsm.buffers.glossy import GlossyPoints
+from refgi.skips import left_out
+from refgi.stages import report_progress, stage, tally
+
+if TYPE_CHECKING:
+    from refgi.pairs.pixel_lights import PixelLights
+
+Array = npt.NDArray[Any]
+
+
+@stage("pairs.glossy_sum")
+def glossy_radiance(
+    points: GlossyPoints, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None, width: int = 0,
+) -> Array:
+    """Sum the radiance that every receiver's lobe reflects towards the eye, of every pixel light (AMS Eq. 2).
+
+    Parameters
+    ----------
+    points : GlossyPoints
+        The n receivers; their dtype is that of the result.
+    lights : PixelLights
+        Lights to sum.
+    settings : PairSettings
+        How one light lights one receiver.
+    footprint : (N,) ndarray, optional
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+    width : int
+        Of the picture that the points are pixels of; 0: neighbours follow each other already. Of no other meaning.
+
+    Returns
+    -------
+    (3, n) ndarray
+        W/m^2/sr, linear RGB, without visibility.
+
+    Raises
+    ------
+    InputError
+        As `pairs.irradiance.irradiance`.
+
+    Notes
+    -----
+    L_s = sum f_s(w_i, w_o) I_i cos / r^2 with f_s = specular (P + 2) / (2 pi) <m . w>^P. The paper's rho_s is any BRDF;
+    its pi is part of the lights here. Lights are summed one by one, never by clusters. Results do not depend on the
+    number of threads or on which receivers follow each other, to the bit.
+    """
+    return summed(points, checked(as_receivers(points), lights, settings, footprint), (None, None), width)
+
+
+def as_receivers(points: GlossyPoints) -> Receivers:
+    """Return glossy points as a picture of one row.
+
+    Parameters
+    ----------
+    points : GlossyPoints
+        n receivers.
+
+    Returns
+    -------
+    Receivers
+        (3, 1, n) and (1, n).
+    """
+    return Receivers(points.position[:, None], points.normal[:, None], np.ones((1, len(points.pixel)), np.bool_))
+
+
+def summed(points: GlossyPoints, packed: Packed, ranges: tuple[Range | None, Range | None], width: int = 0) -> Array:
+    """Sum packed lights at glossy receivers.
+
+    Parameters
+    ----------
+    points : GlossyPoints
+        The n receivers.
+    packed : Packed
+        The lights, in the dtype of the receivers.
+    ranges : tuple of 2 Range or None
+        Of the diffuse lights and of the lobes: which pairs count; None: all.
+    width : int
+        As for `glossy_radiance`.
+
+    Returns
+    -------
+    (3, n) ndarray
+        W/m^2/sr.
+    """
+    order = np.arange(len(points.pixel)) if width == 0 else block_order(points.pixel, width)
+    tally("pairs", lambda: len(order) * packed.terms)
+    result = np.zeros_like(points.position)
+    step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(packed.shines)) // TILE * TILE)
+    for first in range(0, len(order), step):
+        part = order[first : first + step]
+        sums = np.zeros((3, len(part)), points.position.dtype)
+        _add_lights(GlossyPoints(*(np.ascontiguousarray(plane[..., part]) for plane in points)), packed, ranges, sums)
+        result[:, part] = sums * points.specular[:, part]
+        report_progress(min(1.0, (first + step) / len(order)))
+    return result
+
+
+def _add_lights(points: GlossyPoints, packed: Packed, ranges: tuple[Range | None, Range | None], sums: Array) -> None:
+    of = receiver_lobes_of(points.mirrored, points.exponent)
+    place = points.position, points.normal
+    if packed.diffuse.shape[1] > 1:
+        culls = left_out("pairs.tiles", lambda: tiles_behind(*place, packed.diffuse))
+        add_diffuse_lights(*place, of, packed.diffuse, packed.clamp, packed.spheres, ranges[0], culls, sums)
+    if packed.lobes is not None:
+        lights, clamp, widening = packed.lobes
+        limits = bound_lobes(lights[9], -1.0)[LIMIT].copy()
+        add_glossy_lights(*place, of, lights, limits, clamp, widening, ranges[1], sums)
+
+
+def block_order(pixel: Array, width: int) -> Array:
+    """Return the order of pixels by blocks of 16 x 16, within these 8 x 8 after 8 x 8, then 4 x 4.
+
+    Parameters
+    ----------
+    pixel : (n,) ndarray of int
+        Flat indices into a picture.
+    width : int
+        Of the picture.
+
+    Returns
+    -------
+    (n,) ndarray of int
+        Tiles of receivers that follow each other in it are compact.
+    """
+    row, column = np.divmod(pixel, width)
+    key = row // 16 * (width // 16 + 1) + column // 16
+    for side in (8, 4):
+        key = key * 4 + row // side % 2 * 2 + column // side % 2
+    return np.argsort(key * 16 + row % 4 * 4 + column % 4, kind="stable")

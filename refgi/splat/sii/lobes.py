@@ -1,0 +1,85 @@
+"""Lobes of glossy receivers by pixel lights: L_s = sum over lights of f_s I cos / r^2, over the pairs that count."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy.typing as npt
+
+from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import with_clamp
+from refgi.pairs.glossy import as_receivers, glossy_radiance, summed
+from refgi.pairs.irradiance import Receivers, checked
+from refgi.rsm.buffers.glossy import GlossyPoints, spread_over_picture
+from refgi.settings import replaced
+from refgi.splat.sii.reach.lists import LightLists
+from refgi.splat.sii.reach.reference_length import with_reference_length
+from refgi.splat.sii.settings import FullBound, SiiSettings
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.frame import Frame
+    from refgi.lights import PixelLights
+
+Array = npt.NDArray[Any]
+
+
+def sii_lobes(frame: "Frame", settings: SiiSettings) -> Array:
+    """Return the radiance towards the eye that receivers' lobes make of the pixel lights of `sii`.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene and its buffers.
+    settings : SiiSettings
+        As for `sii`.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        W/m^2/sr, linear RGB, without visibility; 0 where there is no lobe.
+
+    Notes
+    -----
+    Every glossy pixel sums all lights, one by one, whatever `half_resolution` and `lightcuts` say of irradiance. A cut
+    leaves out the same pairs as from the irradiance: its threshold is of the irradiance that a light causes at most,
+    and knows nothing of the receiver's lobe.
+    """
+    settings = with_clamp(settings)
+    lights = choose_lights(frame, settings.lights)
+    footprint = footprints(frame, settings.lights, settings.pairs)
+    points = frame.glossy_points
+    if settings.reach.cut is None:
+        radiance = glossy_radiance(points, lights, settings.pairs, footprint, frame.width)
+    else:
+        receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+        resolved = with_reference_length(receivers, lights, settings)
+        radiance = glossy_in_range(points, lights, resolved, footprint, frame.width)
+    return spread_over_picture(points, radiance, (frame.height, frame.width))
+
+
+@stage("sii.glossy_sum")
+def glossy_in_range(
+    points: GlossyPoints, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None, width: int = 0,
+) -> Array:
+    """Sum the radiance that lobes make of the pairs with B >= I_low (SII Sec. 3.4).
+
+    Parameters
+    ----------
+    points : GlossyPoints
+        The n receivers.
+    lights : PixelLights
+        Lights to sum.
+    settings : SiiSettings
+        The parts `reach`, with its reference length, and `pairs`; the bound does not matter.
+    footprint : (N,) ndarray, optional
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+    width : int
+        As for `glossy_radiance`.
+
+    Returns
+    -------
+    (3, n) ndarray
+        W/m^2/sr, linear RGB.
+    """
+    packed = checked(as_receivers(points), lights, settings.pairs, footprint)
+    lists = LightLists(packed, replaced(settings, {"reach.bound": FullBound()}), False, 1, None)
+    return summed(points, packed, (lists.diffuse, lists.lobes), width)

@@ -1,0 +1,165 @@
+"""Crown samples of glossy receivers, drawn by importance: more where lobes point on the screen (Soler 2009, Sec. 5).
+
+Every glossy pixel is a receiver at full resolution on every level, as an upsampled highlight would be a blurred one.
+Its samples lie at the distances of `points`, but around the azimuth phi at which the mirrored ray leaves the pixel on
+the picture: a ray that starts at the pixel stays on one half-line of it. From a uniform v of the unit interval ::
+
+    angle = phi + 2 arctan(s tan(pi (v - 1/2))), weight s / (c^2 + s^2 (1 - c^2)) with c = cos(pi (v - 1/2)),
+
+a wrapped Cauchy density: half of the samples lie within 2 arctan s of phi, and none weighs more than 1 / s times what
+it would by a uniform density. s is the width of the lobe, 1 / sqrt(P + 2), over the sine of the angle between m and the
+line of sight, which widens it on the picture; at most 1, which is uniform.
+
+Symbols: d vector from receiver to sample (m), m direction to the eye mirrored, P exponent.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.lobes import receiver_lobe
+from refgi.rsm.buffers.glossy import GlossyPoints
+from refgi.rsm.raster.projection import Projection
+from refgi.sampling import FIRST_STEP, SECOND_STEP, hash_bits
+from refgi.sssil.crown.add import disc_texels, form_factor
+from refgi.sssil.crown.points import TO_UNIT, distance, pixel_key, relative_weight, row_key
+from refgi.sssil.pyramid.view import Level
+
+Array = npt.NDArray[Any]
+
+LEAST_SPREAD = 1.0 / 64  # of s: finer than texels of a crown, and what bounds weights
+
+
+class GlossyReceivers(NamedTuple):
+    """Glossy pixels of a picture, in float64."""
+
+    row: Array  # (n,) int64
+    column: Array  # (n,) int64
+    position: Array  # (3, n) from the eye of the picture, m
+    normal: Array  # (3, n)
+    mirrored: Array  # (3, n)
+    exponent: Array  # (n,)
+    azimuth: Array  # (2, n) cosine and sine of phi, columns right and rows down
+    spread: Array  # (n,) s
+
+
+class Draws(NamedTuple):
+    """How the samples of a level are drawn."""
+
+    inner: int  # samples in the disc; the others lie in the crown
+    radius: float  # of the crown, texels
+    uniform: bool  # density
+    weight: Array  # (m,) texels that each sample stands for in the mean
+    key: Any  # uint32, of the level
+    every: Array  # (m, 2) int32 offsets that all receivers share, each of one texel; (0, 2) where each draws its own
+
+
+def glossy_receivers(points: GlossyPoints, projection: Projection) -> GlossyReceivers:
+    """Return glossy pixels of a camera's picture as receivers of crowns.
+
+    Parameters
+    ----------
+    points : GlossyPoints
+        The n pixels, of this picture.
+    projection : Projection
+        The camera's map.
+
+    Returns
+    -------
+    GlossyReceivers
+        With the azimuth of their lobes.
+    """
+    row, column = np.divmod(points.pixel, projection.width)
+    position, normal, mirrored = (np.asarray(part, np.float64)
+                                  for part in (points.position, points.normal, points.mirrored))
+    position = position - projection.origin[0][:, None]
+    right, down, ahead = projection.frame[0]
+    depth, along = ahead @ position, ahead @ mirrored
+    x = ((right @ mirrored) * depth - (right @ position) * along) * (projection.width / float(projection.half[0]))
+    y = ((down @ mirrored) * depth - (down @ position) * along) * (projection.height / float(projection.half[1]))
+    length = np.hypot(x, y)
+    azimuth = np.stack([np.divide(x, length, out=np.ones_like(x), where=length > 0),
+                        np.divide(y, length, out=np.zeros_like(y), where=length > 0)])
+    away = np.cross(position, mirrored, axis=0)
+    sine = np.sqrt((away * away).sum(axis=0) / np.maximum((position * position).sum(axis=0), np.finfo(float).tiny))
+    exponent = np.asarray(points.exponent, np.float64)
+    spread = 1.0 / np.maximum(np.sqrt(exponent + 2.0) * sine, 1.0)
+    return GlossyReceivers(row, column, position, normal, mirrored, exponent, azimuth,
+                           np.clip(spread, LEAST_SPREAD, 1.0))
+
+
+@kernel
+def warped(v: float, cosine: float, sine: float, spread: float) -> Any:
+    """Return cosine and sine of the angle of a point v of [0, 1), and its weight over that of a uniform density.
+
+    `cosine` and `sine` are of phi, `spread` is s.
+    """
+    c, s = math.cos(math.pi * (v - 0.5)), math.sin(math.pi * (v - 0.5))
+    across = spread * s
+    square = c * c + across * across
+    turn_cosine, turn_sine = (c * c - across * across) / square, 2.0 * across * c / square
+    return (cosine * turn_cosine - sine * turn_sine, sine * turn_cosine + cosine * turn_sine, spread / square)
+
+
+@kernel(parallel=True)
+def draw_samples(
+    to: GlossyReceivers, first: int, last: int, level: Level, draws: Draws, form: int, share: float, transfer: Array,
+    sender: Array,
+) -> None:
+    """Fill the samples of receivers `first` to `last` on a level of senders.
+
+    `form` and `share` are the form factor's. `sender` (pairs,) gets texels, row * columns + column; `transfer` (pairs,)
+    f_s times pi times the form factor: what of the sender's radiance the lobe reflects, 1; 0 where nothing.
+    """
+    count = len(draws.weight)
+    for i in prange(last - first):
+        _draw(to, first + np.int64(i), level, draws, form, share, np.int64(i) * count, transfer, sender)
+
+
+@kernel
+def _draw(
+    to: GlossyReceivers, i: Any, level: Level, draws: Draws, form: int, share: float, pair: Any, transfer: Array,
+    sender: Array,
+) -> None:
+    rows, columns = level.area.shape
+    row, column = to.row[i] >> level.number, to.column[i] >> level.number
+    key = pixel_key(row_key(draws.key, to.row[i]), to.column[i])
+    shift_u, shift_v = hash_bits(key) * TO_UNIT, hash_bits(key ^ np.uint32(0x27D4EB2F)) * TO_UNIT
+    for j in range(len(draws.weight)):
+        stands_for = draws.weight[j]
+        if len(draws.every) > 0:
+            ox, oy = np.int64(draws.every[j, 0]), np.int64(draws.every[j, 1])
+        else:
+            near = 0.0 if j < draws.inner else 1.0
+            n = j if j < draws.inner else j - draws.inner
+            u, v = (0.5 + n * FIRST_STEP + shift_u) % 1.0, (0.5 + n * SECOND_STEP + shift_v) % 1.0
+            far = distance(u, near, draws.radius, draws.uniform)
+            x, y, relative = warped(v, to.azimuth[0, i], to.azimuth[1, i], to.spread[i])
+            stands_for *= relative_weight(far, near, draws.radius, draws.uniform) * relative
+            ox, oy = np.int64(math.floor(far * x + 0.5)), np.int64(math.floor(far * y + 0.5))
+        a, b = row + oy, column + ox
+        transfer[pair + j], sender[pair + j] = 0.0, 0
+        if 0 <= a < rows and 0 <= b < columns and not (ox == 0 and oy == 0):
+            sender[pair + j] = a * columns + b
+            transfer[pair + j] = glossy_transfer(to, i, level, a, b, stands_for, disc_texels(stands_for, form, share))
+
+
+@kernel
+def glossy_transfer(to: GlossyReceivers, i: Any, level: Level, a: Any, b: Any, weight: float, disc: float) -> Any:
+    """Return f_s times pi times the form factor of a receiver and a texel that stands for `weight`, its disc `disc`.
+
+    Over the receiver's specular reflectance; 0 where nothing is reflected.
+    """
+    dx, dy, dz = (level.position[0, a, b] - to.position[0, i], level.position[1, a, b] - to.position[1, i],
+                  level.position[2, a, b] - to.position[2, i])
+    c = to.normal[0, i] * dx + to.normal[1, i] * dy + to.normal[2, i] * dz
+    s = -(level.normal[0, a, b] * dx + level.normal[1, a, b] * dy + level.normal[2, a, b] * dz)
+    if c <= 0.0 or s <= 0.0:
+        return 0.0
+    texel = s * (level.area[a, b] / math.pi)
+    lobe = receiver_lobe(to.mirrored[0, i], to.mirrored[1, i], to.mirrored[2, i], dx, dy, dz, to.exponent[i])
+    # Eq. (4), or (3), times f_s
+    return lobe * form_factor(math.pi * c, texel * weight, texel * disc, dx * dx + dy * dy + dz * dz)

@@ -1,0 +1,174 @@
+"""Lobes of glossy receivers by what the camera sees: crown samples of every level, each times f_s.
+
+The paper assumes diffuse surfaces and names what glossy ones need: "importance-sample the BRDF" among samples of the
+picture. Receivers are the glossy pixels, at full resolution on every level (`crown.glossy`), where irradiance has a
+receiver for each texel: on level k that is 4^k times as many sums, for glossy pixels alone.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.pairs.shadow_rays import receivers
+from refgi.rsm.buffers.glossy import GlossyPoints, glossy_points, spread_over_picture
+from refgi.settings import replaced
+from refgi.sssil.cameras import join_cameras
+from refgi.sssil.crown.add import form_of
+from refgi.sssil.crown.gather import level_factor
+from refgi.sssil.crown.glossy import Draws, draw_samples, glossy_receivers
+from refgi.sssil.crown.pattern import every_texel
+from refgi.sssil.crown.points import level_key, sample_weight
+from refgi.sssil.crown.reach import chosen_radius
+from refgi.sssil.pyramid.levels import pyramid, sender_pyramid
+from refgi.sssil.pyramid.view import Level
+from refgi.sssil.settings import Bitmask, HssilSettings, Rays
+from refgi.sssil.visibility.glossy import fill_glossy_rays, march_samples, slice_samples
+from refgi.sssil.visibility.rays import add_unoccluded, surfels_of
+from refgi.stages import report_progress, stage, tally
+
+if TYPE_CHECKING:
+    from refgi.frame import Frame
+
+Array = npt.NDArray[Any]
+
+BATCH = 1 << 18  # pairs held at a time
+
+
+def hssil_lobes(frame: "Frame", settings: HssilSettings) -> Array:
+    """Return the radiance towards the eye that receivers' lobes make of what a camera sees.
+
+    Parameters
+    ----------
+    frame : Frame
+        Scene, camera and lights.
+    settings : HssilSettings
+        As for `hssil`; whatever the pattern but "all", each pixel has samples of its own, and nothing is blurred.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        W/m^2/sr, linear RGB; 0 where there is no lobe.
+    """
+    lobes = view_lobes(frame, frame.glossy_points, settings)
+    if not (settings.cameras.count or settings.cameras.views):
+        return lobes
+    eye = frame.scene.camera.eye
+
+    def through(other: "Frame") -> Array:
+        return view_lobes(other, glossy_points(other.gbuffer, other.materials, eye), settings)
+
+    joined = join_cameras(frame, lobes, settings.cameras, through)
+    glossy = np.zeros(joined.shape[1:], np.bool_)
+    glossy.reshape(-1)[frame.glossy_points.pixel] = True
+    return np.where(glossy, joined, joined.dtype.type(0.0))
+
+
+def view_lobes(frame: "Frame", points: GlossyPoints, settings: HssilSettings) -> Array:
+    """Return the lobes of some pixels by what this camera alone sees.
+
+    Parameters
+    ----------
+    frame : Frame
+        Scene, camera and lights.
+    points : GlossyPoints
+        Pixels of this camera; their lobes may belong to another eye.
+    settings : HssilSettings
+        Sampling, levels and visibility.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        W/m^2/sr.
+    """
+    levels = pyramid(frame, settings)
+    senders = sender_pyramid(frame, levels, settings)
+    settings = replaced(settings, {"sampling.radius": chosen_radius(levels[0].shape, settings.sampling)})
+    total = np.zeros(points.position.shape)
+    for index, level in enumerate(senders):
+        if settings.senders.only_level in (None, index):
+            total += glossy_level(frame, points, level, index, settings)
+    radiance = (total * points.specular).astype(points.position.dtype)
+    return spread_over_picture(points, radiance, (frame.height, frame.width))
+
+
+@stage("sssil.glossy", kept=False)
+def glossy_level(
+    frame: "Frame", points: GlossyPoints, senders: Level, index: int, settings: HssilSettings
+) -> Array:
+    """Sum what lobes reflect of the samples of one level.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene whose view the level is.
+    points : GlossyPoints
+        The n receivers.
+    senders : Level
+        The level.
+    index : int
+        0 for the first level, whose inner disc is sampled as well.
+    settings : HssilSettings
+        Sampling, with its radius, form factor and visibility.
+
+    Returns
+    -------
+    (3, n) ndarray of float64
+        Radiance over the lobes' reflectance, W/m^2/sr.
+    """
+    to = glossy_receivers(points, frame.gbuffer.projection)
+    draws, slices = _draws(senders, index, settings), None
+    if isinstance(settings.visibility, Bitmask):
+        slices = slice_samples(to, senders, index, settings, frame.visible_extent.diagonal)
+    count = len(draws.weight) if slices is None else slices.per_receiver
+    tally("pairs", lambda: len(points.pixel) * count)
+    radiance = np.asarray(senders.radiance.reshape(3, -1), np.float64)
+    total, step = np.zeros((3, len(points.pixel))), max(1, BATCH // max(count, 1))
+    rays = _Rays(frame, points, senders) if isinstance(settings.visibility, Rays) else None
+    form, share = form_of(settings.senders.form_factor), settings.senders.disc_share
+    transfer, sender = np.empty(step * count), np.empty(step * count, np.int64)
+    blocked = np.zeros(step * count, np.bool_)
+    for first in range(0, total.shape[1], step):
+        last = min(first + step, total.shape[1])
+        if slices is None:
+            draw_samples(to, first, last, senders, draws, form, share, transfer, sender)
+        else:
+            march_samples(to, first, last, senders, slices, form, share, transfer, sender)
+        if rays is not None:
+            rays.trace(first, last, count, transfer, sender, blocked)
+        add_unoccluded(radiance, first, last, count, blocked, transfer, sender, total)
+        report_progress(last / total.shape[1])
+    result: Array = total * level_factor(index, settings)
+    return result
+
+
+def _draws(level: Level, index: int, settings: HssilSettings) -> Draws:
+    """Return how samples of a level are drawn; the radius of the settings is set."""
+    sampling = settings.sampling
+    assert sampling.radius is not None
+    radius, key = float(sampling.radius), level_key(sampling.seed, level.number)
+    if sampling.pattern == "all":
+        every = every_texel(0.0 if index == 0 else radius, 2.0 * radius, level.shape)
+        return Draws(0, radius, True, np.ones(len(every)), key, np.ascontiguousarray(every))
+    inner, crown = sampling.counts(index)
+    return Draws(inner, radius, sampling.density == "uniform", sample_weight(radius, inner, crown), key,
+                 np.zeros((0, 2), np.int32))
+
+
+class _Rays:
+    """Shadow rays from glossy pixels to texels."""
+
+    def __init__(self, frame: "Frame", points: GlossyPoints, senders: Level) -> None:
+        triangle_id = frame.gbuffer.triangle_id.reshape(-1)[points.pixel]
+        self._tracer = frame.tracer
+        self._to = receivers(frame.scene.geometry, points.position, points.normal, triangle_id, frame.tracer.grain)
+        self._from = surfels_of(senders, frame)
+
+    def trace(self, first: int, last: int, count: int, transfer: Array, sender: Array, blocked: Array) -> None:
+        """Fill which pairs of receivers `first` to `last` are blocked; pairs that transfer nothing are not traced."""
+        size = (last - first) * count
+        origin, direction = np.empty((size, 3), np.float32), np.empty((size, 3), np.float32)
+        reach = np.empty(size, np.float32)
+        fill_glossy_rays(self._to, self._from, first, last, count, sender, transfer, origin, direction, reach)
+        self._tracer.fill_occluded(origin, direction, reach, blocked[:size])
+

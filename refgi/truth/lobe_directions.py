@@ -1,0 +1,148 @@
+"""Directions drawn from a receiver's lobe, and next-event estimation (NEE) where they land.
+
+A direction of density (P + 1) / (2 pi) <m.w>^P that finds radiance L contributes s (P + 2) / (P + 1) <n.w> L: bounded,
+however sharp the lobe. Symbols: as in `refgi.truth.lobe_receivers` and `refgi.truth.surfaces`; x the receiver, y where
+a direction lands, A = r^2 n_a / n_b with n_a = D <m.w>^P <g.w> / r^2, D of `density_on_axis`, and n_b = <g.l> / (Omega
+d^2) for a light one of whose rays has Omega.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.lobes import lobe_direction
+from refgi.pairs.shadow_rays import RayReceivers
+from refgi.radiometry import DIRECTIONAL, incident_light
+from refgi.rays import MISS
+from refgi.sampling import hash_bits
+from refgi.scene import LightTable
+from refgi.truth.hemisphere import short_of, toward_light
+from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, comes_by_photons, density_on_axis
+from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point, row
+from refgi.truth.surfaces import around, face_cross, lift, lobe_pattern, shading_normal
+from refgi.truth.textured import diffuse_at
+
+Array = npt.NDArray[Any]
+
+
+@kernel(parallel=True)
+def send_along_lobes(receivers: RayReceivers, lobes: Lobes, span: tuple[int, int], points: Array, seed: int,
+                     paths: Paths, density: Array) -> None:
+    """Send one ray for each point of the set along the lobe of each receiver of a span.
+
+    `span`: first receiver and one past the last. `points` (s, 2) uint32: the pass's point set. `seed`: random shift: a
+    hash of it and the receiver's pixel. `paths`: origins, directions, reach, lengths, cosines and weights are filled.
+    `density` (n,) float64: filled: D <m.w>^P of each direction, 1/sr; inf for a receiver that takes nothing from light
+    vertices.
+    """
+    count = span[1] - span[0]
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        _send(receivers, lobes, span[0], (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)), points, seed, paths,
+              density)
+
+
+@kernel
+def _send(receivers: RayReceivers, lobes: Lobes, first: int, span: tuple[int, int], points: Array, seed: int,
+          paths: Paths, density: Array) -> None:
+    origins, directions, reaches, travelled, cosines, _, _, weights = paths
+    pixel, _, normals, facing, starts = receivers
+    ray, count = span[0] * len(points), len(points)
+    for r in range(first + span[0], first + span[1]):
+        word = hash_bits(np.uint32(pixel[r]) ^ np.uint32(seed))
+        shift_u, shift_v = hash_bits(word ^ np.uint32(0x68E31DA4)), hash_bits(word ^ np.uint32(0xB5297A4D))
+        exponent, mirror = lobes.exponent[r], (lobes.mirrored[0, r], lobes.mirrored[1, r], lobes.mirrored[2, r])
+        for s in range(count):
+            u = ((points[s, 0] ^ shift_u) + 0.5) * 2.0**-32
+            v = ((points[s, 1] ^ shift_v) + 0.5) * 2.0**-32
+            x, y, z = lobe_direction(u, v, exponent)
+            w = around(mirror, x, y, z)
+            cosine = normals[0, r] * w[0] + normals[1, r] * w[1] + normals[2, r] * w[2]
+            above = facing[0, r] * w[0] + facing[1, r] * w[1] + facing[2, r] * w[2]
+            reaches[ray] = np.inf if above > 0 and cosine > 0 else 0
+            travelled[ray] = 0
+            cosines[ray] = cosine
+            # cos^P = u^(P / (P + 1))
+            density[ray] = (np.inf if exponent > SHARPEST_VERTEX else
+                            density_on_axis(exponent, count) * math.exp(math.log(u) * exponent / (exponent + 1)))
+            # f_s <n.w> over the density
+            weight = cosine * (exponent + 2) / (exponent + 1) / count
+            for c in range(3):
+                origins[ray, c] = starts[c, r]
+                directions[ray, c] = w[c]
+                weights[ray, c] = lobes.specular[c, r] * weight
+            ray += 1
+
+
+@kernel(parallel=True)
+def gather_along_lobes(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float, float],
+                       rays: tuple[int, int], paths: Paths, density: Array, shadows: Shadows) -> None:
+    """Next-event estimation: write the shadow ray from each hit point to one light, and its contribution.
+
+    `limits`: whether light vertices share the light, measure of one light direction (sr or m^2), and the tracer's
+    grain. `rays`: first receiver, and rays of each. `density` (n,): as `send_along_lobes` fills it. `shadows`: origins,
+    directions, reach and contribution are filled; the reach is 0 where nothing contributes.
+    """
+    count = len(paths.reach)
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        _gather(lobes, lights, k, limits, rays, paths, density, shadows,
+                (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
+
+
+@kernel
+def _gather(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float, float], rays: tuple[int, int],
+            paths: Paths, density: Array, shadows: Shadows, span: tuple[int, int]) -> None:
+    _, measure, grain = limits
+    directional, surfaces = lights.kind[k] == DIRECTIONAL, lobes.surfaces
+    for ray in range(span[0], span[1]):
+        triangle = paths.triangle_id[ray]
+        shadows.reach[ray] = 0
+        if triangle == MISS:
+            continue
+        w, y = hit_point(paths, ray)
+        toward = toward_light(lights, k, y)
+        cross = face_cross(surfaces, triangle)
+        side, side_out = dot(cross, toward), dot(cross, w)
+        if side * side_out <= 0:
+            continue
+        lx, ly, lz, far, red, green, blue = incident_light(lights, k, y[0], y[1], y[2])
+        if max(red, green, blue) <= 0:
+            continue
+        light, irradiance = (lx, ly, lz), (red, green, blue)
+        scale = math.copysign(1 / math.sqrt(dot(cross, cross)), side)
+        g = (cross[0] * scale, cross[1] * scale, cross[2] * scale)
+        cos_in, cos_out = dot(g, light), dot(g, w)
+        n = shading_normal(surfaces, triangle, y, g)
+        share = 1.0  # of the power heuristic: 1 / (1 + (r^2 / A)^2)
+        if limits[0] and density[ray] < np.inf:
+            length = np.float64(paths.travelled[ray]) + paths.distance[ray]
+            a = density[ray] * cos_out * (measure if directional else measure * dot(toward, toward)) / cos_in
+            ratio = length * length / a
+            share = 1 / (1 + ratio * ratio)
+        rho, glossy = diffuse_at(surfaces.textures, surfaces, triangle, y), row(
+            surfaces.specular, surfaces.material_of_face[triangle])
+        diffuse, lobe = share * max(0.0, dot(n, w)), 0.0
+        if max(glossy[0], glossy[1], glossy[2]) > 0:
+            lobe = _lobe_share(lobes, rays[0] + ray // rays[1], surfaces.material_of_face[triangle], share)
+            lobe *= lobe_pattern(surfaces, surfaces.material_of_face[triangle], n, light, w)
+        factor, most, offset = cos_in / (np.pi * cos_out), 0.0, lift(surfaces, triangle, y, g, grain)
+        for c in range(3):
+            # radiance = rho F / pi * pattern / <g.w>, F = E_perp <g.l>
+            contribution = paths.weight[ray, c] * factor * irradiance[c] * (rho[c] * diffuse + glossy[c] * lobe)
+            most = max(most, contribution)
+            shadows.contribution[ray, c] = contribution
+            shadows.origin[ray, c] = y[c] + offset * g[c]
+            shadows.direction[ray, c] = toward[c] if directional else toward[c] - offset * g[c]
+        if most > 0:
+            shadows.reach[ray] = np.inf if directional else short_of(lights, k, far, grain)
+
+
+@kernel
+def _lobe_share(lobes: Lobes, r: int, material: int, share: float) -> Any:
+    """Return which share of a sender's lobe a receiver's directions bring."""
+    sender = lobes.surfaces.exponent[material]
+    if sender < lobes.photon_exponent:
+        return share
+    return 0.0 if comes_by_photons(lobes.exponent[r], sender) else 1.0

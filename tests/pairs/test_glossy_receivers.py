@@ -1,0 +1,195 @@
+"""The sum over pairs of pixel light and glossy receiver: against the definition, to rounding, and always the same."""
+
+import math
+
+import numpy as np
+import pytest
+
+from refgi.errors import InputError
+from refgi.jit import threads
+from refgi.lights import PixelLights
+from refgi.pairs.glossy import block_order, glossy_radiance, summed
+from refgi.pairs.packing import pack
+from refgi.pairs.pixel_lights import Range
+from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, LobeSettings, PairSettings, SphereClamp
+from refgi.rsm.buffers.glossy import GlossyPoints
+from refgi.skips import without_skip
+from tests.glossy import defined
+from tests.pairs.sets import random_directions
+
+FLOAT64 = 2e-13  # of the largest: P = 10^6 multiplies the rounding of unit vectors by 10^3 where half is reflected
+CUT_CONES = 1e-6  # the twin's quadrature where a horizon cuts a cone
+U = 2.0**-24
+PLAIN = PairSettings(clamp=None)
+CLAMPS = {"distance": DistanceClamp(0.3), "geometry": GeometryClamp(2.0), "disc": DiscClamp()}
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(11)
+
+
+def scattered(rng, count, lamps, exponent, real=np.float64, *, near=None):
+    """Return receivers and lights anywhere, and the receivers' directions to the eye.
+
+    `near`: a light is put in the lobe of each receiver, off its axis by about `near` times its width.
+    """
+    position, normal, w_o = rng.uniform(-1, 1, (3, count)), random_directions(rng, count), random_directions(rng, count)
+    w_o = w_o * np.sign((w_o * normal).sum(axis=0))
+    mirror = 2 * (w_o * normal).sum(axis=0) * normal - w_o
+    exponents = np.broadcast_to(np.asarray(exponent, float), (count,))
+    points = GlossyPoints(np.arange(count), position, normal, mirror, exponents, rng.uniform(0.1, 1, (3, count)))
+    place, facing, flux = rng.uniform(-1, 1, (3, lamps)), random_directions(rng, lamps), rng.random((3, lamps))
+    axis = random_directions(rng, lamps)
+    if near is not None:
+        of = np.arange(lamps) % count
+        off = near / np.sqrt(exponents[of] + 1) * random_directions(rng, lamps)
+        place = position[:, of] + rng.uniform(0.3, 2, lamps) * (mirror[:, of] + off)
+        facing = -mirror[:, of]
+    axis = axis * np.sign((axis * facing).sum(axis=0))
+    lights = PixelLights(place, facing, flux, rng.random((3, lamps)), axis, rng.uniform(0, 30, lamps), lamps)
+    if real is np.float32:
+        points = GlossyPoints(points.pixel, *(part.astype(real) for part in points[1:]))
+        lights = lights._replace(**{key: getattr(lights, key).astype(real) for key in (
+            "position", "normal", "flux", "lobe_flux", "lobe_axis", "lobe_exponent")})
+    return points, lights, w_o
+
+
+@pytest.mark.feature("AMS-13", "REF-27")
+@pytest.mark.parametrize("exponent", [0.0, 1.0, 20.0, 1e3, 1e6])
+def test_it_is_the_sum_of_the_definition(exponent, rng, evidence):
+    """Some receivers see nothing in their lobe, others a light near its axis."""
+    points, lights, w_o = scattered(rng, 300, 90, exponent, near=1.0)
+    got, expected = glossy_radiance(points, lights, PLAIN), defined(points, lights, w_o, PLAIN)
+    assert expected.max() > 0
+    worst = np.abs(got - expected).max() / expected.max()
+    assert worst < FLOAT64
+    evidence(f"P = {exponent:g}: {worst:.1e} of the largest")
+
+
+def test_exponents_of_receivers_are_their_own(rng):
+    exponents = np.resize([0.0, 3.0, 50.0, 700.0], 260)
+    points, lights, w_o = scattered(rng, 260, 70, exponents)
+    np.testing.assert_allclose(glossy_radiance(points, lights, PLAIN), defined(points, lights, w_o, PLAIN), rtol=1e-11,
+                               atol=1e-13)
+
+
+@pytest.mark.parametrize("name", CLAMPS)
+def test_pairs_are_clamped_as_those_of_irradiance(name, rng):
+    points, lights, w_o = scattered(rng, 200, 80, 5.0)
+    pairs, footprint = PairSettings(clamp=CLAMPS[name]), rng.uniform(0.05, 0.5, 80)
+    expected = defined(points, lights, w_o, pairs, footprint)
+    np.testing.assert_allclose(glossy_radiance(points, lights, pairs, footprint), expected, rtol=1e-11, atol=1e-13)
+    assert np.abs(expected - defined(points, lights, w_o, PLAIN)).max() > 1e-3 * expected.max()
+
+
+def test_spheres_keep_the_lobe_of_their_centre(rng):
+    points, lights, w_o = scattered(rng, 100, 40, 4.0)
+    lights = lights._replace(lobe_flux=None, lobe_axis=None, lobe_exponent=None)
+    pairs, footprint = PairSettings(clamp=SphereClamp()), rng.uniform(0.01, 0.1, 40)
+    np.testing.assert_allclose(glossy_radiance(points, lights, pairs, footprint),
+                               defined(points, lights, w_o, pairs, footprint), rtol=CUT_CONES, atol=1e-12)
+    with pytest.raises(InputError, match="sphere"):
+        glossy_radiance(points, scattered(rng, 1, 40, 4.0)[1], pairs, footprint)
+
+
+@pytest.mark.parametrize("pairs", [PairSettings(clamp=None, offset=0.1),
+                                   PairSettings(clamp=None, lobe=LobeSettings(norm="full_lobe")),
+                                   PairSettings(clamp=None, lobe=LobeSettings(widening=1.5))], ids=str)
+def test_senders_are_those_of_irradiance(pairs, rng):
+    points, lights, w_o = scattered(rng, 100, 80, 5.0)
+    np.testing.assert_allclose(glossy_radiance(points, lights, pairs), defined(points, lights, w_o, pairs), rtol=1e-8,
+                               atol=1e-12)
+
+
+def test_float32_keeps_the_stated_bound(rng, evidence):
+    """Diffuse lights near the axis, one for each receiver, against the same numbers in float64."""
+    worst = 0.0
+    for exponent in (0.0, 1.0, 30.0, 1e3, 1e5):
+        points, lights, _ = scattered(rng, 600, 600, exponent, np.float32, near=1.0)
+        lights = lights._replace(lobe_flux=None, lobe_axis=None, lobe_exponent=None)
+        wide = GlossyPoints(points.pixel, *(part.astype(float) for part in points[1:]))
+        for k in range(0, 600, 7):
+            one = PixelLights(*(part[..., k : k + 1] for part in lights[:3]), None, None, None, 1)
+            here = GlossyPoints(*(part[..., k : k + 1] for part in points))
+            got = glossy_radiance(here, one, PLAIN).astype(float)
+            exact = glossy_radiance(GlossyPoints(*(part[..., k : k + 1] for part in wide)), one, PLAIN)
+            if exact.max() == 0:
+                continue
+            d = one.position.astype(float) - here.position
+            r, n, m = np.linalg.norm(d), here.normal.astype(float), here.mirrored.astype(float)
+            w = d / r
+            h = 0.5 * float(((m - w) ** 2).sum())
+            if h > 0.9:
+                continue
+            peak = (exponent + 2) / (2 * math.pi) * here.specular.astype(float) * one.flux / math.pi
+            lead = peak * (1 - h) ** exponent
+            cosines = float((w * n).sum()) - float((w * one.normal).sum())
+            bound = U * (exact * (20 + 5 * -exponent * math.log2(1 - h)
+                                  + 6.5 * exponent * (math.sqrt(2 * h) + h) / (1 - h)) + 4 * lead * cosines / r**2)
+            worst = max(worst, float((np.abs(got - exact) / bound).max()))
+    assert worst < 1
+    evidence(f"{worst:.2f} of the bound")
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+def test_the_sharpest_lobe_is_finite(real, rng):
+    points, lights, _ = scattered(rng, 300, 90, 1e20, real, near=0.0)
+    got = glossy_radiance(points, lights, PLAIN)
+    assert np.isfinite(got).all()
+    assert (got >= 0).all()
+
+
+def test_lights_at_a_receiver_give_nothing(rng):
+    points, lights, _ = scattered(rng, 5, 5, 10.0)
+    got = glossy_radiance(points, lights._replace(position=points.position.copy()), PLAIN)
+    assert np.isfinite(got).all()
+
+
+@pytest.mark.feature("REF-19")
+def test_bits_do_not_depend_on_order_tiles_threads_or_culling(rng):
+    points, lights, _ = scattered(rng, 1500, 150, np.resize([0.0, 9.0, 400.0], 1500), np.float32)
+    whole = glossy_radiance(points, lights, PLAIN)
+    order = rng.permutation(1500)
+    mixed = glossy_radiance(GlossyPoints(*(np.ascontiguousarray(part[..., order]) for part in points)), lights, PLAIN)
+    assert np.array_equal(mixed, whole[:, order])
+    assert np.array_equal(glossy_radiance(points, lights, PLAIN, width=37), whole)
+    for first in (0, 700):
+        part = slice(first, first + 333)
+        some = GlossyPoints(*(np.ascontiguousarray(plane[..., part]) for plane in points))
+        assert np.array_equal(glossy_radiance(some, lights, PLAIN), whole[:, part])
+    with threads(1), without_skip("pairs.tiles"):
+        assert np.array_equal(glossy_radiance(points, lights, PLAIN), whole)
+
+
+@pytest.mark.parametrize("outside", [False, True])
+def test_a_range_weighs_pairs_by_what_arrives_at_most(outside, rng):
+    """max(1, I_low / B) where B >= xi I_low, B the irradiance without the receiver's cosine; outside, 1 less that."""
+    points, lights, w_o = scattered(rng, 150, 60, 5.0)
+    packed = pack(lights, PLAIN, None, np.float64)
+    square, xi = rng.uniform(0.2, 1, 60), rng.uniform(0.3, 1, 60)
+    reach = Range(np.append(square, 1.0), np.append(xi, 1.0), outside), Range(square, xi, outside)
+
+    def factor(part, x):
+        away = x - part.position
+        r2 = (away**2).sum(axis=1)
+        cosine = np.maximum(0, away @ (part.axis if part.exponent else part.normal)) / np.sqrt(r2)
+        above = away @ part.normal > 0
+        b = square[part.xi] * np.where(above, cosine ** (part.exponent or 1.0), 0) / r2
+        kept = np.where(b >= xi[part.xi], np.maximum(1, 1 / np.maximum(b, 1e-300)), 0.0)
+        return 1 - kept if outside else kept
+
+    assert (lights.lobe_exponent > 0).all()
+    np.testing.assert_allclose(summed(points, packed, reach), defined(points, lights, w_o, PLAIN, factor=factor),
+                               rtol=1e-9, atol=1e-12)
+
+
+def test_blocks_follow_blocks():
+    """Each pixel once; 16 x 16 pixels after each other, 8 x 8 within them, 4 x 4 within those."""
+    pixel = np.arange(40 * 50)
+    order = block_order(pixel, 50)
+    assert np.array_equal(np.sort(order), pixel)
+    row, column = np.divmod(order[:256], 50)
+    assert (row.max(), column.max()) == (15, 15)
+    assert (row[:64].max(), column[:64].max()) == (7, 7)
+    assert (row[:16].max(), column[:16].max()) == (3, 3)

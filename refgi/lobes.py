@@ -9,8 +9,8 @@ vectors must be unit vectors: a length off by e costs e^2 / 2 in h. In float64 t
 may have (1e20, half of whose flux lies within 1.2e-10 rad); in float32 h is good to 1e-13, which suffices to 1e8.
 
 A receiver reflects by f_s(w, w_o) = specular (P + 2) / (2 pi) <m . w>^P, m the direction to the eye w_o mirrored: no
-part of it depends on the tilt, so it is reciprocal, and no more leaves than arrives. The form above is a sender's; as
-a receiver's it would not be reciprocal, and reflect up to 1.35 of a uniform field (docs/radiometry).
+part of it depends on the tilt, so it is reciprocal, and no more leaves than arrives. The form above is a sender's: with
+its K a receiver's would not be reciprocal, and reflect up to 1.36 of a uniform field (docs/radiometry).
 """
 
 import math

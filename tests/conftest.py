@@ -82,6 +82,7 @@ LONG = {
         "test_points_follow_the_density",
         "test_sets_and_densities_change_no_expectation[spot]",
     ),
+    "tests/truth/test_receiver_lobes.py": ("test_every_texel_of_the_map_gives_the_same[1000.0-None]",),
     "tests/truth/test_visible_emitters.py": (
         "test_estimators_agree_and_all_is_more",
         "test_the_part_of_a_sphere_that_is_seen[combined]",

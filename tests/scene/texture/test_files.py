@@ -337,9 +337,9 @@ def test_a_scene_needs_coordinates_for_its_textures(tmp_path: Path) -> None:
 
 def test_images_count_in_the_memory_guard(monkeypatch: pytest.MonkeyPatch) -> None:
     meshes = [Mesh(VERTICES, FACES, None, PAINT, "a", UVS)] * 3
-    monkeypatch.setattr("refgi.scene.mesh.physical_memory", lambda: 12 * 48.0 + 6 * (32 + 96) + 24 * 34)
+    monkeypatch.setattr("refgi.scene.mesh.physical_memory", lambda: 12 * 48.0 + 6 * (32 + 96) + 24 * 40)
     merge(meshes)
-    monkeypatch.setattr("refgi.scene.mesh.physical_memory", lambda: 12 * 48.0 + 6 * (32 + 96) + 24 * 34 - 1)
+    monkeypatch.setattr("refgi.scene.mesh.physical_memory", lambda: 12 * 48.0 + 6 * (32 + 96) + 24 * 40 - 1)
     with pytest.raises(InputError, match="12 vertices and 6 faces and 24 texels"):
         merge(meshes)
 

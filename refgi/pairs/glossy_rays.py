@@ -36,8 +36,12 @@ def shadowed_radiance(
         The same with their lobes.
     lights : PixelLights
         Lights to sum.
-    visibility, batch, hidden
-        As for `shadowed_sum`; no ray is traced for a light that lies off the lobe.
+    visibility : bool
+        Whether to trace the rays, none for a light that lies off the lobe; without, every pair counts.
+    batch : int
+        Pairs held at a time; changes no bit of the result.
+    hidden : callable, optional
+        As for `shadowed_sum`.
 
     Returns
     -------

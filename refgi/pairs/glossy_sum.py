@@ -125,14 +125,22 @@ def add_glossy_lights(
 
     Parameters
     ----------
-    position, normal, of, radiance
-        As for `add_diffuse_lights`.
+    position, normal : (3, n) ndarray
+        Receivers, world space; m and unit vectors.
+    of : ReceiverLobes
+        Their lobes.
     lights : (13, K) ndarray
         Packed lights, as for `lobe_sum.add_lobes`.
     limits : (K,) ndarray
         1 - cos from which on each light's lobe is 0.
-    clamp, widening, reach
-        As for `lobe_sum.add_lobes`.
+    clamp : Clamp
+        How near pairs are kept finite; the bound applies to c_x / r^2.
+    widening : Widening or None
+        How exponents fall near the light; None keeps them.
+    reach : Range or None
+        Which pairs count, and how much (procedure P3); None: all.
+    radiance : (3, n) ndarray
+        Added to, W/m^2/sr.
 
     Notes
     -----

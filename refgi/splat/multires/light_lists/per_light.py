@@ -112,8 +112,18 @@ def per_light_lobes(
         The glossy pixels; of those that share a cell one stands for all, whatever their exponents.
     shape : tuple of 2 ints
         Height and width of the picture.
-    lights, settings, pairs, footprint, start, filter_all, corner_rule
-        As for `per_light`; cells are of glossy pixels alone, and `representative` is the pixel.
+    lights : PixelLights
+        Lights to sum, diffuse, glossy or both.
+    settings : ByIrradiance
+        Levels, threshold and upsampling; cells are of glossy pixels alone.
+    pairs : PairSettings
+        Clamp, offset and lobes of a pair of light and receiver.
+    footprint : (N,) ndarray, optional
+        As for `per_light`.
+    start : Subsplats, optional
+        As for `per_light`; `representative` is the pixel.
+    filter_all, corner_rule : bool
+        As for `upsample`.
 
     Returns
     -------

@@ -67,6 +67,7 @@ class CutFaces(NamedTuple):
 
 NO_CUT = CutFaces(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 6)), np.zeros(0, np.int64), NO_MASKS)
 
+
 _in_use: "weakref.WeakValueDictionary[Key, CutOuts]" = weakref.WeakValueDictionary()
 
 

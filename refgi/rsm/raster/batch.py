@@ -3,7 +3,8 @@
 With vertices v_i = (column w, row w, w) and the texel centre (x, y, 1):
 
 - edge function e_i = (x, y, 1) . (v_j x v_k) = a x + b y + c, barycentric coordinate b_i = e_i / sum(e),
-- nearness = sum(e_i n_i) / det(v), that is 1/w in perspective, an affine function of (x, y) in both.
+- nearness = sum(e_i n_i) / det(v), that is 1/w in perspective, an affine function of (x, y) in both,
+- texture coordinates u = sum(e_i u_i) / sum(e_i), which a mask is asked at.
 
 The forward part of a triangle that crosses the plane of the eye is where all e_i have the sign of det. Adjacent
 triangles compute exactly negated edges from the same two vertices (strict IEEE products commute), so a texel centre on
@@ -18,6 +19,8 @@ import numpy.typing as npt
 
 from refgi.jit import kernel
 from refgi.rsm.raster.triangle import LANES, SMALLEST, SPAN_CUT
+from refgi.scene.cutouts import CutFaces
+from refgi.scene.texture.alpha import is_opaque, lent
 
 Array = npt.NDArray[Any]
 
@@ -57,15 +60,21 @@ def edge(
 
 
 @kernel
-def draw(corners: Array, faces: Array, part: Part, width: int, keys: Array) -> None:
+def draw(corners: Array, faces: Array, part: Part, width: int, holes: CutFaces | None, keys: Array) -> None:
     """Keep the greatest key at each texel: of the nearest triangle, of the earliest one where several are as near.
 
     `corners` (n, 4): projected vertices. `faces` (m, 3): vertices of each triangle. `part`: which triangles and where.
-    `width`: columns of the map. `keys` ((bottom - top + 1) (width + LANES),): keys so far, `EMPTY` where nothing is.
+    `width`: columns of the map. `holes`: ids, coordinates and masks of `faces`, where these may have holes. `keys`
+    ((bottom - top + 1) (width + LANES),): keys so far, `EMPTY` where nothing is.
+
+    A mask is asked only where its triangle would be seen. The greatest key does not depend on the order, so triangles
+    with holes may be drawn after all others.
 
     The loop over triangles is inside, because a call with arrays costs atomic reference counts, which threads share.
     """
     members, boxes, stride = part.members, part.boxes, width + LANES
+    if holes is not None:
+        table, uv = lent(holes.table), holes.uv
     setup = np.zeros(ROWS * BATCH)
     for base in range(part.start, part.stop, BATCH):
         count = min(BATCH, part.stop - base)
@@ -73,7 +82,12 @@ def draw(corners: Array, faces: Array, part: Part, width: int, keys: Array) -> N
         set_up(setup, width)
         for b in range(count):
             face = members[base + b]
-            earliness, nearest = EMPTY - np.int64(face), key_of(setup[LIMIT + b], EMPTY)
+            if holes is None:
+                earliness = EMPTY - np.int64(face)
+            else:
+                earliness = EMPTY - np.int64(holes.face[face])
+                mask = holes.mask[face]
+            nearest = key_of(setup[LIMIT + b], EMPTY)
             a0, b0, c0, t0 = setup[b], setup[BATCH + b], setup[2 * BATCH + b], setup[3 * BATCH + b]
             a1, b1, c1, t1 = setup[4 * BATCH + b], setup[5 * BATCH + b], setup[6 * BATCH + b], setup[7 * BATCH + b]
             a2, b2, c2, t2 = setup[8 * BATCH + b], setup[9 * BATCH + b], setup[10 * BATCH + b], setup[11 * BATCH + b]
@@ -90,12 +104,23 @@ def draw(corners: Array, faces: Array, part: Part, width: int, keys: Array) -> N
                     first, last = shorten(first, last, a1, r1)
                     first, last = shorten(first, last, a2, r2)
                 place, x0 = np.uint64((row - part.top) * stride + first), first + 0.5
-                # a multiple of LANES is SIMD code without a rest; lanes outside the triangle fail by themselves
-                for lane in range((last - first + LANES) & -LANES):
-                    at, x = place + np.uint64(lane), x0 + np.int32(lane)
-                    key, before = key_of(an * x + rn, earliness), keys[at]
-                    inside = (a0 * x + r0 >= t0) & (a1 * x + r1 >= t1) & (a2 * x + r2 >= t2)
-                    keys[at] = key if inside & (key <= nearest) & (key > before) else before
+                if holes is None:
+                    # a multiple of LANES is SIMD code without a rest; lanes outside the triangle fail by themselves
+                    for lane in range((last - first + LANES) & -LANES):
+                        at, x = place + np.uint64(lane), x0 + np.int32(lane)
+                        key, before = key_of(an * x + rn, earliness), keys[at]
+                        inside = (a0 * x + r0 >= t0) & (a1 * x + r1 >= t1) & (a2 * x + r2 >= t2)
+                        keys[at] = key if inside & (key <= nearest) & (key > before) else before
+                else:
+                    for column in range(first, last + 1):
+                        x, at = column + 0.5, np.uint64((row - part.top) * stride + column)
+                        key, e0, e1, e2 = key_of(an * x + rn, earliness), a0 * x + r0, a1 * x + r1, a2 * x + r2
+                        if (e0 >= t0) & (e1 >= t1) & (e2 >= t2) & (key <= nearest) & (key > keys[at]):
+                            scale = 1.0 / (e0 + e1 + e2)
+                            u = (e0 * uv[face, 0] + e1 * uv[face, 2] + e2 * uv[face, 4]) * scale
+                            v = (e0 * uv[face, 1] + e1 * uv[face, 3] + e2 * uv[face, 5]) * scale
+                            if is_opaque(table, mask, u, v):
+                                keys[at] = key
 
 
 @kernel

@@ -37,6 +37,7 @@ from refgi.rsm.raster.projection import Projection
 from refgi.rsm.raster.triangle import CHUNK, SPAN_CUT, Chunks, chunks
 from refgi.scene.cutouts import CutFaces
 from refgi.scene.model import Geometry
+from refgi.scene.texture.alpha import is_opaque, lent
 
 Array = npt.NDArray[Any]
 
@@ -77,7 +78,7 @@ def draw_paraboloids(
     triangles, none = chunks(vertices, faces), np.zeros(projection.maps)
     scratch = np.zeros((workers, 1, nearness.shape[1]), np.int32)
     left_out = np.zeros(projection.maps, np.int64)
-    _draw(projection, triangles, cut, Ignored(none, none), nearness, ids, scratch, left_out, none)
+    _draw_maps(projection, triangles, cut, Ignored(none, none), nearness, ids, scratch, left_out, none)
 
 
 def draw_distances(
@@ -94,29 +95,16 @@ def draw_distances(
     """
     left_out, nearest = np.zeros(projection.maps, np.int64), np.full(projection.maps, np.inf)
     scratch = np.zeros((workers, projection.height, distance.shape[1]), np.int32)
-    _draw(projection, triangles, cut, ignored, distance, scratch[0, :0], scratch, left_out, nearest)
+    _draw_maps(projection, triangles, cut, ignored, distance, scratch[0, :0], scratch, left_out, nearest)
     return nearest, left_out
-
-
-def _draw(
-    projection: Projection, triangles: Chunks, cut: CutChunks | None, ignored: Ignored, nearness: Array, ids: Array,
-    scratch: Array, left_out: Array, nearest: Array,
-) -> None:
-    if cut is None:
-        _draw_maps(projection, triangles, ignored, nearness, ids, scratch, left_out, nearest)
-    else:
-        from refgi.rsm.raster.paraboloid_cutouts import draw_maps
-
-        draw_maps(projection, triangles, cut, ignored, nearness, ids, scratch, left_out, nearest)
 
 
 @kernel(parallel=True)
 def _draw_maps(
-    projection: Projection, triangles: Chunks, ignored: Ignored, nearness: Array, ids: Array, scratch: Array,
-    left_out: Array, nearest: Array,
+    projection: Projection, triangles: Chunks, cut: CutChunks | None, ignored: Ignored, nearness: Array, ids: Array,
+    scratch: Array, left_out: Array, nearest: Array,
 ) -> None:
     workers, height, with_ids = len(scratch), projection.height, len(ids) > 0
-    corners, box = triangles.corners, triangles.box
     for worker in prange(workers):
         setup = np.zeros(ROWS * CHUNK)
         for m in range(worker, len(projection.origin), workers):
@@ -124,7 +112,9 @@ def _draw_maps(
             map_nearness, map_ids = nearness[first:last], ids[first:last] if with_ids else scratch[worker]
             map_nearness[:] = 0
             limits = 1.0 / (ignored.planes[m] * ignored.planes[m]), ignored.ball[m]
-            left_out[m] = draw(projection, m, corners, box, limits, setup, map_nearness, map_ids)
+            left_out[m] = draw(projection, m, triangles, None, limits, setup, map_nearness, map_ids)
+            if cut is not None:
+                left_out[m] += draw(projection, m, cut.chunks, cut.holes, limits, setup, map_nearness, map_ids)
             if with_ids:
                 clear_outside_disc(projection, map_nearness, map_ids)
             else:
@@ -164,15 +154,22 @@ def to_distance(projection: Projection, nearness: Array) -> float:
 
 @kernel
 def draw(
-    projection: Projection, m: int, corners: Array, box: Array, limits: tuple[float, float], setup: Array,
-    nearness: Array, ids: Array,
+    projection: Projection, m: int, triangles: Chunks, holes: CutFaces | None, limits: tuple[float, float],
+    setup: Array, nearness: Array, ids: Array,
 ) -> int:
-    """Draw every triangle on one map; the loop is inside because calls with arrays cost atomic reference counts."""
+    """Draw every triangle on one map; the loop is inside because calls with arrays cost atomic reference counts.
+
+    With `holes`, those of `triangles`, a texel asks a mask where it would see the triangle, or one as near of a higher
+    id: these are drawn after all others.
+    """
     n, width, half = projection.width, nearness.shape[1], projection.half[0]
     step, real = 2.0 * half / n, nearness.dtype.type
     steepest, ball = limits  # 1 / distance^2 of planes, distance of hits that are ignored
     nearest, within = 1.0 / ball, 1.0 / (ball * ball)
-    origin, frame = projection.origin, projection.frame
+    origin, frame, corners, box = projection.origin, projection.frame, triangles.corners, triangles.box
+    count = len(box) * CHUNK
+    if holes is not None:
+        table, uv, count = lent(holes.table), holes.uv, len(holes.face)
     view = (origin[m, 0], origin[m, 1], origin[m, 2], frame[m, 0, 0], frame[m, 0, 1], frame[m, 0, 2],
             frame[m, 1, 0], frame[m, 1, 1], frame[m, 1, 2], frame[m, 2, 0], frame[m, 2, 1], frame[m, 2, 2])  # fmt: skip
     left_out = 0
@@ -182,15 +179,17 @@ def draw(
         transform_chunk(corners, chunk, view, half, n, ball, setup)
         orient(setup)
         for b in range(CHUNK):
-            state = setup[STATE + b]
-            if state == BEHIND:
+            state, face = setup[STATE + b], chunk * CHUNK + b
+            if state == BEHIND or face >= count:
                 continue
             if state == NEAR or setup[SQUARE + b] > steepest:  # its plane lies 1/sqrt of this from the centre
                 left_out += 1
                 continue
             if state == BETWEEN_TEXELS or (state == ACROSS and not bound_across(setup, b, half, n)):
                 continue
-            face, limit = chunk * CHUNK + b, real(setup[LIMIT + b])
+            shown, limit = face, real(setup[LIMIT + b])
+            if holes is not None:
+                shown, mask = holes.face[face], holes.mask[face]
             x0, y0, z0, t0 = setup[b], setup[CHUNK + b], setup[2 * CHUNK + b], setup[3 * CHUNK + b]
             x1, y1, z1, t1 = setup[4 * CHUNK + b], setup[5 * CHUNK + b], setup[6 * CHUNK + b], setup[7 * CHUNK + b]
             x2, y2, z2, t2 = setup[8 * CHUNK + b], setup[9 * CHUNK + b], setup[10 * CHUNK + b], setup[11 * CHUNK + b]
@@ -209,22 +208,40 @@ def draw(
                     left, right = shorten(left, right, x0, z0, r0, step, 0.5 * (n - 1))
                     left, right = shorten(left, right, x1, z1, r1, step, 0.5 * (n - 1))
                     left, right = shorten(left, right, x2, z2, r2, step, 0.5 * (n - 1))
-                for block in range((right - left + BLOCK) // BLOCK):
-                    start = min(left + block * BLOCK, width - BLOCK)
-                    place_0, centre = np.uint64(start), start + 0.5
-                    for lane in range(BLOCK):
-                        column = place_0 + np.uint64(lane)
-                        s = (centre + lane) * step - half
-                        near = real((2.0 * xn - zn * s) * s + rn)
-                        inside = (
-                            ((2.0 * x0 - z0 * s) * s + r0 >= t0)
-                            & ((2.0 * x1 - z1 * s) * s + r1 >= t1)
-                            & ((2.0 * x2 - z2 * s) * s + r2 >= t2)
-                        )
+                if holes is None:
+                    for block in range((right - left + BLOCK) // BLOCK):
+                        start = min(left + block * BLOCK, width - BLOCK)
+                        place_0, centre = np.uint64(start), start + 0.5
+                        for lane in range(BLOCK):
+                            column = place_0 + np.uint64(lane)
+                            s = (centre + lane) * step - half
+                            near = real((2.0 * xn - zn * s) * s + rn)
+                            inside = (
+                                ((2.0 * x0 - z0 * s) * s + r0 >= t0)
+                                & ((2.0 * x1 - z1 * s) * s + r1 >= t1)
+                                & ((2.0 * x2 - z2 * s) * s + r2 >= t2)
+                            )
+                            far_enough = (near <= limit) & (near <= (length + s * s) * cut_short)
+                            if inside & (near > nearness[line, column]) & far_enough:
+                                nearness[line, column] = near
+                                ids[line, column] = shown
+                else:
+                    for lane in range(right - left + 1):
+                        column = np.uint64(left + lane)
+                        s = (left + lane + 0.5) * step - half
+                        near, before = real((2.0 * xn - zn * s) * s + rn), nearness[line, column]
+                        e0, e1 = (2.0 * x0 - z0 * s) * s + r0, (2.0 * x1 - z1 * s) * s + r1
+                        e2 = (2.0 * x2 - z2 * s) * s + r2
                         far_enough = (near <= limit) & (near <= (length + s * s) * cut_short)
-                        if inside & (near > nearness[line, column]) & far_enough:
-                            nearness[line, column] = near
-                            ids[line, column] = face
+                        is_first = (near > before) | ((near == before) & (shown < ids[line, column]))
+                        inside = (e0 >= t0) & (e1 >= t1) & (e2 >= t2)
+                        if inside & far_enough & is_first:
+                            scale = 1.0 / (e0 + e1 + e2)
+                            u = (e0 * uv[face, 0] + e1 * uv[face, 2] + e2 * uv[face, 4]) * scale
+                            v = (e0 * uv[face, 1] + e1 * uv[face, 3] + e2 * uv[face, 5]) * scale
+                            if is_opaque(table, mask, u, v):
+                                nearness[line, column] = near
+                                ids[line, column] = shown
     return left_out
 
 

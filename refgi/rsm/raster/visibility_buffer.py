@@ -14,12 +14,12 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
-from refgi.rsm.raster import cutouts
 from refgi.rsm.raster.batch import EMPTY, Part, draw, unpack
 from refgi.rsm.raster.paraboloid import BLOCK as PARABOLOID_BLOCK
 from refgi.rsm.raster.paraboloid import cut_chunks, draw_paraboloids
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.rsm.raster.triangle import LANES, bound_triangles, project_vertices
+from refgi.scene.cutouts import CutFaces
 from refgi.scene.model import Geometry
 from refgi.stages import stage
 
@@ -43,6 +43,14 @@ class Bands(NamedTuple):
     starts: Array  # (bands + 1,) where each band's triangles start in `members`
     members: Array  # (...) int32: triangles of band 0, of band 1, ..., each in mesh order; then CHUNKS of no meaning
     rows: int  # height of a band
+
+
+class Cut(NamedTuple):
+    """Triangles that may have holes, drawn after all others."""
+
+    faces: Array  # (c, 3) int32: vertices of each
+    holes: CutFaces
+    lists: Any  # Bands, of the same rows as those of the others; None for several maps
 
 
 class Scratch(NamedTuple):
@@ -79,7 +87,8 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     drawn inside the inscribed circle of the hemisphere only. A triangle with holes is seen where its mask says that it
     is there, at the texel's centre.
     """
-    vertices, faces, holes = geometry.vertices, geometry.without_cut, geometry.cut
+    vertices, faces = geometry.vertices, geometry.without_cut
+    cut = None if geometry.cut is None else Cut(geometry.faces[geometry.cut.face], geometry.cut, None)
     height, width = projection.shape
     columns = max(width, PARABOLOID_BLOCK) if projection.kind == PARABOLOID else width
     visibility = Visibility(plane((height, columns), np.int32), plane((height, columns), np.float32))
@@ -89,23 +98,16 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
         draw_paraboloids(projection, vertices, faces, workers, visibility.inverse_depth, visibility.triangle_id,
                          cut_chunks(geometry))
     elif projection.maps > 1:
-        own = scratch(workers, len(vertices), projection)
-        if holes is None:
-            _draw_maps(projection, vertices, faces, own, visibility)
-        else:
-            cutouts.draw_maps(projection, vertices, faces, geometry.faces[holes.face], holes, own, visibility)
+        _draw_maps(projection, vertices, faces, cut, scratch(workers, len(vertices), projection), visibility)
     else:
         corners, cells = plane((len(vertices), 4), np.float64), plane((len(vertices), 4), np.int32)
         _project(projection, vertices, corners, cells)
         rows = min(band_rows or min(max(height // 32, 4), 32), height)
         keys = plane((workers, rows * (width + LANES)), np.int64)
         lists = bands(corners, cells, faces, width, height, rows)
-        if holes is None:
-            _draw_bands(corners, faces, lists, keys, visibility)
-        else:
-            cut = geometry.faces[holes.face]
-            cut_lists = bands(corners, cells, cut, width, height, rows)
-            cutouts.draw_bands(corners, faces, lists, cut, cut_lists, holes, keys, visibility)
+        if cut is not None:
+            cut = cut._replace(lists=bands(corners, cells, cut.faces, width, height, rows))
+        _draw_bands(corners, faces, lists, cut, keys, visibility)
     if width < columns:
         visibility = Visibility(*(np.ascontiguousarray(plane[:, :width]) for plane in visibility))
     return visibility
@@ -190,20 +192,30 @@ def _list(boxes: Array, band_of: Array, cursors: Array, members: Array) -> None:
 
 
 @kernel(parallel=True)
-def _draw_bands(corners: Array, faces: Array, lists: Bands, keys: Array, visibility: Visibility) -> None:
+def _draw_bands(
+    corners: Array, faces: Array, lists: Bands, cut: Cut | None, keys: Array, visibility: Visibility
+) -> None:
     workers, (height, width) = len(keys), visibility.triangle_id.shape
     for worker in prange(workers):
         band_keys = keys[worker]
         for band in range(worker, len(lists.starts) - 1, workers):  # interleaved: neighbours cost alike
             top, bottom = band * lists.rows, min((band + 1) * lists.rows, height) - 1
-            part = Part(lists.members, lists.starts[band], lists.starts[band + 1], lists.boxes, 0, top, bottom)
             band_keys[:] = EMPTY
-            draw(corners, faces, part, width, band_keys)
+            draw(corners, faces, _part_of(lists, band, top, bottom), width, None, band_keys)
+            if cut is not None:
+                draw(corners, cut.faces, _part_of(cut.lists, band, top, bottom), width, cut.holes, band_keys)
             unpack(band_keys, width, top, bottom, visibility.inverse_depth, visibility.triangle_id)
 
 
+@kernel
+def _part_of(lists: Bands, band: int, top: int, bottom: int) -> Part:
+    return Part(lists.members, lists.starts[band], lists.starts[band + 1], lists.boxes, 0, top, bottom)
+
+
 @kernel(parallel=True)
-def _draw_maps(projection: Projection, vertices: Array, faces: Array, scratch: Scratch, visibility: Visibility) -> None:
+def _draw_maps(
+    projection: Projection, vertices: Array, faces: Array, cut: Cut | None, scratch: Scratch, visibility: Visibility
+) -> None:
     workers, height, width = len(scratch.corners), projection.height, projection.width
     for worker in prange(workers):
         corners, cells, keys = scratch.corners[worker], scratch.cells[worker], scratch.keys[worker]
@@ -213,11 +225,24 @@ def _draw_maps(projection: Projection, vertices: Array, faces: Array, scratch: S
             project_vertices(projection, m, vertices, 0, len(vertices), corners, cells)
             keys[:] = EMPTY
             for base in range(0, len(faces), BATCH):
-                count, last = 0, min(base + BATCH, len(faces))
-                bound_triangles(corners, cells, faces, base, last, (width, height), boxes)
-                for face in range(base, last):
-                    members[count] = face
-                    count += boxes[face - base, 0] <= boxes[face - base, 1]
-                part = Part(members, 0, count, boxes, base, 0, height - 1)
-                draw(corners, faces, part, width, keys)
+                count = _list_some(corners, cells, faces, base, (width, height), boxes, members)
+                draw(corners, faces, Part(members, 0, count, boxes, base, 0, height - 1), width, None, keys)
+            if cut is not None:
+                for base in range(0, len(cut.faces), BATCH):
+                    count = _list_some(corners, cells, cut.faces, base, (width, height), boxes, members)
+                    part = Part(members, 0, count, boxes, base, 0, height - 1)
+                    draw(corners, cut.faces, part, width, cut.holes, keys)
             unpack(keys, width, 0, height - 1, visibility.inverse_depth[rows], visibility.triangle_id[rows])
+
+
+@kernel
+def _list_some(
+    corners: Array, cells: Array, faces: Array, base: int, size: tuple[int, int], boxes: Array, members: Array
+) -> int:
+    """List those of BATCH triangles from `base` on that may cover a texel, and return how many these are."""
+    count, last = 0, min(base + BATCH, len(faces))
+    bound_triangles(corners, cells, faces, base, last, size, boxes)
+    for face in range(base, last):
+        members[count] = face
+        count += boxes[face - base, 0] <= boxes[face - base, 1]
+    return count

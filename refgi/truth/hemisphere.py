@@ -58,6 +58,14 @@ def cosine_direction(u: float, v: float) -> tuple[float, float, float]:
     return radius * cosine, radius * sine, math.sqrt(max(0.0, 1 - u))
 
 
+@kernel
+def shifted(points: Array, s: int, pixel: int, seed: int) -> tuple[float, float]:
+    """Return point s of the square, (s, 2) uint32 in 32-bit words, shifted at random for a pixel and pass."""
+    word = hash_bits(np.uint32(pixel) ^ np.uint32(seed))
+    u = ((points[s, 0] ^ hash_bits(word ^ np.uint32(0x68E31DA4))) + 0.5) * 2.0**-32
+    return u, ((points[s, 1] ^ hash_bits(word ^ np.uint32(0xB5297A4D))) + 0.5) * 2.0**-32
+
+
 @kernel(parallel=True)
 def send(receivers: RayReceivers, span: tuple[int, int], points: Array, seed: int, reach: float, paths: Paths) -> None:
     """Send one ray for each point of the set from each receiver of a span.
@@ -78,13 +86,9 @@ def _send(receivers: RayReceivers, first: int, span: tuple[int, int], points: Ar
     pixel, _, normals, facing, starts = receivers
     ray = span[0] * len(points)
     for r in range(first + span[0], first + span[1]):
-        word = hash_bits(np.uint32(pixel[r]) ^ np.uint32(seed))
-        shift_u, shift_v = hash_bits(word ^ np.uint32(0x68E31DA4)), hash_bits(word ^ np.uint32(0xB5297A4D))
         normal = (np.float64(normals[0, r]), np.float64(normals[1, r]), np.float64(normals[2, r]))
         for s in range(len(points)):
-            u = ((points[s, 0] ^ shift_u) + 0.5) * 2.0**-32
-            v = ((points[s, 1] ^ shift_v) + 0.5) * 2.0**-32
-            x, y, z = cosine_direction(u, v)
+            x, y, z = cosine_direction(*shifted(points, s, pixel[r], seed))
             w = around(normal, x, y, z)
             above = facing[0, r] * w[0] + facing[1, r] * w[1] + facing[2, r] * w[2]
             reaches[ray] = reach if above > 0 else 0
@@ -152,22 +156,32 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         diffuse, lobe = max(0.0, dot(n, w) - least), 0.0
         if has_lobe:
             lobe = max(0.0, lobe_pattern(surfaces, material, n, light, w) - least)
-        most, offset = 0.0, lift(surfaces, triangle, y, g, grain)
+        most = 0.0
         for c in range(3):
             contribution = paths.weight[ray, c] * factor * irradiance[c] * (rho[c] * diffuse + glossy[c] * lobe)
             most = max(most, contribution)
             shadows.contribution[ray, c] = contribution
-            shadows.origin[ray, c] = y[c] + offset * g[c]
-            shadows.direction[ray, c] = toward[c] if directional else toward[c] - offset * g[c]
         if most > 0:
-            shadows.reach[ray] = np.inf if directional else short_of(lights, k, far, grain)
+            aim_at_light(lights, k, (y, g, toward), far, lift(surfaces, triangle, y, g, grain), grain, shadows, ray)
 
 
 @kernel
-def short_of(lights: LightTable, k: int, far: float, grain: float) -> Any:
-    """Return the share of the way to a light up to which things block: a lamp may lie in a surface itself."""
-    offset = ray_offset(lights.position[k, 0], lights.position[k, 1], lights.position[k, 2], grain)
-    return max(0.0, 1.0 - STEPS - offset / far)
+def aim_at_light(
+    lights: LightTable, k: int, hit: tuple[Any, Any, Any], far: float, offset: float, grain: float, shadows: Shadows,
+    ray: int,
+) -> None:
+    """Write the shadow ray from a hit point to a light.
+
+    `hit`: the point, its face normal on the light's side, and the vector to the light. `far`: distance of the light, m.
+    `offset`: how far above the face the ray starts, m. A lamp may lie in a surface itself: rays end short of it.
+    """
+    y, g, toward = hit
+    directional = lights.kind[k] == DIRECTIONAL
+    for c in range(3):
+        shadows.origin[ray, c] = y[c] + offset * g[c]
+        shadows.direction[ray, c] = toward[c] if directional else toward[c] - offset * g[c]
+    short = ray_offset(lights.position[k, 0], lights.position[k, 1], lights.position[k, 2], grain) / far
+    shadows.reach[ray] = np.inf if directional else max(0.0, 1.0 - STEPS - short)
 
 
 @kernel

@@ -209,20 +209,12 @@ def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array, ti
             total += blocks[b, i]
         for s in range(picks):
             reach[(r - first) * picks + s] = real(0)
-        shift = real(hash_bits(np.uint32(receivers.pixel[r]) ^ np.uint32(seed)) >> np.uint32(8)) * real(2.0**-24)
-        share = total / real(picks)
+        shift, share = random_shift(receivers.pixel[r], seed), total / real(picks)
         b, before = 0, real(0)  # block, and the sum of those before it
         for s in range(picks if total > real(0) else 0):
             ray = (r - first) * picks + s
             target = (real(s) + shift) * share
-            while b < blocks.shape[0] - 1 and before + blocks[b, i] <= target:
-                before += blocks[b, i]
-                b += 1
-            rest = target - before
-            p, end = b * PARTS, b * PARTS + PARTS - 1
-            while p < end and parts[p, i] <= rest:
-                rest -= parts[p, i]
-                p += 1
+            b, before, p, rest = part_of(blocks, parts, i, target, b, before)
             j, end = first_point + p * PART, first_point + p * PART + PART - 1
             if j < first_lobe:
                 term = _diffuse_term(points, j, tile, i)
@@ -241,3 +233,26 @@ def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array, ti
                 picked[ray] = j
                 for c in range(3):
                     contribution[ray, c] = share * points.colour[c, j]
+
+
+@kernel
+def random_shift(pixel: int, seed: int) -> Any:
+    """Return how far a receiver's picks are shifted in a pass: 0 to 1 of the way from one to the next."""
+    return np.float32(hash_bits(np.uint32(pixel) ^ np.uint32(seed)) >> np.uint32(8)) * np.float32(2.0**-24)
+
+
+@kernel
+def part_of(blocks: Array, parts: Array, i: int, target: Any, b: int, before: Any) -> tuple[int, Any, int, Any]:
+    """Find the part of senders that a pick of receiver i falls in, from block b on, `before` the sum of those before.
+
+    Returns its block, the sum before that, the part, and what of `target` remains there.
+    """
+    while b < blocks.shape[0] - 1 and before + blocks[b, i] <= target:
+        before += blocks[b, i]
+        b += 1
+    rest = target - before
+    p, end = b * PARTS, b * PARTS + PARTS - 1
+    while p < end and parts[p, i] <= rest:
+        rest -= parts[p, i]
+        p += 1
+    return b, before, p, rest

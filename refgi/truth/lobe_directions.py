@@ -17,9 +17,8 @@ from refgi.lobes import lobe_direction
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS
-from refgi.sampling import hash_bits
 from refgi.scene import LightTable
-from refgi.truth.hemisphere import short_of, toward_light
+from refgi.truth.hemisphere import aim_at_light, shifted, toward_light
 from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, comes_by_photons, density_on_axis
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point, row
 from refgi.truth.surfaces import around, face_cross, lift, lobe_pattern, shading_normal
@@ -51,12 +50,9 @@ def _send(receivers: RayReceivers, lobes: Lobes, first: int, span: tuple[int, in
     pixel, _, normals, facing, starts = receivers
     ray, count = span[0] * len(points), len(points)
     for r in range(first + span[0], first + span[1]):
-        word = hash_bits(np.uint32(pixel[r]) ^ np.uint32(seed))
-        shift_u, shift_v = hash_bits(word ^ np.uint32(0x68E31DA4)), hash_bits(word ^ np.uint32(0xB5297A4D))
         exponent, mirror = lobes.exponent[r], (lobes.mirrored[0, r], lobes.mirrored[1, r], lobes.mirrored[2, r])
         for s in range(count):
-            u = ((points[s, 0] ^ shift_u) + 0.5) * 2.0**-32
-            v = ((points[s, 1] ^ shift_v) + 0.5) * 2.0**-32
+            u, v = shifted(points, s, pixel[r], seed)
             x, y, z = lobe_direction(u, v, exponent)
             w = around(mirror, x, y, z)
             cosine = normals[0, r] * w[0] + normals[1, r] * w[1] + normals[2, r] * w[2]
@@ -127,16 +123,14 @@ def _gather(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float,
         if max(glossy[0], glossy[1], glossy[2]) > 0:
             lobe = _lobe_share(lobes, rays[0] + ray // rays[1], surfaces.material_of_face[triangle], share)
             lobe *= lobe_pattern(surfaces, surfaces.material_of_face[triangle], n, light, w)
-        factor, most, offset = cos_in / (np.pi * cos_out), 0.0, lift(surfaces, triangle, y, g, grain)
+        factor, most = cos_in / (np.pi * cos_out), 0.0
         for c in range(3):
             # radiance = rho F / pi * pattern / <g.w>, F = E_perp <g.l>
             contribution = paths.weight[ray, c] * factor * irradiance[c] * (rho[c] * diffuse + glossy[c] * lobe)
             most = max(most, contribution)
             shadows.contribution[ray, c] = contribution
-            shadows.origin[ray, c] = y[c] + offset * g[c]
-            shadows.direction[ray, c] = toward[c] if directional else toward[c] - offset * g[c]
         if most > 0:
-            shadows.reach[ray] = np.inf if directional else short_of(lights, k, far, grain)
+            aim_at_light(lights, k, (y, g, toward), far, lift(surfaces, triangle, y, g, grain), grain, shadows, ray)
 
 
 @kernel

@@ -19,8 +19,7 @@ import numpy.typing as npt
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
-from refgi.sampling import hash_bits
-from refgi.truth.light_side import BELOW_1, PART, PARTS, TILE, aim
+from refgi.truth.light_side import BELOW_1, PART, PARTS, TILE, aim, part_of, random_shift
 from refgi.truth.light_vertices import BLOCK, LightVertices
 from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, density_on_axis
 
@@ -157,20 +156,12 @@ def _pick_all(points: LightVertices, receivers: RayReceivers, lobes: Lobes, memb
             total += blocks[b, i]
         for s in range(picks):
             reach[(r - first) * picks + s] = real(0)
-        shift = real(hash_bits(np.uint32(receivers.pixel[r]) ^ np.uint32(seed)) >> np.uint32(8)) * real(2.0**-24)
-        share = total / real(picks)
+        shift, share = random_shift(receivers.pixel[r], seed), total / real(picks)
         b, before = 0, real(0)  # block, and the sum of those before it
         for s in range(picks if total > real(0) else 0):
             ray = (r - first) * picks + s
             target = (real(s) + shift) * share
-            while b < blocks.shape[0] - 1 and before + blocks[b, i] <= target:
-                before += blocks[b, i]
-                b += 1
-            rest = target - before
-            p, end = b * PARTS, b * PARTS + PARTS - 1
-            while p < end and parts[p, i] <= rest:
-                rest -= parts[p, i]
-                p += 1
+            b, before, p, rest = part_of(blocks, parts, i, target, b, before)
             j, end = first_point + p * PART, first_point + p * PART + PART - 1
             term = _term(points, j, tile, i)
             while j < end and term <= rest:

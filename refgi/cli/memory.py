@@ -9,6 +9,7 @@ from refgi.errors import InputError
 from refgi.method import Extent
 from refgi.methods import find_method
 from refgi.scene import PointLight, Scene
+from refgi.scene.mesh import BYTES_OF_ALPHA, BYTES_OF_COLOUR
 
 # From peaks measured at 1024^2 and 2048^2, rounded up by a third; the truth keeps moments in float64.
 PIXEL_FLOATS = 32  # G-buffer, visibility, direct and indirect light, radiance, and their temporaries
@@ -16,8 +17,6 @@ TRUTH_PIXEL_BYTES = 250  # receivers, moments, results
 COMPARED_PIXEL_BYTES = 90  # a method's or reference's pictures, maps and figures
 TEXEL_FLOATS = 36
 FACE_BYTES = 400  # vertices, faces, Embree's tree
-TEXEL_BYTES = 28  # of an image: float32 with mip levels, and what these are made from
-ALPHA_BYTES = 12  # of a texel whose alpha is asked for: codes, float32, and what that is made from
 
 
 def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4, rsm_resolution: int = 512,
@@ -47,9 +46,9 @@ def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4,
     pixel = PIXEL_FLOATS * float_bytes + traced * TRUTH_PIXEL_BYTES + compared * COMPARED_PIXEL_BYTES
     texels = map_count(scene) * rsm_resolution**2 * TEXEL_FLOATS * float_bytes
     images = {texture.image for one in scene.materials for texture in one.textures}
-    painted = sum(image.width * image.height for image in images) * TEXEL_BYTES
+    painted = sum(image.width * image.height for image in images) * BYTES_OF_COLOUR
     cut = {texture.image for one in scene.materials if one.cutoff is not None for texture in one.textures}
-    painted += sum(image.width * image.height for image in cut) * ALPHA_BYTES
+    painted += sum(image.width * image.height for image in cut) * BYTES_OF_ALPHA
     return width * height * pixel + texels + scene.face_count * FACE_BYTES + painted
 
 

@@ -23,7 +23,9 @@ SHORTEST, LONGEST = 1e-100, 1e100  # of a normal: its square neither vanishes no
 # A vertex is 24 bytes, a face 12 and its material 4; joining the meshes holds them twice for a moment.
 BYTES_OF_VERTEX, BYTES_OF_FACE = 2 * 24, 2 * (12 + 4)
 BYTES_OF_COORDINATES = 2 * 48  # of a face's texture coordinates
-BYTES_OF_TEXEL = 8 + 16 + 4 + 12  # its codes, float32 with mip levels, that of alpha, and what these are made from
+# Of an image's texel: float32 with mip levels and what these are made from; codes and float32 of alpha, if asked for.
+BYTES_OF_COLOUR, BYTES_OF_ALPHA = 28, 12
+BYTES_OF_TEXEL = BYTES_OF_COLOUR + BYTES_OF_ALPHA
 MOST_VERTICES = 2**31 - 1  # corner indices are int32
 
 

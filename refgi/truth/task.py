@@ -1,5 +1,6 @@
 """Inputs of every pass of the ground truth, and batches of its shadow rays."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,6 +31,7 @@ class Task(NamedTuple):
     receivers: RayReceivers
     set_of: Array  # (r,) which set of light vertices each receiver picks from
     caustics: Film | None = None
+    left_to_photons: float = math.inf  # exponent from which on a sender's lobe comes by photons alone
     view: Projection | None = None  # only surfaces visible in it emit; None: all do
     densities: tuple[Density | None, ...] = ()  # of each light's rays; none: even ones
     lobes: Lobes | None = None  # of the receivers, where their lobes and not their irradiance are asked for

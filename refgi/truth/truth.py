@@ -259,15 +259,14 @@ def _without_pilot(scene: Scene, tracer: Any, position: Array, normal: Array, tr
     caustics, left_to_photons = _photons(scene, triangle_id.shape, settings)
     reflecting = surfaces(scene, left_to_photons)
     view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "visible" else None
-    return Task(scene, settings, tracer, reflecting, lights_of(scene), points, set_of, caustics, view)
+    return Task(scene, settings, tracer, reflecting, lights_of(scene), points, set_of, caustics, left_to_photons, view)
 
 
 def _with_lobes(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
                 settings: TruthSettings) -> Task:
     """Return a task of lobes; `triangle_id`: as `glossy_triangles` has it."""
     task = _without_pilot(scene, tracer, position, normal, triangle_id, settings)
-    left_to_photons = math.inf if task.caustics is None else MIRROR_EXPONENT if settings.caustics else SHARP_LOBE
-    lobes = lobes_of(scene, task.receivers.pixel, position, normal, triangle_id, left_to_photons)
+    lobes = lobes_of(scene, task.receivers.pixel, position, normal, triangle_id, task.left_to_photons)
     count = settings.photons * len(scene.lights)
     if task.caustics is not None and not settings.caustics and not meets_photons(lobes) and left_out(
             "truth.photons", lambda: (count, count)):

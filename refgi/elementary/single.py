@@ -85,7 +85,9 @@ def _exp2(x: Any) -> Any:
 def _log2(x: Any) -> Any:
     """Return the logarithm to base 2."""
     high, low = _log2_parts(x)
-    value = high + low if x > np.float32(0.0) else (np.float32(-np.inf) if x == np.float32(0.0) else np.float32(np.nan))
+    # the sum before what chooses it: within a choice it would become a branch
+    value, other = high + low, np.float32(-np.inf) if x == np.float32(0.0) else np.float32(np.nan)
+    value = value if x > np.float32(0.0) else other
     return value if x < np.float32(np.inf) else x
 
 

@@ -17,7 +17,7 @@ from refgi.rsm.buffers.surfaces import cross
 from refgi.rsm.buffers.texel_rays import image_ray, row_view
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.scene.model import Geometry, MaterialTable
-from refgi.scene.texture.footprint import Looks, footprint_means, looks
+from refgi.scene.texture.footprint import PLACE, TOGETHER, Looks, footprint_means, looks
 from refgi.scene.texture.table import TextureTable
 
 Array = npt.NDArray[Any]
@@ -61,74 +61,80 @@ def paint(
 
 
 class Scratch(NamedTuple):
-    """What is looked up for a row of texels."""
+    """What is looked up for some texels."""
 
-    texture: Array  # (n,) int32: row of the table, -1 for none
-    place: Array  # (6, n): u, v, their change to the next texel of the row, and to that of the next row
-    colour: Array  # (n, 3) float32
+    texture: Array  # (TOGETHER,) int32: row of the table, -1 for none
+    colour: Array  # (TOGETHER, 3) float32
     looks: Looks
 
 
 @kernel
-def _scratch(count: int) -> Any:
-    return Scratch(np.empty(count, np.int32), np.empty((6, count)), np.empty((count, 3), np.float32), looks())
+def _scratch() -> Any:
+    return Scratch(np.empty(TOGETHER, np.int32), np.empty((TOGETHER, 3), np.float32), looks())
 
 
 @kernel(parallel=True)
 def _paint_rows(surface: Painted, projection: Projection, triangle_id: Array, albedo: Array) -> None:
-    scratch = _scratch(triangle_id.shape[1])
+    scratch, width = _scratch(), triangle_id.shape[1]
     for row in prange(triangle_id.shape[0]):
-        _paint_row(surface, projection, triangle_id, row, scratch, albedo)
+        for begin in range(0, width, TOGETHER):
+            _paint_some(surface, projection, triangle_id, (row, begin, min(begin + TOGETHER, width)), scratch, albedo)
 
 
 @kernel
-def _paint_row(surface: Painted, projection: Projection, triangle_id: Array, row: int, scratch: Scratch,
-               albedo: Array) -> None:
-    """Write the albedo of a row; what texels of one triangle share is set up once a run of them."""
-    faces, of_face, of_material = triangle_id[row], surface.material_of_face, surface.table.of_material
-    width, column, painted = len(faces), 0, False
-    while column < width:
-        face, first = faces[column], column
-        while column < width and faces[column] == face:
-            column += 1
+def _paint_some(surface: Painted, projection: Projection, triangle_id: Array, span: tuple[int, int, int],
+                scratch: Scratch, albedo: Array) -> None:
+    """Write the albedo of a span of a row: its first column and one past the last.
+
+    What texels of one triangle share is set up once a run of them.
+    """
+    row, begin, end = span
+    of_face, of_material, column, painted = surface.material_of_face, surface.table.of_material, begin, False
+    while column < end:
+        face, first = triangle_id[row, column], column
         texture = of_material[of_face[face]] if face >= 0 else -1
-        scratch.texture[first:column] = texture
+        while column < end and triangle_id[row, column] == face:
+            scratch.texture[column - begin] = texture
+            column += 1
         if texture >= 0:
             painted = True
-            fill_places(surface, projection, face, (row, first, column), first, scratch.place)
+            fill_places(surface, projection, face, (row, first, column), first - begin, scratch.looks.pixel)
     if painted:
-        footprint_means(surface.table, scratch.texture, scratch.place, width, scratch.looks, scratch.colour)
-        for channel in range(3):
-            for x in range(width):
-                if scratch.texture[x] >= 0:
-                    albedo[channel, row, x] = surface.diffuse[of_face[faces[x]], channel] * scratch.colour[x, channel]
+        footprint_means(surface.table, scratch.texture, end - begin, scratch.looks, scratch.colour)
+        for x in range(begin, end):
+            if scratch.texture[x - begin] >= 0:
+                material = of_face[triangle_id[row, x]]
+                for channel in range(3):
+                    albedo[channel, row, x] = surface.diffuse[material, channel] * scratch.colour[x - begin, channel]
 
 
 @kernel
 def _paint_texels(surface: Painted, projection: Projection, triangle_id: Array, texel: Array, albedo: Array) -> None:
     """Write the albedo of some texels, with the bits of whole rows."""
-    width, scratch = triangle_id.shape[1], _scratch(len(texel))
-    for k in range(len(texel)):
-        row, column = texel[k] // width, texel[k] % width
-        face = triangle_id[row, column]
-        texture = surface.table.of_material[surface.material_of_face[face]] if face >= 0 else -1
-        scratch.texture[k] = texture
-        if texture >= 0:
-            fill_places(surface, projection, face, (row, column, column + 1), k, scratch.place)
-    footprint_means(surface.table, scratch.texture, scratch.place, len(texel), scratch.looks, scratch.colour)
-    for k in range(len(texel)):
-        if scratch.texture[k] >= 0:
-            material = surface.material_of_face[triangle_id[texel[k] // width, texel[k] % width]]
-            for channel in range(3):
-                albedo[channel, k] = surface.diffuse[material, channel] * scratch.colour[k, channel]
+    width, scratch = triangle_id.shape[1], _scratch()
+    for begin in range(0, len(texel), TOGETHER):
+        count = min(TOGETHER, len(texel) - begin)
+        for k in range(count):
+            row, column = texel[begin + k] // width, texel[begin + k] % width
+            face = triangle_id[row, column]
+            texture = surface.table.of_material[surface.material_of_face[face]] if face >= 0 else -1
+            scratch.texture[k] = texture
+            if texture >= 0:
+                fill_places(surface, projection, face, (row, column, column + 1), k, scratch.looks.pixel)
+        footprint_means(surface.table, scratch.texture, count, scratch.looks, scratch.colour)
+        for k in range(count):
+            if scratch.texture[k] >= 0:
+                material = surface.material_of_face[triangle_id[texel[begin + k] // width, texel[begin + k] % width]]
+                for channel in range(3):
+                    albedo[channel, begin + k] = surface.diffuse[material, channel] * scratch.colour[k, channel]
 
 
 @kernel
 def fill_places(surface: Painted, projection: Projection, face: int, run: tuple[int, int, int], at: int,
-                place: Array) -> None:
+                pixel: Array) -> None:
     """Fill the coordinates, and their changes, of a run of texels of a row that see one triangle.
 
-    `run`: its row, first column and one past the last. `at`: where the first one's stand in `place`.
+    `run`: its row, first column and one past the last. `at`: which of the pixels of `Looks` the first one is.
     """
     row, first, last = run
     vertices, uv = surface.vertices, surface.uv
@@ -147,8 +153,7 @@ def fill_places(surface: Painted, projection: Projection, face: int, run: tuple[
             upper, lower = image_ray(kind, view, x, y - 0.5 * step_y), image_ray(kind, view, x, y + 0.5 * step_y)
             across, down = less(terms(plane, right), terms(plane, left)), less(terms(plane, lower), terms(plane, upper))
             u, v, ux, vx, uy, vy = coordinates(here, across, down)
-            k = np.uint64(at + column - first)
-            place[0, k], place[1, k], place[2, k], place[3, k], place[4, k], place[5, k] = u, v, ux, vx, uy, vy
+            put(pixel, at + column - first, u, v, ux, vx, uy, vy)
         return
     # all terms are linear in the place on the image
     middle = terms(plane, image_ray(kind, view, 0.0, y))
@@ -158,8 +163,16 @@ def fill_places(surface: Painted, projection: Projection, face: int, run: tuple[
     for column in range(first, last):
         x = ((column + 0.5) * (2.0 / projection.width) - 1.0) * projection.half[0]
         u, v, ux, vx, uy, vy = coordinates(added(middle, scaled(slope, x)), across, down)
-        k = np.uint64(at + column - first)
-        place[0, k], place[1, k], place[2, k], place[3, k], place[4, k], place[5, k] = u, v, ux, vx, uy, vy
+        put(pixel, at + column - first, u, v, ux, vx, uy, vy)
+
+
+@kernel
+def put(pixel: Array, k: int, u: float, v: float, ux: float, vx: float, uy: float, vy: float) -> None:
+    """Write the given rows of a pixel of `Looks`."""
+    at = np.uint64(PLACE * TOGETHER + k)
+    pixel[at], pixel[at + np.uint64(TOGETHER)], pixel[at + np.uint64(2 * TOGETHER)] = u, v, ux
+    pixel[at + np.uint64(3 * TOGETHER)], pixel[at + np.uint64(4 * TOGETHER)] = vx, uy
+    pixel[at + np.uint64(5 * TOGETHER)] = vy
 
 
 @kernel

@@ -26,10 +26,11 @@ MOST = 32  # probes along the longer side
 STRETCH, TEXEL = 1.2, 0.93  # of these pairs the best on a checkered floor
 SHORTEST = 0.5  # texel; smaller parts see no more of a blend of four
 EDGE_ON = 1e12  # texels a pixel, of a surface that is seen edge-on
-TOGETHER = 64  # pixels whose probes are listed at once
+TOGETHER = 64  # most pixels whose probes are listed at once
 LOOKS = 2 * MOST * TOGETHER  # of them, on two levels each
 # rows of `Looks.pixel`: the image's size and last level; first probe, step to the next, level and number of probes;
-# periods of u and v, and one over each
+# periods of u and v, and one over each; and what is given from PLACE on: u and v of the pixel's centre, their change to
+# the next pixel of its row, and to that of the next row
 WIDTH, HEIGHT, TOP, U, V, ALONG_U, ALONG_V, LEVEL, PROBES, PERIOD = range(10)
 PLACE = PERIOD + 4
 PERIODS = (1.0, 0.0, 2.0)  # of u and v, by wrap: repeat, clamp, mirror
@@ -42,7 +43,7 @@ class Looks(NamedTuple):
     """Scratch of one worker: probes of some pixels, and where each is looked up."""
 
     short: Array  # (TOGETHER,) float32
-    pixel: Array  # ((PLACE + 6) TOGETHER,) float64: by rows as named above, then the six of `place`
+    pixel: Array  # ((PLACE + 6) TOGETHER,) float64: rows as named above
     place: Array  # (2 LOOKS,) float64: place of a look on its level, in texels
     texel: Array  # (INTEGERS LOOKS,) int32: pixel, first texel (of the level; then of the look), steps to the others
     share: Array  # (SHARES LOOKS,) float32: weight of a look, shares of the second texel along both axes
@@ -58,35 +59,29 @@ def looks() -> Any:
 
 
 @kernel
-def footprint_means(table: TextureTable, texture: Array, place: Array, count: int, scratch: Looks,
-                    colour: Array) -> None:
-    """Look up what each texture's filter makes of each of a row of pixels: the mean over its footprint, or a point.
+def footprint_means(table: TextureTable, texture: Array, count: int, scratch: Looks, colour: Array) -> None:
+    """Look up what each texture's filter makes of each of some pixels: the mean over its footprint, or a point.
 
-    `texture` (n,): row of the table, -1 for none. `place` (6, n): u and v of the pixel's centre, their change to the
-    next pixel of the row, and to that of the next row. `count`: how many pixels there are. `colour` (n, 3) float32:
-    filled, 0 where there is no texture.
+    `texture` (n,): row of the table, -1 for none. `count`: how many pixels there are, at most TOGETHER. `scratch`: with
+    the rows from PLACE on filled, of pixels that have a texture. `colour` (n, 3) float32: filled, 0 where there is no
+    texture.
     """
-    for first in range(0, count, TOGETHER):
-        size = min(TOGETHER, count - first)
-        _describe(table, texture, place, first, size, scratch.pixel)
-        _plan(scratch.pixel)
-        _level(scratch.pixel, scratch.short)
-        listed, spans = _list(table, texture, first, size, scratch)
-        _locate(listed, scratch)
-        _wrap(table, spans, scratch)
-        for i in range(first, first + size):
-            colour[i, 0], colour[i, 1], colour[i, 2] = np.float32(0), np.float32(0), np.float32(0)
-        _blend(table.texels, listed, scratch, first, colour)
+    _describe(table, texture, count, scratch.pixel)
+    _plan(scratch.pixel)
+    _level(scratch.pixel, scratch.short)
+    listed, spans = _list(table, texture, count, scratch)
+    _locate(listed, scratch)
+    _wrap(table, spans, scratch)
+    for i in range(count):
+        colour[i, 0], colour[i, 1], colour[i, 2] = np.float32(0), np.float32(0), np.float32(0)
+    _blend(table.texels, listed, scratch, colour)
 
 
 @kernel
-def _describe(table: TextureTable, texture: Array, place: Array, first: int, size: int, pixel: Array) -> None:
-    """Fill place, size and last level of the images of some pixels; -1 for filters without levels."""
-    for row in range(PLACE, PLACE + 6):
-        for i in range(size):
-            pixel[row * TOGETHER + i] = place[row - PLACE, first + i]
-    for i in range(size):
-        row = max(texture[first + i], 0)
+def _describe(table: TextureTable, texture: Array, count: int, pixel: Array) -> None:
+    """Fill size, last level and periods of the images of some pixels; -1 for filters without levels."""
+    for i in range(count):
+        row = max(texture[i], 0)
         level = table.texture[row, FIRST]
         pixel[WIDTH * TOGETHER + i], pixel[HEIGHT * TOGETHER + i] = table.level[level, 1], table.level[level, 2]
         for axis, wrap in ((0, WRAP_U), (1, WRAP_V)):
@@ -148,12 +143,12 @@ def _level(pixel: Array, short: Array) -> None:
 
 
 @kernel
-def _list(table: TextureTable, texture: Array, first: int, size: int, scratch: Looks) -> tuple[int, int]:
+def _list(table: TextureTable, texture: Array, size: int, scratch: Looks) -> tuple[int, int]:
     """List every probe of some pixels on both levels around its own; return how many looks and spans are listed."""
     pixel, place, texel, share, span = scratch.pixel, scratch.place, scratch.texel, scratch.share, scratch.span
     count, spans = 0, 0
     for i in range(size):
-        one = texture[first + i]
+        one = texture[i]
         if one < 0:
             continue
         whole = table.texture[one, FILTER] == NEAREST
@@ -214,11 +209,11 @@ def nearer(share: float) -> float:
 
 
 @kernel
-def _blend(texels: Array, count: int, scratch: Looks, first: int, colour: Array) -> None:
+def _blend(texels: Array, count: int, scratch: Looks, colour: Array) -> None:
     """Add up what the looks find."""
     texel, share, one = scratch.texel, scratch.share, np.float32(1)
     for k in range(count):
-        i = np.uint64(first + texel[PIXEL * LOOKS + k])
+        i = np.uint64(texel[PIXEL * LOOKS + k])
         ul = np.uint64(texel[START * LOOKS + k])
         ur, ll = ul + np.uint64(np.int64(texel[RIGHT * LOOKS + k])), ul + np.uint64(np.int64(texel[BELOW * LOOKS + k]))
         lr = ll + np.uint64(np.int64(texel[RIGHT * LOOKS + k]))

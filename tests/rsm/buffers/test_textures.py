@@ -13,7 +13,7 @@ from refgi.rsm.buffers.gbuffer import values_at
 from refgi.rsm.buffers.light_projection import light_projection
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection, camera_projection
 from refgi.scene import DirectionalLight, Image, Material, PointLight, Scene, SpotLight, material_table
-from refgi.scene.texture.footprint import MOST
+from refgi.scene.texture.footprint import MOST, PLACE, TOGETHER, looks
 from tests.naive import textures as naive
 from tests.textured import CHECKS, EYE, HALF, PITCH, VFOV, checker, floor, room
 
@@ -71,11 +71,12 @@ def test_coordinates_are_those_of_the_ray_s_barycentrics(view: str, evidence: Ca
     projection = projections(scene)[view]
     surface = textures.painted(scene.geometry, material_table(scene.materials))
     assert surface is not None
-    found = np.empty((6, projection.width))
+    pixels = looks().pixel
+    found = pixels[PLACE * TOGETHER :].reshape(6, TOGETHER)
     worst = slope = 0.0
     for row in range(projection.height * 2 // 3, projection.height, 3):
         for face in (0, 1):
-            textures.fill_places(surface, projection, face, (row, 0, projection.width), 0, found)
+            textures.fill_places(surface, projection, face, (row, 0, projection.width), 0, pixels)
             for column in range(0, projection.width, 5):
                 expected = place(scene, projection, face, row, column)
                 worst = max(worst, np.abs(found[:2, column] - expected[:2]).max())

@@ -8,7 +8,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.scene import Image, Texture
-from refgi.scene.texture.footprint import MOST, footprint_means, looks
+from refgi.scene.texture.footprint import MOST, PLACE, TOGETHER, Looks, footprint_means, looks
 from refgi.scene.texture.lookup import bilinear, coordinates_at, nearest, point_sample
 from refgi.scene.texture.table import Textures, textures_of
 from tests.naive import textures as naive
@@ -55,6 +55,13 @@ def footprints(count: int, seed: int) -> np.ndarray:
     return place
 
 
+def at(place: np.ndarray) -> Looks:
+    """Scratch with pixels at these coordinates, (6, n)."""
+    scratch: Looks = looks()
+    scratch.pixel[PLACE * TOGETHER :].reshape(6, TOGETHER)[:, : place.shape[1]] = place
+    return scratch
+
+
 @pytest.mark.parametrize("size", [(16, 16), (9, 14), (1, 1)])
 @pytest.mark.parametrize("wrap", [("repeat", "repeat"), ("mirror", "clamp")])
 def test_means_over_footprints_equal_the_twin(size: tuple[int, int], wrap: tuple[str, str]) -> None:
@@ -63,7 +70,7 @@ def test_means_over_footprints_equal_the_twin(size: tuple[int, int], wrap: tuple
     colour = np.full((60, 3), np.nan, np.float32)
     texture = np.zeros(60, np.int32)
     texture[10] = -1
-    footprint_means(table, texture, place, 59, looks(), colour)
+    footprint_means(table, texture, 59, at(place), colour)
     assert not colour[10].any()
     assert np.isnan(colour[59]).all()
     for k in set(range(59)) - {10}:
@@ -75,7 +82,7 @@ def test_other_filters_look_at_the_middle_of_a_footprint(chosen: str) -> None:
     picture, place = image(6, 7), footprints(40, 4)
     table = Textures([Texture(picture, filter=chosen)]).table  # type: ignore[arg-type]
     colour = np.empty((40, 3), np.float32)
-    footprint_means(table, np.zeros(40, np.int32), place, 40, looks(), colour)
+    footprint_means(table, np.zeros(40, np.int32), 40, at(place), colour)
     literal = {"nearest": naive.nearest, "bilinear": naive.bilinear}[chosen]
     expected = [literal(picture.pixels, ("repeat", "repeat"), u, v) for u, v in place[:2].T]
     assert np.abs(colour - expected).max() <= BLENDS
@@ -89,7 +96,7 @@ def test_what_is_seen_edge_on_or_from_far_is_the_mean_and_no_number_breaks_a_loo
     place[2:, 3] = np.nan
     place[:2, 4] = 1e200
     colour = np.full((5, 3), np.nan, np.float32)
-    footprint_means(table, np.zeros(5, np.int32), place, 5, looks(), colour)
+    footprint_means(table, np.zeros(5, np.int32), 5, at(place), colour)
     assert np.allclose(colour[:4], picture.pixels.mean(axis=(0, 1)), atol=1e-6)
     assert ((colour[4] >= 0) & (colour[4] <= 1)).all()
 

@@ -17,9 +17,10 @@ from refgi.stress.run import stress
 
 SIZE, LARGER = 64, 96
 SCENES = ("cornell_box", "cornell_sphere:faces=1000", "stage", "ring:faces=3000",
-          "glass_ball:faces=3000", "metaballs", "integrating_sphere:faces=1000", "parallel_plates", "wedge")
+          "glass_ball:faces=3000", "metaballs", "integrating_sphere:faces=1000", "parallel_plates", "wedge", "atrium",
+          "textured_atrium", "leaf_grid")
 REAL = ("cornell_horse", "dragon_bunny")
-SAID = "nine built-in and two real scenes, 64 x 64, and five at 96 x 96"
+SAID = "all built-in and two real scenes, 64 x 64, and five at 96 x 96"
 LARGER_SCENES = ("cornell_box", "stage", "ring:faces=3000", "glass_ball:faces=3000", "metaballs")
 FAST = ("gather", "sii", "multires", "hssil")  # also seen larger
 

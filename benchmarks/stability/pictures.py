@@ -26,7 +26,7 @@ from refgi.stress.run import PART, stress
 
 SIZE = 64
 SCENES = ("cornell_box", "stage", "ring:faces=3000", "glass_ball:faces=3000", "metaballs",
-          "integrating_sphere:faces=1000")
+          "integrating_sphere:faces=1000", "textured_atrium", "leaf_grid")
 SHORT_METHODS = ("sii", "multires", "hssil", "gather")
 # a few lights each: what breaks on a strange scene breaks with few
 FEW = {"sii": ("lights=64",), "multires": ("lights=64",), "val": ("lights=64", "clusters=4", "maps=16"),

@@ -32,6 +32,8 @@ EVERY = {"sii": ("pattern=all",), "multires": ("pattern=all", "coarsest=65536"),
 SMALL_MAP: Mapping[str, Any] = MappingProxyType({"rsm_resolution": 16})
 DRAWN_ANEW = ("mirrored", "two lamps of half")  # changes after which other lights or samples are drawn
 SAMPLED_ANEW = ("quarter turn", "turned", "mirrored", "two lamps of half")  # changes after which paths go elsewhere
+# the same where surfaces have images: a hit that is rounded otherwise reads another place, and senders are picked by it
+PAINTED_ANEW = ("moved far", "moved aside", "faces permuted", "faces split", "faces unwelded", "faces doubled")
 
 AROUND = "it looks at the picture around a pixel"
 WITHOUT_MAPS = ("hssil", "truth")
@@ -88,9 +90,10 @@ def asked(method: str, change: Change, scene: Scene) -> Asked:
     few = FEW.get(method, ())
     if method == "hssil" and change.name == "flux x 2^-60":
         return Asked("rounding", few, limit=LEAST, kind="derived", source=SUBNORMAL)
-    if change.promise == "bits":
+    sampled_anew = SAMPLED_ANEW + PAINTED_ANEW * any(material.textures for material in scene.materials)
+    if change.promise == "bits" and not (method == "truth" and change.name in sampled_anew):
         return Asked("bits", few, source=POWER_OF_TWO if " x 2^" in change.name else SAME)
-    if method == "truth" and change.name in SAMPLED_ANEW:
+    if method == "truth" and change.name in sampled_anew:
         return Asked("estimate", few, kind="statistics", source=f"Student's t of both estimates, {UNLIKELY:g}")
     if change.name == "hidden plane":
         return Asked("rounding", few, limit=LEAST, kind="derived", source="no light comes from it, none goes to it")

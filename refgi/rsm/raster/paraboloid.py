@@ -55,7 +55,7 @@ class Ignored(NamedTuple):
 class CutChunks(NamedTuple):
     """Triangles that may have holes."""
 
-    chunks: Chunks
+    triangles: Chunks
     holes: CutFaces
 
 
@@ -114,7 +114,7 @@ def _draw_maps(
             limits = 1.0 / (ignored.planes[m] * ignored.planes[m]), ignored.ball[m]
             left_out[m] = draw(projection, m, triangles, None, limits, setup, map_nearness, map_ids)
             if cut is not None:
-                left_out[m] += draw(projection, m, cut.chunks, cut.holes, limits, setup, map_nearness, map_ids)
+                left_out[m] += draw(projection, m, cut.triangles, cut.holes, limits, setup, map_nearness, map_ids)
             if with_ids:
                 clear_outside_disc(projection, map_nearness, map_ids)
             else:

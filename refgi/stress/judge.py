@@ -99,7 +99,7 @@ def same_surface(before: Seen, after: Seen, changed: Changed) -> Array:
 
 
 def bits_apart(before: Seen, after: Seen, changed: Changed) -> int:
-    """Return how many pixels of the part differ by a bit.
+    """Return how many pixels of the part differ by a bit, of those whose light has all its digits in both pictures.
 
     Parameters
     ----------
@@ -112,8 +112,14 @@ def bits_apart(before: Seen, after: Seen, changed: Changed) -> int:
     -------
     int
         Pixels.
+
+    Notes
+    -----
+    Light below the smallest normal number of float32, 1.2e-38, keeps fewer bits and is not asked for any.
     """
-    return int(np.count_nonzero((before.light[:, *changed.part] != changed.back(after.light)).any(axis=0)))
+    was, now = before.light[:, *changed.part], changed.back(after.light)
+    too_dark = np.maximum(was, now) * min(1.0, changed.flux) < np.finfo(np.float32).tiny
+    return int(np.count_nonzero(((was != now) & ~too_dark).any(axis=0)))
 
 
 def rmse_apart(before: Seen, after: Seen, changed: Changed) -> float:

@@ -175,6 +175,10 @@ def test_judges_in_closed_form():
     assert rmse_apart(seen(2.0), seen(4.0), Changed(None, flux=2.0)) == 0
     assert bits_apart(seen(1.0), seen([[1, 1], [1, np.nextafter(1, 2)]]), plain) == 1
     assert bits_apart(seen([[1, 2], [3, 4]]), seen([[2, 1], [4, 3]]), Changed(None, mirrored=True)) == 0
+    darker, subnormal = Changed(None, flux=2.0**-27), 2.0**-110  # 2^-137 in the darker picture
+    for was, now, apart in ((subnormal, 0.0, 0), (0.0, subnormal, 0), (2.0**-98, 0.0, 1), (0.0, 2.0**-98, 1),
+                            (subnormal, 1.0, 1), (np.nan, np.nan, 1)):
+        assert bits_apart(seen([[was, 1], [1, 1]]), seen(darker.flux * np.array([[now, 1], [1, 1]])), darker) == apart
     moved = seen(2.0, [[1, 1], [1, 2]])  # another place in one pixel: 4, which is left out
     assert same_surface(seen(2.0), moved, plain).tolist() == [[True, True], [True, False]]
     assert rmse_apart(seen(2.0), moved._replace(light=seen([[2, 2], [2, 9]]).light), plain) == 0

@@ -218,7 +218,7 @@ def test_a_lobe_of_exponent_0_reflects_as_a_diffuse_surface(case, evidence):
         corners = room.geometry.vertices[room.geometry.faces]
         flat = naive.unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
         normals = np.empty(room.geometry.vertices.shape)
-        flat[2:] = naive.unit(flat[2:] + (0.25, 0.15, -0.1))  # of the senders
+        flat[2:] = naive.unit(flat[2:] + np.array((0.25, 0.15, -0.1)))  # of the senders
         normals[room.geometry.faces] = flat[:, None]
         room = dataclasses.replace(room, geometry=dataclasses.replace(room.geometry, vertex_normals=normals))
     frame = Frame(room, width=24, height=24)

@@ -140,9 +140,9 @@ def written_files(process: int, folder: Path, most: int = 1 << 30) -> int:
 
 def command(arguments: Sequence[str]) -> None:
     """Run refgi."""
-    from refgi.cli.group import VerbGroup
+    from refgi.cli import main
 
-    VerbGroup.refgi().main(list(arguments))
+    main(arguments)
 
 
 def serve() -> None:

@@ -4,11 +4,40 @@ Results go to stdout, everything else to stderr. Exit codes: 0 done, 1 a check f
 2 usage or input error, 130 interrupted, 143 terminated.
 """
 
-from refgi.cli.group import VerbGroup
+import atexit
+import contextlib
+import os
+import sys
+import threading
+from collections.abc import Sequence
+from typing import NoReturn
+
+from refgi.cli.group import SIGNALLED, VerbGroup
 
 __all__ = ["main"]
 
 
-def main() -> None:
-    """Run the command line and exit."""
-    VerbGroup.refgi().main(prog_name="refgi")
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Those of the process where absent.
+    """
+    try:
+        VerbGroup.refgi().main(arguments, prog_name="refgi")
+    except SystemExit as end:
+        if end.code in SIGNALLED:
+            _leave(end.code)
+        raise
+
+
+def _leave(code: int) -> NoReturn:
+    """End like the interpreter, but take no object apart: a signal may have left any, as a compiler's, half made."""
+    threading._shutdown()  # type: ignore[attr-defined]
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)

@@ -33,6 +33,10 @@ Exit codes: 0 done, 1 a check failed, 2 usage or input error, 130 interrupted, 1
 """
 
 
+SIGNALLED = (INTERRUPTED, TERMINATED)  # exit codes
+_interrupts: list[BaseException] = []  # kept, so that no frame they came through is taken apart: see `refgi.cli.main`
+
+
 class Terminated(KeyboardInterrupt):
     """SIGTERM, by which systems ask a program to end: cleaned up after like an interrupt from the keyboard."""
 
@@ -199,6 +203,8 @@ def _expect_halves() -> None:
 
 def _explained(error: BaseException, session: Session) -> int:
     """Say what went wrong and return the exit code."""
+    if isinstance(error, KeyboardInterrupt):
+        _interrupts.append(error)
     if isinstance(error, SystemExit):
         return error.code if isinstance(error.code, int) else FAILED
     if session.debug and not isinstance(error, click.exceptions.Abort | KeyboardInterrupt):

@@ -3,10 +3,17 @@
 import os
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from refgi.scene import Scene, load_scene
+from refgi.stages import Run
+
+STAND_INS = {  # built-in scenes of as many faces, where the papers' are absent
+    "cornell_horse": "cornell_sphere:faces=17000", "sponza": "atrium:faces=262000",
+    "kitchen": "atrium:faces=100000,seed=3", "dragon_bunny": "atrium:faces=405000",
+    "flying_bunnies": "atrium:faces=417000,seed=2"}
 DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
 
 
@@ -14,6 +21,11 @@ def real_scene(name: str) -> Path | None:
     """Return the file of a scene of REFGI_DATA, the folder of real scenes; none where there is no such file."""
     path = DATA / f"{name}.json"
     return path if path.is_file() else None
+
+
+def paper_scene(name: str) -> Scene:
+    """Return a scene of REFGI_DATA, its stand-in where that has none, or the built-in one of that name."""
+    return load_scene(real_scene(name) or STAND_INS.get(name, name))
 
 
 class Row(NamedTuple):
@@ -63,3 +75,18 @@ def _time(function: Callable[[], object]) -> float:
     started = time.perf_counter()
     function()
     return time.perf_counter() - started
+
+
+def own_seconds(runs: Sequence[Run]) -> dict[str, float]:
+    """Return how long stages took without the stages inside them, by name; a log has each before those inside it."""
+    own: dict[str, float] = {}
+    open_runs: list[Run] = []
+    for run in runs:
+        if run.status != "ran":
+            continue
+        del open_runs[run.depth:]
+        own[run.name] = own.get(run.name, 0.0) + run.seconds
+        if open_runs:
+            own[open_runs[-1].name] -= run.seconds
+        open_runs.append(run)
+    return own

@@ -11,18 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.harness import Row, ratio, real_scene, seconds
-from refgi import Frame, load_scene
+from benchmarks.harness import Row, paper_scene, ratio, seconds
+from refgi import Frame
 from refgi.errors import RefgiWarning
 from refgi.frame import compose
-from refgi.scene import Scene
 from refgi.settings import of, replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
 from refgi.sssil.settings import PRESETS
 from refgi.stages import observe
 
-STAND_INS = {"sponza": "atrium:faces=262000", "cornell_horse": "cornell_sphere:faces=17000"}
 PAPER = {  # start, levels, samples: total ms on both cards, Fig. 6
     ("quarter", 4, 64): (13.9, 4.6), ("quarter", 4, 256): (33.6, 11.2), ("half", 4, 256): (110.6, 32.6),
     ("half", 4, 64): (34.8, 10.5), ("half", 5, 64): (35.1, 10.55)}
@@ -37,17 +35,13 @@ def rows(quick: bool) -> Iterator[Row]:
         settings = replaced(PRESETS["paper"], {"start": start, "levels": levels, "samples": samples})
         yield _time(frame, f"{start}, {levels} levels, {samples} samples", settings, repeats, fast)
     yield from _fifth_level(frame, repeats)
-    for name in STAND_INS:
+    for name in ("sponza", "cornell_horse"):
         yield from _errors(name, 96 if quick else 192)
-
-
-def _scene(name: str) -> Scene:
-    return load_scene(real_scene(name) or STAND_INS[name])
 
 
 def _seen(name: str, width: int, height: int) -> Frame:
     """Return a frame whose G-buffer and direct light are known: what deferred shading has done before."""
-    frame = Frame(_scene(name), width=width, height=height)
+    frame = Frame(paper_scene(name), width=width, height=height)
     frame.gbuffer.resolve("position", "depth", "normal", "albedo")
     assert frame.direct.any()
     return frame

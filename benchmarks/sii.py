@@ -3,7 +3,6 @@
 A figure of the paper is of a GeForce 6800 GT at 512^2, without buffer updates unless said; ours are of this machine.
 """
 
-import dataclasses
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,7 +17,6 @@ from refgi.scene import Scene
 from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.reach.fragments import fragments
-from refgi.stages import Memory, observe
 
 ROOM = "cornell_sphere:faces=17000"
 # a sixth of the pairs count, as in Fig. 8: 125 of 768
@@ -38,29 +36,13 @@ def rows(quick: bool) -> Iterator[Row]:
 
 
 def _frames(name: str, scene: Scene, settings: SiiSettings, size: int, repeats: int, paper: float) -> Iterator[Row]:
-    """Frames a second: with still buffers, as the paper timed its figures, and with light and camera moving."""
+    """Frames a second of the splatting alone, as the paper timed its figures; of whole frames: topic frames."""
     still = Frame(scene, width=size, height=size)
     lights, receivers = choose_lights(still, settings.lights), _receivers(still)
     drawn = fragments(receivers, lights, settings)
     splatting = seconds(lambda: sii(still, settings), repeats)  # choosing the lights included
     note = f"paper {paper:.0f}; overdraw {drawn.total / receivers.covered.sum():.0f}"
     yield Row(f"{name}: still buffers", 1 / splatting, "frames/s", f">= {paper * (3 if paper < 50 else 1):.0f}", note)
-    memory, moves = Memory(), iter(range(1, 1000))
-
-    def frame() -> None:
-        with observe(memory=memory):
-            moved = Frame(_moved(scene, 1e-4 * next(moves)), width=size, height=size)
-            moved.radiance(sii(moved, settings))
-
-    yield Row(f"{name}: light and camera move", 1 / seconds(frame, repeats), "frames/s", "",
-              f"paper {96 if paper > 90 else 48}; RSM, G-buffer, shadows and shading included")
-
-
-def _moved(scene: Scene, step: float) -> Scene:
-    light, (x, y, z) = scene.lights[0], scene.camera.eye
-    a, b, c = light.position
-    return (scene.with_lights(dataclasses.replace(light, position=(a + step, b, c)))
-            .with_camera(eye=(x + step, y, z)))
 
 
 def _receivers(frame: Frame) -> Receivers:

@@ -2,11 +2,12 @@
 
 import statistics
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.harness import own_seconds
 from benchmarks.papers.records import Bar, Cell, Figure, Picture, Ratios, Table, relative
 from benchmarks.papers.val.subjects import (
     AREA_LIGHTS,
@@ -29,7 +30,7 @@ from benchmarks.papers.workbench import Gallery, Workbench, errors_of, interleav
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.scene import Scene
-from refgi.stages import Run, observe
+from refgi.stages import observe
 
 
 def one_frame(bench: Workbench, name: str, fps: float) -> Figure:
@@ -167,18 +168,3 @@ def _profile(bench: Workbench, scene: Scene, settings: ValSettings) -> dict[str,
                  for step in STEPS}
         found.append(parts | {REST: whole - sum(parts.values()), "frame": whole})
     return {key: statistics.median(one[key] for one in found) for key in found[0]}
-
-
-def own_seconds(runs: Sequence[Run]) -> dict[str, float]:
-    """Return how long stages took without the stages inside them, by name; a log has each before those inside it."""
-    own: dict[str, float] = {}
-    open_runs: list[Run] = []
-    for run in runs:
-        if run.status != "ran":
-            continue
-        del open_runs[run.depth:]
-        own[run.name] = own.get(run.name, 0.0) + run.seconds
-        if open_runs:
-            own[open_runs[-1].name] -= run.seconds
-        open_runs.append(run)
-    return own

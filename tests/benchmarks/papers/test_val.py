@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import refgi.stages
+from benchmarks.harness import own_seconds
 from benchmarks.papers.val import frames as whole_frames
 from benchmarks.papers.val.clusters import cluster_of_pixel, moved, painted
-from benchmarks.papers.val.frames import STEPS, own_seconds
+from benchmarks.papers.val.frames import STEPS
 from benchmarks.papers.val.moving import EXACT, FEWER, INTERLEAVED, RESTARTED, WARM, mean_motion, motion, pieces
 from benchmarks.papers.val.shadows import penumbra
 from benchmarks.papers.val.subjects import (

@@ -20,6 +20,7 @@ from refgi.pairs.settings import Lightcuts, PairSettings, SphereClamp
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.pairs.tile_counts import lobe_tiles, tiles_behind
 from refgi.pairs.tiles import block_by_block, clear, put, receiving, taken
+from refgi.rsm.pool import plane, zeros
 from refgi.skips import left_out
 from refgi.stages import report_progress, skip, stage, tally
 
@@ -169,12 +170,12 @@ def over_receivers(receivers: Receivers, packed: Packed, add: Callable[[Array, A
     normal = np.asarray(receivers.normal, position.dtype)
     shown = receiving(covered)
     places = block_by_block(shown)
-    result = np.zeros(position.shape, position.dtype)
+    result = (plane if len(places) == covered.size else zeros)(position.shape, position.dtype)
     step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(packed.shines)) // TILE * TILE)
     for first in range(0, len(places), step):
         part = places[first : first + step]
         points, normals = taken(position, part), taken(normal, part)
-        sums = np.zeros_like(points)
+        sums = zeros(points.shape, points.dtype)
         add(points, normals, part, sums)
         put(result, part, sums)
         report_progress(min(1.0, (first + step) / len(places)))

@@ -2,7 +2,7 @@
 
 Blocks of 16 x 16 pixels go row by row; within a block 8 x 8 after 8 x 8, within these 4 x 4 after 4 x 4. Pixels
 without surface are left out, so the tiles of the kernels are filled and still compact: fewer lights reach into them
-than into a piece of a row. One thread does it: copying a picture takes less than it may take another to start.
+than into a piece of a row.
 
 Which lights can reach which tile of receivers: what lies behind a plane adds exactly 0 and need not be summed.
 
@@ -16,12 +16,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel
+from refgi.jit import kernel, prange
+from refgi.rsm.pool import plane
 from refgi.skips import left_out
 
 Array = npt.NDArray[Any]
 
 BLOCK = 16  # BLOCK^2 pixels fill one tile of the kernels
+AT_ONCE = 1 << 12  # pixels that a thread copies at once
 ROUNDING = 32.0  # units of rounding of |d| that a cosine computed from d may be off; about 6 are possible
 
 
@@ -32,29 +34,32 @@ def receiving(covered: Array) -> Array:
     return np.ones_like(covered)
 
 
-def clear(plane: Array, covered: Array, receiving: Array) -> None:
+def clear(picture: Array, covered: Array, receiving: Array) -> None:
     """Set pixels without surface of (3, h, w) to 0 that were summed at, where a zero normal gave them anything."""
     if receiving is not covered:
-        plane[:, ~covered] = 0
+        picture[:, ~covered] = 0
 
 
 def block_by_block(covered: Array) -> Array:
     """Return the flat indices of covered pixels (h, w), block by block, (n,) int64."""
-    places = np.empty(covered.size, np.int64)
-    count = _fill(covered, _path(), places)
-    return places[:count]
+    counts = np.empty(-(-len(covered) // BLOCK), np.int64)
+    _count_strips(covered, counts)
+    ends = np.cumsum(counts)
+    places = plane((int(counts.sum()),), np.int64)
+    _fill_strips(covered, _path(), ends - counts, places)
+    return places
 
 
-def taken(plane: Array, places: Array) -> Array:
+def taken(values: Array, places: Array) -> Array:
     """Return the values of three channels (3, h, w) at pixels of flat indices (n,), (3, n)."""
-    values = np.empty((3, len(places)), plane.dtype)
-    _take(np.ascontiguousarray(plane).reshape(3, -1), places, values)
-    return values
+    some = plane((3, len(places)), values.dtype)
+    _take(np.ascontiguousarray(values).reshape(3, -1), places, some)
+    return some
 
 
-def put(plane: Array, places: Array, values: Array) -> None:
-    """Store the values (3, n) of three channels at pixels of distinct flat indices (n,) of a contiguous plane."""
-    _put(values, places, plane.reshape(3, -1))
+def put(picture: Array, places: Array, values: Array) -> None:
+    """Store the values (3, n) of three channels at pixels of distinct flat indices (n,) of a contiguous picture."""
+    _put(values, places, picture.reshape(3, -1))
 
 
 def _path() -> Array:
@@ -63,17 +68,26 @@ def _path() -> Array:
     return np.stack([index // BLOCK, index % BLOCK])
 
 
-@kernel
-def _fill(covered: Array, path: Array, places: Array) -> int:
+@kernel(parallel=True)
+def _count_strips(covered: Array, counts: Array) -> None:
+    for strip in prange(len(counts)):
+        count = 0
+        for row in range(strip * BLOCK, min((strip + 1) * BLOCK, len(covered))):
+            for column in range(covered.shape[1]):
+                count += covered[row, column]
+        counts[strip] = count
+
+
+@kernel(parallel=True)
+def _fill_strips(covered: Array, path: Array, starts: Array, places: Array) -> None:
     height, width = covered.shape
-    offset = path[0] * width + path[1]
-    count = 0
-    for top in range(0, height, BLOCK):
+    for strip in prange(len(starts)):
+        top, count = strip * BLOCK, starts[strip]
         for left in range(0, width, BLOCK):
             first = top * width + left
             if _is_full(covered, top, left):
                 for i in range(BLOCK * BLOCK):
-                    places[count + i] = first + offset[i]
+                    places[count + i] = first + path[0, i] * width + path[1, i]
                 count += BLOCK * BLOCK
                 continue
             for i in range(BLOCK * BLOCK):
@@ -81,7 +95,6 @@ def _fill(covered: Array, path: Array, places: Array) -> int:
                 if row < height and column < width and covered[row, column]:
                     places[count] = row * width + column
                     count += 1
-    return count
 
 
 @kernel
@@ -96,18 +109,20 @@ def _is_full(covered: Array, top: int, left: int) -> bool:
     return full
 
 
-@kernel
-def _take(plane: Array, places: Array, values: Array) -> None:
-    for c in range(3):
-        for i in range(len(places)):
-            values[c, i] = plane[c, places[i]]
+@kernel(parallel=True)
+def _take(values: Array, places: Array, some: Array) -> None:
+    for part in prange(-(-len(places) // AT_ONCE)):
+        for c in range(3):
+            for i in range(part * AT_ONCE, min((part + 1) * AT_ONCE, len(places))):
+                some[c, i] = values[c, places[i]]
 
 
-@kernel
-def _put(values: Array, places: Array, plane: Array) -> None:
-    for c in range(3):
-        for i in range(len(places)):
-            plane[c, places[i]] = values[c, i]
+@kernel(parallel=True)
+def _put(some: Array, places: Array, values: Array) -> None:
+    for part in prange(-(-len(places) // AT_ONCE)):
+        for c in range(3):
+            for i in range(part * AT_ONCE, min((part + 1) * AT_ONCE, len(places))):
+                values[c, places[i]] = some[c, i]
 
 
 @kernel

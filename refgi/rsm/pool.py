@@ -66,3 +66,13 @@ def plane(shape: tuple[int, ...], dtype: npt.DTypeLike) -> Array:
     if size < SMALL:
         return np.empty(shape, dtype)
     return np.asarray(_PooledBlock(_pool, _pool.acquire(size))).view(dtype).reshape(shape)
+
+
+def zeros(shape: tuple[int, ...], dtype: npt.DTypeLike) -> Array:
+    """Allocate an array of zeros from the pool.
+
+    Result: C-contiguous.
+    """
+    array = plane(shape, dtype)
+    array[...] = 0
+    return array

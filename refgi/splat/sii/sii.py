@@ -22,7 +22,7 @@ from refgi.pairs.pair_sum import TILE
 from refgi.pairs.ranged_sum import LANES, sum_pairs_in_range, sum_weighted_pairs
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.splat.sii.half_resolution import half_resolution
-from refgi.splat.sii.reach.lists import LightLists, Some, listed_pairs
+from refgi.splat.sii.reach.lists import EVERY, LightLists, Some, listed_pairs
 from refgi.splat.sii.reach.reference_length import with_reference_length
 from refgi.splat.sii.reach.threshold import warn_of_cut
 from refgi.splat.sii.settings import SiiSettings
@@ -176,6 +176,10 @@ def _sum_in_range(
         elif lists.diffuse is not None:
             run = sum_weighted_pairs if weighted else sum_pairs_in_range
             for some, listed in lists.of_diffuse(here, facing, places):
+                if some is EVERY:  # all at once, into what holds nothing yet
+                    _tally(listed, LANES, sums)
+                    run(here, facing, packed.diffuse, packed.clamp, lists.diffuse, listed, sums)
+                    continue
                 points, normals, found = _chosen(some, here, facing)
                 _tally(listed, LANES, found)
                 run(points, normals, packed.diffuse, packed.clamp, lists.diffuse, listed, found)

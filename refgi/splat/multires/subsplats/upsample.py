@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange, threads
+from refgi.rsm.pool import plane
 from refgi.splat.multires.refinement.grid import Subsplats, level_shape
 from refgi.splat.multires.settings import Upsampling
 from refgi.splat.multires.subsplats.tent import demo_pass, tent_pass
@@ -24,10 +25,10 @@ FEW_TEXELS = 1 << 16  # of a level, that one thread fills before others are awak
 
 def _layer(values: Array, subsplats: Subsplats, level: int) -> Array:
     """Return the layer of one level, (3, h_l, w_l) W/m^2: irradiance at its subsplats, 0 elsewhere."""
-    plane = np.zeros((3, *subsplats.leaf[level].shape), values.dtype)
+    layer = np.zeros((3, *subsplats.leaf[level].shape), values.dtype)
     of_level = np.flatnonzero(subsplats.level == level)
-    plane[:, subsplats.row[of_level], subsplats.column[of_level]] = values[:, of_level]
-    return plane
+    layer[:, subsplats.row[of_level], subsplats.column[of_level]] = values[:, of_level]
+    return layer
 
 
 def filled_cells(covered: Array, top: int) -> list[Array]:
@@ -180,7 +181,7 @@ def demo_level(
 
 def _empty_level(filled: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:
     """Return uninitialised irradiance and mask of a level."""
-    return np.empty((3, *filled.shape), dtype), np.empty(filled.shape, np.bool_)
+    return plane((3, *filled.shape), dtype), plane(filled.shape, np.bool_)
 
 
 def black_level(filled: Array, dtype: np.dtype[Any]) -> tuple[Array, Array]:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.ranged_sum import LANES
+from refgi.rsm.pool import zeros
 from refgi.splat.sii.reach.bounds import Solids
 from refgi.stages import stage
 
@@ -76,7 +77,7 @@ def list_lights(position: Array, normal: Array, solids: Array) -> Array:
     (ceil(n / LANES), N) ndarray of bool
         Whether a light may count for some receiver of a tile.
     """
-    listed = np.zeros((-(-position.shape[1] // LANES), solids.shape[1]), np.bool_)
+    listed = zeros((-(-position.shape[1] // LANES), solids.shape[1]), np.bool_)
     _list(position, normal, solids, bool((solids[BALL] > 0).any()), listed)
     return listed
 

@@ -16,7 +16,7 @@ from refgi.errors import RefgiWarning
 from refgi.pairs.irradiance import Receivers, add_lights
 from refgi.pairs.packing import pack
 from refgi.pairs.settings import PairSettings
-from refgi.pairs.tiles import block_by_block, taken
+from refgi.pairs.tiles import nth_by_block, strip_starts, taken
 from refgi.stages import stage
 
 if TYPE_CHECKING:
@@ -44,10 +44,12 @@ def sample_pixels(receivers: Receivers, count: int) -> Sample:
     One out of each of `count` equal stretches of the picture's blocks, at van der Corput's place in it; all where there
     are fewer.
     """
-    places = block_by_block(np.asarray(receivers.covered, np.bool_))
-    count = min(count, len(places))
-    ends = np.arange(count + 1) * len(places) // max(1, count)
-    chosen = places[ends[:-1] + (_van_der_corput(count) * np.diff(ends)).astype(np.int64)]
+    covered = np.asarray(receivers.covered, np.bool_)
+    starts = strip_starts(covered)
+    count = min(count, int(starts[-1]))
+    ends = np.arange(count + 1) * starts[-1] // max(1, count)
+    nth = ends[:-1] + (_van_der_corput(count) * np.diff(ends)).astype(np.int64)
+    chosen = nth_by_block(covered, starts, nth)
     return Sample(chosen, *(taken(np.asarray(plane), chosen) for plane in (receivers.position, receivers.normal)))
 
 

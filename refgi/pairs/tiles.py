@@ -40,13 +40,25 @@ def clear(picture: Array, covered: Array, receiving: Array) -> None:
         picture[:, ~covered] = 0
 
 
-def block_by_block(covered: Array) -> Array:
-    """Return the flat indices of covered pixels (h, w), block by block, (n,) int64."""
+def strip_starts(covered: Array) -> Array:
+    """Return how many covered pixels (h, w) come before each strip of blocks, and before its end, (s + 1,) int64."""
     counts = np.empty(-(-len(covered) // BLOCK), np.int64)
     _count_strips(covered, counts)
-    ends = np.cumsum(counts)
-    places = plane((int(counts.sum()),), np.int64)
-    _fill_strips(covered, _path(), ends - counts, places)
+    return np.concatenate([[0], np.cumsum(counts)])
+
+
+def block_by_block(covered: Array) -> Array:
+    """Return the flat indices of covered pixels (h, w), block by block, (n,) int64."""
+    starts = strip_starts(covered)
+    places = plane((int(starts[-1]),), np.int64)
+    _fill_strips(covered, _path(), starts, places)
+    return places
+
+
+def nth_by_block(covered: Array, starts: Array, nth: Array) -> Array:
+    """Return `block_by_block(covered)[nth]`, of which only those (m,), rising, are found; `starts`: `strip_starts`."""
+    places = np.empty(len(nth), np.int64)
+    _choose(covered, _path(), starts, nth, places)
     return places
 
 
@@ -81,7 +93,7 @@ def _count_strips(covered: Array, counts: Array) -> None:
 @kernel(parallel=True)
 def _fill_strips(covered: Array, path: Array, starts: Array, places: Array) -> None:
     height, width = covered.shape
-    for strip in prange(len(starts)):
+    for strip in prange(len(starts) - 1):
         top, count = strip * BLOCK, starts[strip]
         for left in range(0, width, BLOCK):
             first = top * width + left
@@ -95,6 +107,30 @@ def _fill_strips(covered: Array, path: Array, starts: Array, places: Array) -> N
                 if row < height and column < width and covered[row, column]:
                     places[count] = row * width + column
                     count += 1
+
+
+@kernel(parallel=True)
+def _choose(covered: Array, path: Array, starts: Array, nth: Array, places: Array) -> None:
+    height, width = covered.shape
+    for strip in prange(len(starts) - 1):
+        top, count = strip * BLOCK, starts[strip]
+        wanted, stop = np.searchsorted(nth, count), np.searchsorted(nth, starts[strip + 1])
+        for left in range(0, width, BLOCK):
+            if wanted == stop:
+                break
+            here = 0
+            for row in range(top, min(top + BLOCK, height)):
+                for column in range(left, min(left + BLOCK, width)):
+                    here += covered[row, column]
+            i, passed = -1, count  # of the block's pixels in order, and how many are passed
+            while wanted < stop and nth[wanted] < count + here:
+                while passed <= nth[wanted]:
+                    i += 1
+                    row, column = top + path[0, i], left + path[1, i]
+                    passed += row < height and column < width and covered[row, column]
+                places[wanted] = (top + path[0, i]) * width + left + path[1, i]
+                wanted += 1
+            count += here
 
 
 @kernel

@@ -15,6 +15,7 @@ Array = npt.NDArray[Any]
 
 PAGE = 4096  # bytes
 SMALL = 1 << 18  # bytes; smaller arrays are left to NumPy
+STEPS = 5  # a block is up to 2^(1 - STEPS) larger than what is asked for
 MOST_IDLE = 1 << 28  # bytes that the pool keeps; a frame of 1024 x 1024 pixels takes about 100 MB
 
 
@@ -65,7 +66,9 @@ def plane(shape: tuple[int, ...], dtype: npt.DTypeLike) -> Array:
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < SMALL:
         return np.empty(shape, dtype)
-    return np.asarray(_PooledBlock(_pool, _pool.acquire(size))).view(dtype).reshape(shape)
+    step = 1 << (size.bit_length() - STEPS)  # whole steps: lists that are a little longer or shorter in the next frame
+    block = _pool.acquire(-(-size // step) * step)
+    return np.asarray(_PooledBlock(_pool, block))[:size].view(dtype).reshape(shape)
 
 
 def zeros(shape: tuple[int, ...], dtype: npt.DTypeLike) -> Array:

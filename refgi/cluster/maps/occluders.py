@@ -73,9 +73,8 @@ def ends_of(frame: "Frame", lights: "PixelLights") -> Ends:
     Ends
         Vertices of the triangles that the camera sees, places of the lights, and the scene's extent.
     """
-    geometry, visible = frame.scene.geometry, np.zeros(frame.scene.face_count + 1, np.bool_)
-    visible[frame.gbuffer.triangle_id] = True  # -1, no triangle, is the last place
-    used = _used(len(geometry.vertices), geometry.faces[visible[:-1]])
+    geometry, used = frame.scene.geometry, np.zeros(len(frame.scene.geometry.vertices), np.bool_)
+    _flag_corners(frame.gbuffer.triangle_id, geometry.faces, used)
     places = np.asarray(lights.position, np.float64).T
     return Ends(np.ascontiguousarray(np.concatenate([geometry.vertices[used], places])), frame.extent)
 
@@ -188,6 +187,19 @@ def _extreme(points: Array) -> Array:
     farthest = np.zeros(DIRECTIONS, np.int64)
     _farthest(points, np.stack([ring * np.cos(turn), ring * np.sin(turn), z]), farthest)
     return np.ascontiguousarray(points[farthest])
+
+
+@kernel(parallel=True)
+def _flag_corners(triangle_id: Array, faces: Array, used: Array) -> None:
+    """Flag the vertices of the triangles that pixels show; whoever comes second writes the same."""
+    for row in prange(triangle_id.shape[0]):
+        before = np.int32(-1)
+        for column in range(triangle_id.shape[1]):
+            face = triangle_id[row, column]
+            if face != before and face >= 0:
+                for corner in range(3):
+                    used[faces[face, corner]] = True
+            before = face
 
 
 @kernel(parallel=True)

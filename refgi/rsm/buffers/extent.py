@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel
+from refgi.jit import kernel, prange
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.scene.model import Geometry
@@ -114,13 +114,22 @@ def _reflecting_positions(rsm: Rsm) -> Array:
     return np.asarray(position[:, reflects])
 
 
-@kernel
+@kernel(parallel=True)
 def _row_bounds(position: Array, covered: Array, rows: Array) -> None:
-    """Fill least and most coordinates of the covered pixels of each row."""
-    for row in range(covered.shape[0]):
+    """Fill least and most coordinates of the covered pixels of each row, halves of it against each other."""
+    for row in prange(covered.shape[0]):
+        real, columns = position.dtype.type, covered.shape[1]
+        low, high = np.empty(columns, position.dtype), np.empty(columns, position.dtype)
         for c in range(3):
-            low, high = np.inf, -np.inf
-            for column in range(covered.shape[1]):
-                if covered[row, column]:
-                    low, high = min(low, position[c, row, column]), max(high, position[c, row, column])
-            rows[c, row], rows[3 + c, row] = low, high
+            for i in range(columns):
+                place = position[c, row, i]
+                low[i] = place if covered[row, i] else real(np.inf)
+                high[i] = place if covered[row, i] else real(-np.inf)
+            count = columns
+            while count > 1:
+                half = (count + 1) // 2
+                for i in range(count - half):
+                    low[i] = low[half + i] if low[half + i] < low[i] else low[i]
+                    high[i] = high[half + i] if high[half + i] > high[i] else high[i]
+                count = half
+            rows[c, row], rows[3 + c, row] = low[0], high[0]

@@ -139,9 +139,7 @@ def bands(corners: Array, cells: Array, faces: Array, width: int, height: int, r
     counts = np.zeros((CHUNKS, band_of[-1] + 1), np.int64)
     _count(corners, cells, faces, (width, height), band_of, boxes, counts)
     ends = np.cumsum(counts.T).reshape(counts.T.shape)  # band by band, chunk by chunk
-    length = int(ends[-1, -1]) + CHUNKS
-    step = 1 << max(length.bit_length() - 4, 0)  # whole steps: a moved camera finds the memory of the last frame
-    members = plane((-(-length // step) * step,), np.int32)[:length]
+    members = plane((int(ends[-1, -1]) + CHUNKS,), np.int32)
     _list(boxes, band_of, np.ascontiguousarray((ends - counts.T).T), members)
     return Bands(boxes, np.concatenate([[0], ends[:, -1]]), members, rows)
 

@@ -9,8 +9,10 @@ Symbols: z distance from the map's centre, m; t depth of the series, 0 to `most`
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
 import numpy.typing as npt
 
 from refgi.elementary import exp2, log2
@@ -29,6 +31,12 @@ class DepthScale(NamedTuple):
     origin: Any  # m: what is 0 on the series' scale
     slope: Any  # depth of the series for each metre, or each octave
     most: Any  # far end: what lies beyond, and nothing at all
+
+
+def joined(scales: Sequence[DepthScale]) -> DepthScale:
+    """Return the scales of several maps, all of one kind, as one with an axis."""
+    return scales[0]._replace(origin=np.array([scale.origin for scale in scales], np.float64),
+                              slope=np.array([scale.slope for scale in scales], np.float64))
 
 
 def depth_scale(kind: str, near: float, far: float, scene_far: float, most: float) -> DepthScale:

@@ -1,12 +1,13 @@
 """Prefilters of convolution shadow maps (Sec. 6): mip maps and the brute force, chosen by type when kernels compile."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy.typing as npt
 
 from refgi.cluster.filters.brute import Brute, brute_means, brutes, build_brute
-from refgi.cluster.filters.depth_scale import DepthScale
-from refgi.cluster.filters.mip import Mip, build_mip, mip_means, mip_of, mips
+from refgi.cluster.filters.depth_scale import DepthScale, joined
+from refgi.cluster.filters.mip import Mip, build_mips, mip_means, mip_of, mips
 from refgi.cluster.settings import Csm
 from refgi.jit import by_type
 
@@ -15,7 +16,6 @@ Array = npt.NDArray[Any]
 # a read between texels is a tent twice as wide as a texel of its level: half the level makes it the filter's width
 LEVEL_SHIFT = -1.0
 MEANS: dict[Any, Any] = {Mip: mip_means, Brute: brute_means}
-BUILD: dict[Any, Any] = {Mip: build_mip, Brute: build_brute}
 
 
 def filter_means(
@@ -55,7 +55,7 @@ def _by_type(
     return call
 
 
-def build_filters(depth: Array, scale: DepthScale, settings: Csm, box: bool, scratch: Any = None) -> Any:
+def build_filters(depth: Array, scale: DepthScale, settings: Csm, box: bool) -> Any:
     """Filter one map as settings ask for.
 
     Parameters
@@ -68,44 +68,73 @@ def build_filters(depth: Array, scale: DepthScale, settings: Csm, box: bool, scr
         Terms, filter and quantisation.
     box : bool
         Brute force filters over squares instead of discs.
-    scratch : Mip or Brute, optional
-        Of `allocate_filters` with the same settings; overwritten and returned.
 
     Returns
     -------
     Mip or Brute
         In the dtype of `depth`.
     """
-    scratch = allocate_filters(len(depth), depth.dtype, settings, box) if scratch is None else scratch
-    BUILD[type(scratch)](depth, scale, scratch)
-    return scratch
+    return build_several(depth[None], (scale,), settings, box)[0]
 
 
-def allocate_filters(n: int, dtype: npt.DTypeLike, settings: Csm, box: bool) -> Any:
-    """Allocate the filters of one map.
+def build_several(
+    depth: Array, scales: Sequence[DepthScale], settings: Csm, box: bool, scratch: Mip | None = None
+) -> list[Any]:
+    """Filter several maps at once, one on each thread.
 
     Parameters
     ----------
-    n : int
-        Texels along a side of the map.
-    dtype : dtype
-        Of the map.
+    depth : (k, n, n) ndarray
+        Radial distances, m; inf where a map is empty.
+    scales : sequence of DepthScale
+        From metres to the series' scale, of each map.
     settings : Csm
         Terms, filter and quantisation.
     box : bool
-        As in `build_filters`.
+        Brute force filters over squares instead of discs.
+    scratch : Mip, optional
+        Of `allocate_mips` for k maps or more with the same settings; overwritten.
 
     Returns
     -------
-    Mip or Brute
-        Not yet filled.
+    list of Mip or Brute
+        In the dtype of `depth`.
 
     Notes
     -----
     Sec. 6 filters square maps. The square beyond the unit disc, which the hemisphere does not reach, mirrors what lies
     within: holding nothing, it would let light leak in over the rim. Texel by texel, it is left out.
     """
-    quantised = settings.quantisation == "published"
+    size, dtype = depth.shape[1], depth.dtype
     if settings.prefilter == "mip":
-        return mip_of(mips(1, n, settings.terms, dtype, shift=LEVEL_SHIFT, quantised=quantised, mirrored=True), 0)
-    return brutes(n, settings.terms, dtype, box=box, quantised=quantised)
+        several = allocate_mips(len(depth), size, dtype, settings) if scratch is None else scratch
+        build_mips(depth, joined(scales), several)
+        return [mip_of(several, k) for k in range(len(depth))]
+    filtered = []
+    for one, scale in zip(depth, scales, strict=True):
+        filtered.append(brutes(size, settings.terms, dtype, box=box, quantised=settings.quantisation == "published"))
+        build_brute(one, scale, filtered[-1])
+    return filtered
+
+
+def allocate_mips(count: int, size: int, dtype: npt.DTypeLike, settings: Csm) -> Mip:
+    """Allocate the pyramids of several maps.
+
+    Parameters
+    ----------
+    count : int
+        Maps.
+    size : int
+        Texels along a side of a map.
+    dtype : dtype
+        Of the maps.
+    settings : Csm
+        Terms and quantisation.
+
+    Returns
+    -------
+    Mip
+        With a leading axis of `count`, not yet filled.
+    """
+    return mips(count, size, settings.terms, dtype, shift=LEVEL_SHIFT, quantised=settings.quantisation == "published",
+                mirrored=True)

@@ -6,7 +6,6 @@ visibility that is found in Python (by rays, back projection, from behind), go b
 """
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import numba
@@ -14,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
-from refgi.cluster.filters.prefilter import allocate_filters, build_filters
+from refgi.cluster.filters.prefilter import allocate_mips, build_several
 from refgi.cluster.lighting.area_sum import (
     ReceiverTiles,
     add_shadowed,
@@ -210,22 +209,19 @@ def _shadows(
 
 
 def _filters(maps: "ShadowMaps | None", chosen: Array, settings: "ValSettings") -> Iterator[Any]:
-    """Filter some maps in their order, a few ahead: one map is too little for more than one thread."""
+    """Filter some maps in their order, one for each thread at a time: all at once would leave the cache."""
     if maps is None or len(chosen) == 0:
         return
-    known, workers = maps, numba.get_num_threads()
     csm, box = settings.visibility, "val_alpha_over_pi" in settings.as_published
     assert isinstance(csm, Csm)
-    buffers = [allocate_filters(known.depth.shape[1], known.depth.dtype, csm, box)
-               for _ in range(min(workers, len(chosen)))]
-
-    def build(k: int, buffer: Any) -> Any:
-        return build_filters(known.depth[k], scale_of(known, k, csm.depth_scale, series(csm)), csm, box, buffer)
-
-    with ThreadPoolExecutor(workers) as pool:
-        for first in range(0, len(chosen), workers):  # what was filtered before is no longer in use
-            some = chosen[first : first + workers]
-            yield from pool.map(build, some, buffers[: len(some)])
+    workers, depth = numba.get_num_threads(), maps.depth
+    scratch = None
+    if csm.prefilter == "mip":
+        scratch = allocate_mips(min(workers, len(chosen)), depth.shape[1], depth.dtype, csm)
+    for first in range(0, len(chosen), workers):  # what was filtered before is no longer in use
+        some = chosen[first : first + workers]
+        scales = [scale_of(maps, k, csm.depth_scale, series(csm)) for k in some]
+        yield from build_several(depth[some], scales, csm, box, scratch)
 
 
 def _add_by_lists(

@@ -15,6 +15,8 @@ from refgi.scene import load_scene
 if TYPE_CHECKING:
     from refgi.scene import Scene
 
+PICTURE = "animation.picture"  # under which a memory keeps the last pictures
+
 
 class Animation:
     """Pictures of a scene that changes, by one method.
@@ -35,7 +37,7 @@ class Animation:
     scene : Scene
         The scene of the last frame, from which the next one follows: `with_camera`, `with_lights`.
     runs : list of stages.Run
-        Stages of the last frame: which ran, and which were reused.
+        Stages of the last frame: which ran, and which were reused; none where all rests.
     """
 
     def __init__(self, scene: "Scene", method: str = "sii", settings: Any = None, **frame_options: Any) -> None:
@@ -55,7 +57,8 @@ class Animation:
         Returns
         -------
         Picture
-            As that of `refgi.render`. Its arrays are shared with other frames: they are to be read, not written.
+            As that of `refgi.render`, the same object where the scene is that of the frame before. Its arrays are
+            shared with other frames: they are to be read, not written.
 
         Raises
         ------
@@ -65,7 +68,10 @@ class Animation:
         method, settings, frame_options = self._options
         scene = self.scene if scene is None else scene
         with stages.reusing(self._memory) as runs:
-            picture = render(scene, method, settings, **frame_options)
+            rests, picture = self._memory.recall(PICTURE, (scene,))
+            if not rests:
+                picture = render(scene, method, settings, **frame_options)
+                self._memory.keep(PICTURE, (scene,), picture)
         self.scene, self.runs = scene, runs
         return picture
 

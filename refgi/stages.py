@@ -26,6 +26,7 @@ Counted = Literal["pairs", "rays", "bytes"]  # of light and receiver, before ski
 STAGES: dict[str, Callable[..., Any]] = {}  # every stage that is imported, by name
 KEPT_RESULTS = 8  # per stage: one per light of a scene with several, without hoarding buffers
 SMALL_ARRAY = 4096  # elements up to which two distinct arrays are compared by value
+SMALL_MASK = 1 << 24  # the same of bool, which takes little time
 
 
 @dataclasses.dataclass(frozen=True)
@@ -347,7 +348,8 @@ def _same(a: Any, b: Any) -> bool:
     if type(a) is not type(b):
         return False
     if isinstance(a, np.ndarray):
-        return a.shape == b.shape and a.dtype == b.dtype and a.size <= SMALL_ARRAY and bool(np.array_equal(a, b))
+        most = SMALL_MASK if a.dtype == np.bool_ else SMALL_ARRAY
+        return a.shape == b.shape and a.dtype == b.dtype and a.size <= most and bool(np.array_equal(a, b))
     if isinstance(a, list | tuple):
         return len(a) == len(b) and all(map(_same, a, b))
     if dataclasses.is_dataclass(a):

@@ -62,16 +62,40 @@ def test_what_rests_is_not_made_again(scene, name):
     moves, animation = MOVES[name], refgi.frames(scene, "sii", **SMALL)
     for step in range(STEPS):
         animation.render(moved(scene, moves, step))
+    assert (not animation.runs) == (not moves)
+    if not moves:
+        return
     assert ("rsm.reflective_shadow_map" in reused(animation)) == ("light" not in moves)
     assert ("lights.choose" in reused(animation)) == ("light" not in moves)
     assert ("rsm.gbuffer" in reused(animation)) == ("camera" not in moves)
-    assert ("pairs.sum" in reused(animation)) == (not moves)
 
 
-def test_a_scene_that_rests_need_not_be_named(scene):
-    animation = refgi.frames(scene, "sii", **SMALL)
-    first, second = animation.render(), animation.render()
-    assert second.radiance is first.radiance
+@pytest.mark.parametrize("method", [*METHODS])
+def test_a_scene_that_rests_is_not_rendered_again(scene, method):
+    animation = refgi.frames(scene, method, settings_of(method), **SMALL)
+    first = animation.render()
+    assert animation.runs
+    second, third = animation.render(), animation.render(scene.with_camera(eye=scene.camera.eye))
+    assert second is first
+    assert third is first
+    assert not animation.runs
+
+
+@pytest.mark.parametrize(("method", "changed"), [("val", {}), ("multires", {"visibility": "val", "lights": 32})])
+def test_maps_of_area_lights_are_kept_while_light_and_what_can_block_it_rest(method, changed):
+    """A camera that moves draws none of them again, though it sees other pixels."""
+    shown = refgi.load_scene("cornell_sphere:faces=10000")
+    settings = of(METHODS[method].settings, **QUICK.get(method, {}), **changed)
+    ran = {}
+    for name in ("camera", "light", "both"):
+        animation = refgi.frames(shown, method, settings, **SMALL)
+        for step in range(STEPS):
+            animation.render(moved(shown, MOVES[name], step))
+        ran[name] = {run.name for run in animation.runs if run.status == "ran"}
+    assert "rsm.resolve" in ran["camera"]
+    assert "cluster.distances" not in ran["camera"]
+    assert "cluster.distances" in ran["light"] & ran["both"]
+    assert "cluster.blockers" not in ran["camera"] | ran["light"] | ran["both"]
 
 
 @pytest.mark.parametrize("method", ["multires", "hssil"])

@@ -81,7 +81,8 @@ def room(rng: np.random.Generator, ground: float) -> tuple[Geometry, Ends, AreaL
     things = rng.uniform(-0.6, 0.6, (12, 1, 3)) + 0.2 * rng.uniform(-1, 1, (12, 3, 3))
     vertices = np.concatenate([corners, things.reshape(-1, 3)])
     faces += (8 + np.arange(36).reshape(-1, 3)).tolist()
-    ends = Ends(vertices, Extent(vertices.min(axis=0), vertices.max(axis=0)))
+    box = Extent(vertices.min(axis=0), vertices.max(axis=0))
+    ends = Ends(vertices, box, box)
     areas = area_lights(*_lights(rng, 0.7), AreaLightSettings())
     if ground:
         far = ground * np.array([[-1.0, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]) - (0, 1.5, 0)

@@ -27,7 +27,7 @@ from tests.naive.crossings import LIFT, corners_of, face_normals, free
 from tests.naive.pair_term import contributions
 from tests.naive.val import is_between, view_frame
 
-ABOVE = 4e-6  # of map centres off their lights, as a share of the largest coordinate
+ABOVE = 4e-6  # of map centres off their lights, as a share of the lit surfaces' largest coordinate
 HULL = 1e-6  # of the diagonal: what lies beyond a plane by less is not beyond it
 FLAT = 1e-5  # of a cluster's radius: a narrower rectangle is a line
 BACK = 0.75  # of the area lights that were enough: the one step back
@@ -393,9 +393,10 @@ def share_by_map(settings, area, seen, channels, local, facing):
 def map_of(view, area, sign):
     """Draw the map of an area light past what cannot block or lies too near."""
     settings = view.settings.maps
-    takes_part = np.concatenate([view.position, lit_points(view.frame)])
+    lit = lit_points(view.frame)
+    takes_part = np.concatenate([view.position, lit])
     low, high = takes_part.min(axis=0), takes_part.max(axis=0)
-    center = area.center + ABOVE * max(np.abs(low).max(), np.abs(high).max()) * area.frame[2]
+    center = area.center + ABOVE * np.abs(lit).max() * area.frame[2]
     near = near_share(view.settings) * area.radius
     corners = blockers(view, HULL * float(np.linalg.norm(high - low)))
     corners = without_near_planes(corners, center, near) if settings.near_geometry == "planes" else corners

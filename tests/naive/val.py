@@ -9,7 +9,7 @@ import math
 from typing import NamedTuple
 
 STEEPEST = math.radians(80)  # half-angle of the widest cone in which blockers are searched
-LIFT = 4e-6  # of map centres off their lights, as a share of the largest coordinate
+LIFT = 4e-6  # of map centres off their lights, as a share of the lit surfaces' largest coordinate
 NEAR = 0.6  # share of a cluster's radius within which nothing blocks
 LEAST_RATIO = 1.05  # farthest over nearest of what a map holds, on the scale of its depths
 SLACK = 1e-3  # share of its distance by which a blocker lies before a receiver
@@ -183,7 +183,7 @@ def diagonal_of(box):
 
 
 def lifted(area, box):
-    """Return the area light with its centre where its map looks from; `box` is that of what takes part."""
+    """Return the area light with its centre where its map looks from; `box` is that of what is lit."""
     largest = max(abs(x) for corner in box for x in corner)
     return area._replace(center=plus(area.center, area.normal, LIFT * largest))
 

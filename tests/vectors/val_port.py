@@ -116,7 +116,7 @@ class Port:
 
     def maps_views(self):
         low, high = self.common_box()
-        center = (self["clusters.center"] + ABOVE * max(np.abs(low).max(), np.abs(high).max())
+        center = (self["clusters.center"] + ABOVE * np.abs(self["extents.illuminated"]).max()
                   * self["clusters.normal"]).T
         far = [math.hypot(*np.maximum(np.abs(low - c), np.abs(high - c))) for c in center]
         return {"maps.center": center, "maps.scene_far": np.array(far),

@@ -56,6 +56,7 @@ class Ends(NamedTuple):
 
     points: Array  # (n, 3) float64, m
     extent: Extent  # the box of what takes part
+    illuminated: Extent  # the box of what light begins at
 
 
 def ends_of(frame: "Frame", lights: "PixelLights") -> Ends:
@@ -76,7 +77,8 @@ def ends_of(frame: "Frame", lights: "PixelLights") -> Ends:
     geometry, used = frame.scene.geometry, np.zeros(len(frame.scene.geometry.vertices), np.bool_)
     _flag_corners(frame.gbuffer.triangle_id, geometry.faces, used)
     places = np.asarray(lights.position, np.float64).T
-    return Ends(np.ascontiguousarray(np.concatenate([geometry.vertices[used], places])), frame.extent)
+    return Ends(np.ascontiguousarray(np.concatenate([geometry.vertices[used], places])), frame.extent,
+                frame.illuminated_extent)
 
 
 def everywhere(geometry: Geometry) -> Ends:
@@ -93,7 +95,8 @@ def everywhere(geometry: Geometry) -> Ends:
         All vertices that triangles use, and their box.
     """
     vertices = np.ascontiguousarray(geometry.vertices, np.float64)
-    return Ends(vertices[_used(len(vertices), geometry.faces)], Extent(*geometry.bounds))
+    whole = Extent(*geometry.bounds)
+    return Ends(vertices[_used(len(vertices), geometry.faces)], whole, whole)
 
 
 @stage("cluster.occluders")
@@ -118,7 +121,7 @@ def occluders(geometry: Geometry, ends: Ends | None = None, touching: bool = Fal
     """
     faces = np.ascontiguousarray(geometry.faces)
     border = np.zeros(len(faces), np.bool_)
-    used, extent = ends or everywhere(geometry)
+    used, extent, _ = ends or everywhere(geometry)
     if not len(used):  # nothing is seen and nothing shines: no two points, so nothing lies between
         return border
     tolerance = TOLERANCE * extent.diagonal * (-1.0 if touching else 1.0)
@@ -130,7 +133,6 @@ def occluders(geometry: Geometry, ends: Ends | None = None, touching: bool = Fal
     return np.logical_not(border)
 
 
-@stage("cluster.blockers")
 def blockers(geometry: Geometry, alone: bool, ends: Ends | None = None) -> Blockers:
     """Return the triangles that maps are drawn from.
 
@@ -151,8 +153,22 @@ def blockers(geometry: Geometry, alone: bool, ends: Ends | None = None) -> Block
     return selected_blockers(geometry, occluders(geometry, ends, not alone))
 
 
+@stage("cluster.blockers")
 def selected_blockers(geometry: Geometry, chosen: Array) -> Blockers:
-    """Return those triangles that are `chosen` (m,), bool."""
+    """Return some triangles as maps are drawn from.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    chosen : (m,) ndarray of bool
+        Which of them.
+
+    Returns
+    -------
+    Blockers
+        The triangles, in mesh order.
+    """
     selected = geometry.faces[chosen]
     used = _used(len(geometry.vertices), selected)
     vertices = np.ascontiguousarray(geometry.vertices[used], np.float64)

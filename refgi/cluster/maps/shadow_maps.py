@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from refgi.rays import Tracer
 
 Array = npt.NDArray[Any]
-LIFT = 4e-6  # share of the extent's largest coordinate: twice what ends of rays are lifted, above float32's rounding
+LIFT = 4e-6  # share of the illuminated extent's largest coordinate: twice what ends of rays are lifted, above float32's rounding
 BACKWARD = np.diag([-1.0, 1.0, -1.0])  # the frame of the hemisphere behind: right and forward turned round
 
 
@@ -149,12 +149,13 @@ def shadow_maps(
         If the type is not float32 or float64.
     """
     expect(np.dtype(dtype) in (np.float32, np.float64), "dtype", "float32 or float64", np.dtype(dtype).name)
-    extent = Extent(*geometry.bounds) if ends is None else ends.extent
+    whole = Extent(*geometry.bounds)
+    extent, illuminated = (whole, whole) if ends is None else (ends.extent, ends.illuminated)
     drawn, both = blockers(geometry, settings.occluders_alone, ends), settings.behind == "dual_paraboloid"
     used = np.flatnonzero(areas.members > 0)
     if not len(drawn.faces) and skips.left_out("cluster.maps", lambda: (len(used), len(used))):
         used = used[:0]
-    center = np.ascontiguousarray(map_centers(areas.center, areas.normal, extent)[used])
+    center = np.ascontiguousarray(map_centers(areas.center, areas.normal, illuminated)[used])
     frame, radius = areas.frame[used], settings.near_share * areas.radius[used]
     rays = tracer if len(drawn.faces) == len(geometry.faces) else None
     depth, near, left_out = draw_maps(drawn, center, frame, radius, settings, dtype, rays)
@@ -184,9 +185,9 @@ def _end_beyond_scene(maps: ShadowMaps, empty: Array) -> None:
             values[empty] = 2.0 * maps.scene_far[empty]
 
 
-def map_centers(center: Array, normal: Array, extent: Extent) -> Array:
+def map_centers(center: Array, normal: Array, illuminated: Extent) -> Array:
     """Return where maps look from, (M, 3), m: centres (3, M), lifted a little off their surface along normals."""
-    return np.asarray((center + LIFT * extent.largest * normal).T)
+    return np.asarray((center + LIFT * illuminated.largest * normal).T)
 
 
 def farthest_corner(extent: Extent, center: Array) -> Array:
@@ -220,11 +221,39 @@ def _without(maps: ShadowMaps, needed: Array) -> ShadowMaps:
     return maps._replace(**shown)
 
 
+@stage("cluster.distances")
 def draw_maps(
     drawn: Blockers, center: Array, frame: Array, radius: Array, settings: ShadowMapSettings, dtype: npt.DTypeLike,
     tracer: "Tracer | None",
 ) -> tuple[Array, Array, Array]:
-    """Return maps, the smallest distance on each, and how many triangles each leaves out."""
+    """Measure distances on paraboloid maps, as settings ask for.
+
+    Parameters
+    ----------
+    drawn : Blockers
+        The triangles.
+    center : (k, 3) ndarray
+        Where maps look from, m.
+    frame : (k, 3, 3) ndarray
+        Rows right, down, forward of each.
+    radius : (k,) ndarray
+        What is nearer to a centre counts as the settings say, m.
+    settings : ShadowMapSettings
+        Size and kind of the maps.
+    dtype : dtype
+        Float32 or float64.
+    tracer : Tracer or None
+        Rays against the same triangles.
+
+    Returns
+    -------
+    distance : (k, n, n) ndarray
+        Distance, m; inf where the map is empty and outside the disc.
+    nearest : (k,) ndarray
+        Float64: smallest distance on each map, m; inf where nothing is.
+    left_out : (k,) ndarray
+        Int64: triangles that reach into each map's hemisphere and are ignored.
+    """
     n = settings.resolution
     projection = Projection(PARABOLOID, n, n, center, np.ascontiguousarray(frame), np.ones(2), np.inf)
     none = np.zeros_like(radius)

@@ -50,11 +50,11 @@ def _add_views(recipe: Recipe, settings: ValSettings) -> None:
 
     def run(arrays: Arrays, real: Any, near: float = share) -> Arrays:  # noqa: ARG001
         box = extent_of(arrays, "visible", "illuminated")
-        center = map_centers(arrays["clusters.center"], arrays["clusters.normal"], box)
+        center = map_centers(arrays["clusters.center"], arrays["clusters.normal"], extent_of(arrays, "illuminated"))
         return {"maps.center": center, "maps.ball": near * arrays["areas.radius"],
                 "maps.scene_far": farthest_corner(box, center)}
 
-    recipe.facts["maps"] = {"texels a side": settings.maps.resolution, "lift, of the largest coordinate": 4e-6,
+    recipe.facts["maps"] = {"texels a side": settings.maps.resolution, "lift, of the illuminated extent's largest coordinate": 4e-6,
                             "ball, of the cluster's radius": share, "projection": "paraboloid (x, y) / (1 + z)"}
     recipe.add("maps.views", "where maps look from, and the ball within which nothing blocks", run,
                (*EXTENTS, "clusters.center", "clusters.normal", "areas.radius"),
@@ -77,7 +77,7 @@ def _add_blockers(recipe: Recipe, settings: ValSettings) -> None:
         frame: Any = SimpleNamespace(
             scene=SimpleNamespace(geometry=geometry, face_count=len(geometry.faces)),
             gbuffer=SimpleNamespace(triangle_id=np.asarray(arrays["gbuffer.triangle_id"])),
-            extent=extent_of(arrays, "visible", "illuminated"))
+            extent=extent_of(arrays, "visible", "illuminated"), illuminated_extent=extent_of(arrays, "illuminated"))
         where: Any = SimpleNamespace(position=arrays["lights.position"] if lights else np.zeros((3, 0)))
         return {"maps.blocks": occluders(geometry, ends_of(frame, where), touching=touching)}
 

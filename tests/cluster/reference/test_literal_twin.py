@@ -51,7 +51,7 @@ def twin(frame, settings, block=1):
     across = naive.diagonal_of(naive.box_of(lit))
     areas = naive.area_lights(positions, *naive.k_means(positions, normals, settings.clusters.count, across))
     box = naive.box_of(lit + seen)
-    above = [naive.lifted(area, box) for area in areas]
+    above = [naive.lifted(area, naive.box_of(lit)) for area in areas]
     ends = corners[np.unique(frame.gbuffer.triangle_id[frame.gbuffer.covered])].reshape(-1, 3).tolist() + positions
     maps = [naive.depth_map(area, triangles, MAP, ends, box, HULL * naive.diagonal_of(box)) for area in above]
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from benchmarks.stability.inputs import directions
 from benchmarks.stability.promise import Case, Promise
 from refgi.rsm.buffers.solid_angle import spot_power
-from refgi.rsm.raster.paraboloid import BLOCK, draw_paraboloids
+from refgi.rsm.raster.paraboloid import draw_paraboloids
 from refgi.rsm.raster.projection import (
     cube_projection,
     directional_projection,
@@ -61,7 +61,7 @@ def wide_triangles(rng: np.random.Generator) -> Case:
     for _ in range(TRIANGLES):
         corners = _across_the_axis(rng)
         maps = paraboloid_projection([(0.0, 0.0, 0.0)], [(0.0, 0.0, 1.0)], TEXELS)
-        nearness = np.zeros((TEXELS, max(TEXELS, BLOCK)), np.float32)
+        nearness = np.zeros((TEXELS, TEXELS), np.float32)
         ids = np.full(nearness.shape, -1, np.int32)
         draw_paraboloids(maps, corners, np.array([[0, 1, 2]], np.int32), 1, nearness, ids)
         covered, sure = _by_planes(corners @ maps.frame[0].T)

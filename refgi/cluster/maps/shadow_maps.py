@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from refgi.rays import Tracer
 
 Array = npt.NDArray[Any]
-LIFT = 4e-6  # share of the illuminated extent's largest coordinate: twice what ends of rays are lifted, above float32's rounding
+LIFT = 4e-6  # share of what is lit's largest coordinate: twice what ends of rays are lifted, above float32's rounding
 BACKWARD = np.diag([-1.0, 1.0, -1.0])  # the frame of the hemisphere behind: right and forward turned round
 
 

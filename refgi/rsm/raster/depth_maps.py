@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.rsm.pool import plane
-from refgi.rsm.raster.paraboloid import BLOCK, CutChunks, Ignored, cut_chunks, draw_distances
+from refgi.rsm.raster.paraboloid import CutChunks, Ignored, cut_chunks, draw_distances
 from refgi.rsm.raster.projection import Projection, paraboloid_projection
 from refgi.rsm.raster.triangle import Chunks, chunks
 from refgi.scene.model import Geometry
@@ -74,7 +74,7 @@ def distance_maps(
     its ball.
     """
     n, none = projection.width, np.zeros(projection.maps)
-    distance = plane((projection.maps * n, max(n, BLOCK)), dtype)
+    distance = plane((projection.maps * n, n), dtype)
     workers = numba.get_num_threads()
     found = draw_distances(projection, triangles, ignored or Ignored(none, none), workers, distance, cut)
-    return np.ascontiguousarray(distance[:, :n]).reshape(-1, n, n), *found
+    return distance.reshape(-1, n, n), *found

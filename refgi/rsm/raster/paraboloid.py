@@ -16,7 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import has_wide_registers, kernel, prange
+from refgi.jit import kernel, prange
+from refgi.rsm.pool import plane
+from refgi.rsm.raster.batch import EMPTY, key_of, unpack
 from refgi.rsm.raster.paraboloid_batch import (
     ACROSS,
     BEHIND,
@@ -34,15 +36,12 @@ from refgi.rsm.raster.paraboloid_batch import (
     transform_chunk,
 )
 from refgi.rsm.raster.projection import Projection
-from refgi.rsm.raster.triangle import CHUNK, SPAN_CUT, Chunks, chunks
+from refgi.rsm.raster.triangle import CHUNK, LANES, SPAN_CUT, Chunks, chunks
 from refgi.scene.cutouts import CutFaces
 from refgi.scene.model import Geometry
 from refgi.scene.texture.alpha import is_opaque, lent
 
 Array = npt.NDArray[Any]
-
-# texels tested at once; a map has at least as many columns in memory
-BLOCK = 16 if has_wide_registers() else 1
 
 
 class Ignored(NamedTuple):
@@ -72,13 +71,10 @@ def draw_paraboloids(
     """Draw triangles on every paraboloid map, inside the hemisphere's disc.
 
     `vertices` (n, 3): world space, m. `faces` (m, 3): vertices of each triangle. `workers`: threads; maps are assigned
-    to them round-robin. `nearness` (H, max(W, BLOCK)): float32, receives 1/tau; 0 where nothing is. `ids` (H, max(W,
-    BLOCK)): int32, receives the triangle's id. `cut`: those that may have holes, which `faces` show nothing of.
+    to them round-robin. `nearness` (H, W): float32, receives 1/tau; 0 where nothing is. `ids` (H, W): int32, receives
+    the triangle's id, -1 where nothing is. `cut`: those that may have holes, which `faces` show nothing of.
     """
-    triangles, none = chunks(vertices, faces), np.zeros(projection.maps)
-    scratch = np.zeros((workers, 1, nearness.shape[1]), np.int32)
-    left_out = np.zeros(projection.maps, np.int64)
-    _draw_maps(projection, triangles, cut, Ignored(none, none), nearness, ids, scratch, left_out, none)
+    _draw_maps(projection, chunks(vertices, faces), cut, _keys(projection, workers), nearness, ids)
 
 
 def draw_distances(
@@ -88,37 +84,54 @@ def draw_distances(
     """Draw triangles on every paraboloid map and turn nearness into distance.
 
     `ignored`: what lies too near the centres to count. `workers`: threads; maps are assigned to them round-robin.
-    `distance` (H, max(W, BLOCK)): float32 or float64, of any content; receives the distance, m, inf where nothing is
-    and outside the disc. Returns `nearest` (k,): float64: smallest distance on each map, m; inf where nothing is.
-    `left_out` (k,): int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in
-    its ball. `cut`: further triangles, that may have holes.
+    `distance` (H, W): float32 or float64, of any content; receives the distance, m, inf where nothing is and outside
+    the disc. Returns `nearest` (k,): float64: smallest distance on each map, m; inf where nothing is. `left_out` (k,):
+    int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in its ball. `cut`:
+    further triangles, that may have holes.
     """
     left_out, nearest = np.zeros(projection.maps, np.int64), np.full(projection.maps, np.inf)
-    scratch = np.zeros((workers, projection.height, distance.shape[1]), np.int32)
-    _draw_maps(projection, triangles, cut, ignored, distance, scratch[0, :0], scratch, left_out, nearest)
+    _draw_distances(projection, triangles, cut, ignored, _keys(projection, workers), distance, left_out, nearest)
     return nearest, left_out
+
+
+def _keys(projection: Projection, workers: int) -> Array:
+    """Return a row of keys for each worker: those of a map, with LANES columns more that nobody reads."""
+    return plane((workers, projection.height * (projection.width + LANES)), np.int64)
 
 
 @kernel(parallel=True)
 def _draw_maps(
-    projection: Projection, triangles: Chunks, cut: CutChunks | None, ignored: Ignored, nearness: Array, ids: Array,
-    scratch: Array, left_out: Array, nearest: Array,
+    projection: Projection, triangles: Chunks, cut: CutChunks | None, keys: Array, nearness: Array, ids: Array
 ) -> None:
-    workers, height, with_ids = len(scratch), projection.height, len(ids) > 0
+    workers, height, width = len(keys), projection.height, projection.width
     for worker in prange(workers):
-        setup = np.zeros(ROWS * CHUNK)
+        setup, map_keys = np.zeros(ROWS * CHUNK), keys[worker]
         for m in range(worker, len(projection.origin), workers):
-            first, last = m * height, (m + 1) * height
-            map_nearness, map_ids = nearness[first:last], ids[first:last] if with_ids else scratch[worker]
-            map_nearness[:] = 0
-            limits = 1.0 / (ignored.planes[m] * ignored.planes[m]), ignored.ball[m]
-            left_out[m] = draw(projection, m, triangles, None, limits, setup, map_nearness, map_ids)
+            rows = slice(m * height, (m + 1) * height)
+            map_keys[:] = EMPTY
+            draw(projection, m, triangles, None, (np.inf, 0.0), setup, None, map_keys)
             if cut is not None:
-                left_out[m] += draw(projection, m, cut.triangles, cut.holes, limits, setup, map_nearness, map_ids)
-            if with_ids:
-                clear_outside_disc(projection, map_nearness, map_ids)
-            else:
-                nearest[m] = to_distance(projection, map_nearness)
+                draw(projection, m, cut.triangles, cut.holes, (np.inf, 0.0), setup, None, map_keys)
+            unpack(map_keys, width, 0, height - 1, nearness[rows], ids[rows])
+            clear_outside_disc(projection, nearness[rows], ids[rows])
+
+
+@kernel(parallel=True)
+def _draw_distances(
+    projection: Projection, triangles: Chunks, cut: CutChunks | None, ignored: Ignored, keys: Array, distance: Array,
+    left_out: Array, nearest: Array,
+) -> None:
+    workers, height = len(keys), projection.height
+    for worker in prange(workers):
+        setup, map_keys = np.zeros(ROWS * CHUNK), keys[worker]
+        for m in range(worker, len(projection.origin), workers):
+            shown = distance[m * height : (m + 1) * height]
+            limits = 1.0 / (ignored.planes[m] * ignored.planes[m]), ignored.ball[m]
+            map_keys[:] = 0
+            left_out[m] = draw(projection, m, triangles, None, limits, setup, shown, map_keys)
+            if cut is not None:
+                left_out[m] += draw(projection, m, cut.triangles, cut.holes, limits, setup, shown, map_keys)
+            nearest[m] = to_distance(projection, map_keys, shown)
 
 
 @kernel
@@ -136,35 +149,58 @@ def clear_outside_disc(projection: Projection, nearness: Array, ids: Array) -> N
 
 
 @kernel
-def to_distance(projection: Projection, nearness: Array) -> float:
-    """Turn nearness into distance, inf outside the disc, and return the smallest."""
+def to_distance(projection: Projection, keys: Array, distance: Array) -> float:
+    """Write distances of a map from its keys, inf where there is no surface and outside the disc.
+
+    Result: the smallest.
+    """
     n, half, least = projection.width, projection.half[0], np.inf
-    step, real = 2.0 * half / n, nearness.dtype.type
+    step, real, nearness = 2.0 * half / n, distance.dtype.type, keys.view(np.float64)
     for row in range(n):
         t = (row + 0.5) * step - half
+        line, place = np.uint64(row), np.uint64(row * (n + LANES))
         for column in range(n):
             s = (column + 0.5) * step - half
             square = s * s + t * t
             # no surface: nearness 0, distance inf
-            distance = (1.0 + square) / nearness[row, column]
-            nearness[row, column] = real(distance if square <= 1.0 else np.inf)
-            least = min(least, nearness[row, column])
+            far = (1.0 + square) / nearness[place + np.uint64(column)]
+            distance[line, np.uint64(column)] = real(far if square <= 1.0 else np.inf)
+        for column in range(n):
+            least = min(least, distance[row, column])
     return least
+
+
+@kernel
+def nearness_of(value: float, rounded: Array | None) -> Any:
+    """Return 1/tau as it is kept: rounded to float32, or to the type of the distances that become of it."""
+    if rounded is None:
+        return np.float32(value)
+    return np.float64(rounded.dtype.type(value))
+
+
+@kernel
+def key_at(near: Any, earliness: Any, rounded: Array | None) -> Any:
+    """Return a number that is greater for the nearer triangle: with ids as `key_of`, else the bits of a float64."""
+    if rounded is None:
+        return key_of(near, earliness)
+    kept = np.float64(near)
+    return kept.view(np.int64)
 
 
 @kernel
 def draw(
     projection: Projection, m: int, triangles: Chunks, holes: CutFaces | None, limits: tuple[float, float],
-    setup: Array, nearness: Array, ids: Array,
+    setup: Array, rounded: Array | None, keys: Array,
 ) -> int:
-    """Draw every triangle on one map; the loop is inside because calls with arrays cost atomic reference counts.
+    """Keep the greatest key at each texel of one map; the loop is inside because calls with arrays count references.
 
-    With `holes`, those of `triangles`, a texel asks a mask where it would see the triangle, or one as near of a higher
-    id: these are drawn after all others.
+    With `holes`, those of `triangles`, a mask is asked only where its triangle would be seen. `limits`: 1 / distance^2
+    of planes, distance of hits that are ignored. `rounded`: distances that become of the keys; None where these hold
+    ids as well. `keys` (n (n + LANES),). Result: how many triangles ahead are left out.
     """
-    n, width, half = projection.width, nearness.shape[1], projection.half[0]
-    step, real = 2.0 * half / n, nearness.dtype.type
-    steepest, ball = limits  # 1 / distance^2 of planes, distance of hits that are ignored
+    n, half = projection.width, projection.half[0]
+    step, stride = 2.0 * half / n, n + LANES
+    steepest, ball = limits
     nearest, within = 1.0 / ball, 1.0 / (ball * ball)
     origin, frame, corners, box = projection.origin, projection.frame, triangles.corners, triangles.box
     count = len(box) * CHUNK
@@ -187,9 +223,11 @@ def draw(
                 continue
             if state == BETWEEN_TEXELS or (state == ACROSS and not bound_across(setup, b, half, n)):
                 continue
-            shown, limit = face, real(setup[LIMIT + b])
-            if holes is not None:
-                shown, mask = holes.face[face], holes.mask[face]
+            if holes is None:
+                earliness = EMPTY - np.int64(face)
+            else:
+                earliness, mask = EMPTY - np.int64(holes.face[face]), holes.mask[face]
+            limit = key_at(nearness_of(setup[LIMIT + b], rounded), EMPTY, rounded)
             x0, y0, z0, t0 = setup[b], setup[CHUNK + b], setup[2 * CHUNK + b], setup[3 * CHUNK + b]
             x1, y1, z1, t1 = setup[4 * CHUNK + b], setup[5 * CHUNK + b], setup[6 * CHUNK + b], setup[7 * CHUNK + b]
             x2, y2, z2, t2 = setup[8 * CHUNK + b], setup[9 * CHUNK + b], setup[10 * CHUNK + b], setup[11 * CHUNK + b]
@@ -203,45 +241,42 @@ def draw(
                 rest = 1.0 - t * t
                 r0, r1, r2 = 2.0 * t * y0 + rest * z0, 2.0 * t * y1 + rest * z1, 2.0 * t * y2 + rest * z2
                 rn = 2.0 * t * yn + rest * zn
-                line, left, right, length = np.uint64(row), first, last, 1.0 + t * t
+                left, right, length = first, last, 1.0 + t * t
                 if last - first > SPAN_CUT:
                     left, right = shorten(left, right, x0, z0, r0, step, 0.5 * (n - 1))
                     left, right = shorten(left, right, x1, z1, r1, step, 0.5 * (n - 1))
                     left, right = shorten(left, right, x2, z2, r2, step, 0.5 * (n - 1))
+                place, centre = np.uint64(row * stride + left), left + 0.5
                 if holes is None:
-                    for block in range((right - left + BLOCK) // BLOCK):
-                        start = min(left + block * BLOCK, width - BLOCK)
-                        place_0, centre = np.uint64(start), start + 0.5
-                        for lane in range(BLOCK):
-                            column = place_0 + np.uint64(lane)
-                            s = (centre + lane) * step - half
-                            near = real((2.0 * xn - zn * s) * s + rn)
-                            inside = (
-                                ((2.0 * x0 - z0 * s) * s + r0 >= t0)
-                                & ((2.0 * x1 - z1 * s) * s + r1 >= t1)
-                                & ((2.0 * x2 - z2 * s) * s + r2 >= t2)
-                            )
-                            far_enough = (near <= limit) & (near <= (length + s * s) * cut_short)
-                            if inside & (near > nearness[line, column]) & far_enough:
-                                nearness[line, column] = near
-                                ids[line, column] = shown
+                    # a multiple of LANES is SIMD code without a rest; lanes outside the triangle fail by themselves
+                    for lane in range((right - left + LANES) & -LANES):
+                        at_texel = place + np.uint64(lane)
+                        s = (centre + np.int32(lane)) * step - half
+                        near = nearness_of((2.0 * xn - zn * s) * s + rn, rounded)
+                        key, before = key_at(near, earliness, rounded), keys[at_texel]
+                        inside = (
+                            ((2.0 * x0 - z0 * s) * s + r0 >= t0)
+                            & ((2.0 * x1 - z1 * s) * s + r1 >= t1)
+                            & ((2.0 * x2 - z2 * s) * s + r2 >= t2)
+                        )
+                        far_enough = (key <= limit) & (near <= (length + s * s) * cut_short)
+                        keys[at_texel] = key if inside & far_enough & (key > before) else before
                 else:
                     for lane in range(right - left + 1):
-                        column = np.uint64(left + lane)
-                        s = (left + lane + 0.5) * step - half
-                        near, before = real((2.0 * xn - zn * s) * s + rn), nearness[line, column]
+                        at_texel = place + np.uint64(lane)
+                        s = (centre + lane) * step - half
+                        near = nearness_of((2.0 * xn - zn * s) * s + rn, rounded)
+                        key = key_at(near, earliness, rounded)
                         e0, e1 = (2.0 * x0 - z0 * s) * s + r0, (2.0 * x1 - z1 * s) * s + r1
                         e2 = (2.0 * x2 - z2 * s) * s + r2
-                        far_enough = (near <= limit) & (near <= (length + s * s) * cut_short)
-                        is_first = (near > before) | ((near == before) & (shown < ids[line, column]))
+                        far_enough = (key <= limit) & (near <= (length + s * s) * cut_short)
                         inside = (e0 >= t0) & (e1 >= t1) & (e2 >= t2)
-                        if inside & far_enough & is_first:
+                        if inside & far_enough & (key > keys[at_texel]):
                             scale = 1.0 / (e0 + e1 + e2)
                             u = (e0 * uv[face, 0] + e1 * uv[face, 2] + e2 * uv[face, 4]) * scale
                             v = (e0 * uv[face, 1] + e1 * uv[face, 3] + e2 * uv[face, 5]) * scale
                             if is_opaque(table, mask, u, v):
-                                nearness[line, column] = near
-                                ids[line, column] = shown
+                                keys[at_texel] = key
     return left_out
 
 

@@ -15,7 +15,6 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.batch import EMPTY, Part, draw, unpack
-from refgi.rsm.raster.paraboloid import BLOCK as PARABOLOID_BLOCK
 from refgi.rsm.raster.paraboloid import cut_chunks, draw_paraboloids
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.rsm.raster.triangle import LANES, bound_triangles, project_vertices
@@ -90,11 +89,9 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     vertices, faces = geometry.vertices, geometry.without_cut
     cut = None if geometry.cut is None else Cut(geometry.faces[geometry.cut.face], geometry.cut, None)
     height, width = projection.shape
-    columns = max(width, PARABOLOID_BLOCK) if projection.kind == PARABOLOID else width
-    visibility = Visibility(plane((height, columns), np.int32), plane((height, columns), np.float32))
+    visibility = Visibility(plane((height, width), np.int32), plane((height, width), np.float32))
     workers = numba.get_num_threads()
     if projection.kind == PARABOLOID:
-        _clear(visibility.triangle_id, visibility.inverse_depth)
         draw_paraboloids(projection, vertices, faces, workers, visibility.inverse_depth, visibility.triangle_id,
                          cut_chunks(geometry))
     elif projection.maps > 1:
@@ -108,8 +105,6 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
         if cut is not None:
             cut = cut._replace(lists=bands(corners, cells, cut.faces, width, height, rows))
         _draw_bands(corners, faces, lists, cut, keys, visibility)
-    if width < columns:
-        visibility = Visibility(*(np.ascontiguousarray(plane[:, :width]) for plane in visibility))
     return visibility
 
 
@@ -142,13 +137,6 @@ def bands(corners: Array, cells: Array, faces: Array, width: int, height: int, r
     members = plane((int(ends[-1, -1]) + CHUNKS,), np.int32)
     _list(boxes, band_of, np.ascontiguousarray((ends - counts.T).T), members)
     return Bands(boxes, np.concatenate([[0], ends[:, -1]]), members, rows)
-
-
-@kernel(parallel=True)
-def _clear(triangle_id: Array, inverse_depth: Array) -> None:
-    for row in prange(len(triangle_id)):
-        triangle_id[row] = -1
-        inverse_depth[row] = 0.0
 
 
 @kernel(parallel=True)

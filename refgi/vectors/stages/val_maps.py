@@ -54,7 +54,8 @@ def _add_views(recipe: Recipe, settings: ValSettings) -> None:
         return {"maps.center": center, "maps.ball": near * arrays["areas.radius"],
                 "maps.scene_far": farthest_corner(box, center)}
 
-    recipe.facts["maps"] = {"texels a side": settings.maps.resolution, "lift, of the illuminated extent's largest coordinate": 4e-6,
+    recipe.facts["maps"] = {"texels a side": settings.maps.resolution,
+                            "lift, of the illuminated extent's largest coordinate": 4e-6,
                             "ball, of the cluster's radius": share, "projection": "paraboloid (x, y) / (1 + z)"}
     recipe.add("maps.views", "where maps look from, and the ball within which nothing blocks", run,
                (*EXTENTS, "clusters.center", "clusters.normal", "areas.radius"),

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel, prange
+from refgi.jit import has_wide_registers, kernel, prange
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, view_coordinates
 
@@ -22,7 +22,7 @@ SMALLEST_W = 1e-30  # stands for a vertex in the plane of the eye, m
 BOX_PAD = 1e-3  # texels; far above the rounding of a projected vertex
 SPAN_CUT = 32  # texels; narrower boxes are cheaper to test whole
 BEHIND = -1  # column of a vertex that is not in front of the eye
-LANES = 4  # texels tested at once; so many columns more has a row of keys
+LANES = 8 if has_wide_registers() else 4  # texels tested at once; so many columns more has a row of keys
 BLOCK = 256  # triangles bounded without a branch before those among them that cross the plane of the eye
 SMALLEST = 1e-300  # an edge that owns its line needs e >= 0, another needs e >= SMALLEST
 CHUNK = 64  # triangles

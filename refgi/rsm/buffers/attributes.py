@@ -114,6 +114,26 @@ def resolve(
                 _fill(projection, tile, False, len(surface.normals) > 0, runs, records, line, channels, planes)
 
 
+@kernel(parallel=True)
+def resolve_materials(surface: Surface, triangle_id: Array, albedo: Array, material_id: Array) -> None:
+    """Fill albedo (3, H, W) and material (H, W), or those of them that are not empty, without looking at geometry."""
+    faces, diffuse = surface.material_of_face, surface.diffuse
+    height, width = triangle_id.shape
+    for row in prange(height):
+        material = np.empty(width, np.int32)
+        for x in range(width):
+            face = triangle_id[row, x]
+            material[x] = faces[np.uint32(max(face, np.int32(0)))] if face >= 0 else np.int32(-1)
+        if material_id.size > 0:
+            for x in range(width):
+                material_id[row, x] = material[x]
+        if albedo.size > 0:
+            for channel in range(3):
+                for x in range(width):
+                    known = np.uint32(max(material[x], np.int32(0)))
+                    albedo[channel, row, x] = diffuse[known, channel] if material[x] >= 0 else diffuse.dtype.type(0)
+
+
 @kernel
 def _runs_of(scratch: Scratch, worker: int) -> Runs:
     runs = scratch.runs

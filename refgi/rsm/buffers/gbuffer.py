@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, resolve_at
+from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, resolve_at, resolve_materials
 from refgi.rsm.buffers.surfaces import Surface
 from refgi.rsm.buffers.textures import paint
 from refgi.rsm.pool import plane
@@ -21,6 +21,7 @@ from refgi.stages import stage
 Array = npt.NDArray[Any]
 
 MANY = 8  # as soon as one texel in so many is asked for, all are computed
+OF_MATERIALS = {"albedo", "material_id"}  # channels that need no geometry but the triangle
 
 
 class GBuffer:
@@ -271,8 +272,11 @@ def _resolve(
     """
     planes = _planes(names, triangle_id.shape, dtype)
     channels = ChannelMask(*(name in names for name in ChannelMask._fields))
-    scratch = allocate(numba.get_num_threads())
-    resolve(_surface(geometry, materials, dtype), projection, triangle_id, channels, planes, scratch)
+    surface = _surface(geometry, materials, dtype)
+    if set(names) <= OF_MATERIALS:
+        resolve_materials(surface, triangle_id, planes.albedo, planes.material_id)
+    else:
+        resolve(surface, projection, triangle_id, channels, planes, allocate(numba.get_num_threads()))
     paint(geometry, materials, projection, triangle_id, planes.albedo)
     return {name: getattr(planes, name) for name in names}
 

@@ -13,7 +13,7 @@ from refgi.stages import Run
 STAND_INS = {  # built-in scenes of as many faces, where the papers' are absent
     "cornell_horse": "cornell_sphere:faces=17000", "sponza": "atrium:faces=262000",
     "kitchen": "atrium:faces=100000,seed=3", "dragon_bunny": "atrium:faces=405000",
-    "flying_bunnies": "atrium:faces=417000,seed=2"}
+    "flying_bunnies": "atrium:faces=417000,seed=2", "caustic_ring": "ring"}
 DATA = Path(os.environ.get("REFGI_DATA", Path(__file__).parents[2] / "shared" / "data"))
 
 

@@ -31,6 +31,8 @@ TOLERANCE = 1e-6
 FEW_PAIRS = 1 << 24  # triangles times points that are tried without asking for the hull, which takes about as long
 DIRECTIONS = 128  # along which extreme points are found before the hull: enough to tell most triangles from it
 TURN = 47  # odd: steps through the directions in an order that is spread from the start
+BATCH, ROWS, AT_ONCE = 64, 9, 1024  # triangles in SIMD lanes; rows of their corners; triangles that a thread takes
+FEW_POINTS = 24  # that a batch looks at together
 SKETCHED = 1 << 14  # points that are enough for that
 
 
@@ -241,17 +243,45 @@ def _hull(points: Array) -> Array:
 
 @kernel(parallel=True)
 def _on_border(vertices: Array, faces: Array, points: Array, tolerance: float, border: Array) -> None:
-    """Return which planes have all points on one side, up to a tolerance."""
-    for face in prange(len(faces)):
-        i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-        ax, ay, az = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-        bx, by, bz = vertices[j, 0] - ax, vertices[j, 1] - ay, vertices[j, 2] - az
-        cx, cy, cz = vertices[k, 0] - ax, vertices[k, 1] - ay, vertices[k, 2] - az
-        nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-        limit = tolerance * np.sqrt(nx * nx + ny * ny + nz * nz)
-        above, below, p = False, False, 0
-        while p < len(points) and not (above and below):
-            height = nx * (points[p, 0] - ax) + ny * (points[p, 1] - ay) + nz * (points[p, 2] - az)
-            above, below = above or height > limit, below or height < -limit
-            p += 1
-        border[face] = not (above and below)
+    """Return which planes have all points on one side, up to a tolerance.
+
+    A batch of triangles looks at a few points in SIMD lanes, after which most have some on both sides; the others look
+    at the rest one by one.
+    """
+    for part in prange(-(-len(faces) // AT_ONCE)):
+        plane, above, below = np.empty(ROWS * BATCH), np.empty(BATCH, np.bool_), np.empty(BATCH, np.bool_)
+        for base in range(part * AT_ONCE, min((part + 1) * AT_ONCE, len(faces)), BATCH):
+            size = min(BATCH, len(faces) - base)
+            for b in range(size):  # loads that wait for memory, many under way at once
+                for corner in range(3):
+                    vertex = faces[base + b, corner]
+                    for axis in range(3):
+                        plane[(3 * corner + axis) * BATCH + b] = vertices[vertex, axis]
+            for b in range(size):
+                ax, ay, az = plane[b], plane[BATCH + b], plane[2 * BATCH + b]
+                bx, by, bz = plane[3 * BATCH + b] - ax, plane[4 * BATCH + b] - ay, plane[5 * BATCH + b] - az
+                cx, cy, cz = plane[6 * BATCH + b] - ax, plane[7 * BATCH + b] - ay, plane[8 * BATCH + b] - az
+                nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+                plane[3 * BATCH + b], plane[4 * BATCH + b], plane[5 * BATCH + b] = nx, ny, nz
+                plane[6 * BATCH + b] = tolerance * np.sqrt(nx * nx + ny * ny + nz * nz)
+                above[b] = below[b] = False
+            for p in range(min(FEW_POINTS, len(points))):
+                x, y, z = points[p, 0], points[p, 1], points[p, 2]
+                for b in range(size):
+                    height = _height(plane, b, x, y, z)
+                    above[b] |= height > plane[6 * BATCH + b]
+                    below[b] |= height < -plane[6 * BATCH + b]
+            for b in range(size):
+                over, under, p, limit = above[b], below[b], FEW_POINTS, plane[6 * BATCH + b]
+                while p < len(points) and not (over and under):
+                    height = _height(plane, b, points[p, 0], points[p, 1], points[p, 2])
+                    over, under = over or height > limit, under or height < -limit
+                    p += 1
+                border[base + b] = not (over and under)
+
+
+@kernel
+def _height(plane: Array, b: int, x: float, y: float, z: float) -> Any:
+    """Return how far a point lies above the plane of triangle `b` of a batch, times its normal's length."""
+    return (plane[3 * BATCH + b] * (x - plane[b]) + plane[4 * BATCH + b] * (y - plane[BATCH + b])
+            + plane[5 * BATCH + b] * (z - plane[2 * BATCH + b]))

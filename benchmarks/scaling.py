@@ -2,7 +2,7 @@
 
 Each sweep changes one number of a frame of the atrium and leaves the others; a method's sweep ends where a frame takes
 more than `LONGEST`. Times are processor time of all threads, from geometry to radiance, acceleration structures
-included; medians of three frames, or the only one of those that take long.
+included; medians of three frames, or one of those that take long, after a first that is not counted.
 `python -m benchmarks.scaling DIR PICTURE` draws the figures of --out.
 """
 
@@ -46,7 +46,7 @@ def rows(quick: bool) -> Iterator[Row]:
                 if faces not in scenes:
                     scenes = {faces: load_scene(f"atrium:faces={faces}")}  # one at a time: the largest takes 1 GB
                 side = math.isqrt(value) if sweep == "pixels" else SIDE
-                found = _cost(scenes[faces], name, side, value if sweep == "lights" else LIGHTS, warm=before is None)
+                found = _cost(scenes[faces], name, side, value if sweep == "lights" else LIGHTS)
                 growth = "" if before is None else f"exponent {_exponent(before, (value, found)):.2f}"
                 yield Row(f"{sweep}: {name}, {value}", found, "s", "", growth)
                 before = value, found
@@ -54,8 +54,8 @@ def rows(quick: bool) -> Iterator[Row]:
                     break
 
 
-def _cost(scene: Scene, name: str, side: int, lights: int, warm: bool) -> float:
-    """Return the processor time of a frame by a method, s."""
+def _cost(scene: Scene, name: str, side: int, lights: int) -> float:
+    """Return the processor time of a frame by a method, s: not of the first one, which may compile or bound a scene."""
     method = find_method(name)
     settings = of(method.settings, **_settings(name, lights))
 
@@ -67,10 +67,10 @@ def _cost(scene: Scene, name: str, side: int, lights: int, warm: bool) -> float:
             view.radiance(method.compute(view, settings)[0])
         return time.process_time() - started
 
-    if warm:
-        frame()
     first = frame()
-    return first if first > LONG else statistics.median([first, frame(), frame()])
+    if first > LONGEST:
+        return first
+    return frame() if first > LONG else statistics.median([frame(), frame(), frame()])
 
 
 def _settings(name: str, lights: int) -> dict[str, Any]:

@@ -5,6 +5,7 @@ fill them. So the memory of an earlier frame's buffers serves the next frame's.
 """
 
 import math
+import os
 import threading
 from typing import Any
 
@@ -16,7 +17,8 @@ Array = npt.NDArray[Any]
 PAGE = 4096  # bytes
 SMALL = 1 << 18  # bytes; smaller arrays are left to NumPy
 STEPS = 5  # a block is up to 2^(1 - STEPS) larger than what is asked for
-MOST_IDLE = 1 << 28  # bytes that the pool keeps; a frame of 1024 x 1024 pixels takes about 100 MB
+# bytes that the pool keeps: a frame of 1024 x 1024 pixels takes about 100 MB, one of 4096 x 4096 sixteen times as much
+MOST_IDLE = max(1 << 28, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 16)
 
 
 class _Pool:

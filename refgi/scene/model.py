@@ -127,8 +127,10 @@ class Geometry:
         """Corners of the axis-aligned box of all used vertices, m."""
         if not len(self.faces):
             return np.zeros(3), np.zeros(3)
-        used = self.vertices[np.unique(self.faces)]
-        return used.min(axis=0), used.max(axis=0)
+        used = np.zeros(len(self.vertices), np.bool_)
+        used[self.faces] = True
+        corners = self.vertices[used]
+        return corners.min(axis=0), corners.max(axis=0)
 
     @cached_property
     def diagonal(self) -> float:

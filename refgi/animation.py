@@ -68,6 +68,7 @@ class Animation:
         method, settings, frame_options = self._options
         scene = self.scene if scene is None else scene
         with stages.reusing(self._memory) as runs:
+            picture: Picture
             rests, picture = self._memory.recall(PICTURE, (scene,))
             if not rests:
                 picture = render(scene, method, settings, **frame_options)

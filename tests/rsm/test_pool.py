@@ -82,3 +82,26 @@ def test_a_moved_camera_finds_the_memory_of_the_last_frame(monkeypatch):
         idle.append(sum(size * len(blocks) for size, blocks in fresh._idle.items()))
     assert idle[0] > 1 << 22
     assert set(idle) == {idle[0]}
+
+
+def test_a_list_that_is_a_little_longer_finds_the_memory_of_the_last():
+    """Lists of triangles and subsplats change their length from frame to frame."""
+    first = pool.plane((100_000, 4), np.int32)
+    place, size = first.ctypes.data, first.nbytes
+    del first
+    for count in (100_000, 99_000, 101_000, 98_500):
+        again = pool.plane((count, 4), np.int32)
+        assert again.ctypes.data == place
+        assert again.nbytes == count * 16
+        del again
+    assert pool.plane((150_000, 4), np.int32).nbytes > size
+
+
+def test_zeros_are_zeros_on_used_memory():
+    used = pool.plane((300, 400), np.float64)
+    used[:] = 7.0
+    del used
+    for shape in ((300, 400), (3, 4)):
+        again = pool.zeros(shape, np.float64)
+        assert again.shape == shape
+        assert not again.any()

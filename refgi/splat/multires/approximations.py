@@ -8,7 +8,7 @@ from refgi.cluster.settings import ClusteredShadows
 from refgi.lights.approximations import CLAMP, LIGHT_SAMPLING, OPENNESS, RSM_RESOLUTION, VISIBILITY, without_clamp
 from refgi.method import Approximation
 from refgi.pairs.settings import PairSettings
-from refgi.splat.multires.settings import MOST_CELLS, ByGeometry, MultiresSettings, Rays
+from refgi.splat.multires.settings import MOST_CELLS, ByError, ByGeometry, MultiresSettings, Rays
 
 
 def _ignores_visibility(settings: MultiresSettings) -> Mapping[str, Any]:
@@ -18,7 +18,7 @@ def _ignores_visibility(settings: MultiresSettings) -> Mapping[str, Any]:
 def _by_rays(settings: MultiresSettings, _: Mapping[str, Any]) -> MultiresSettings:
     if not isinstance(settings.visibility, ClusteredShadows):
         return settings
-    assert isinstance(settings.subsplats, ByGeometry)
+    assert isinstance(settings.subsplats, ByGeometry | ByError)
     subsplats = dataclasses.replace(settings.subsplats, visibility=Rays())
     return dataclasses.replace(settings, subsplats=subsplats, pairs=PairSettings())
 

@@ -67,8 +67,8 @@ def _lobes(
     """Return the lobes at the pixels of one G-buffer."""
     shape = buffer.covered.shape
     if isinstance(settings.subsplats, ByError):
-        radiance = glossy_radiance(points, lights, settings.effective_pairs, footprint, shape[1])
-        return spread_over_picture(points, radiance, shape)
+        return spread_over_picture(points, _evaluated(frame, buffer, points, lights, footprint, settings, shape[1]),
+                                   shape)
     total = np.zeros((3, *shape), points.position.dtype)
     for exponent in np.unique(points.exponent):
         some = GlossyPoints(*(np.ascontiguousarray(plane[..., points.exponent == exponent]) for plane in points))
@@ -122,11 +122,11 @@ def glossy_subsplats(buffer: "GBuffer", points: GlossyPoints, settings: ByGeomet
 
 def _evaluated(
     frame: "Frame", buffer: "GBuffer", here: GlossyPoints, lights: "PixelLights", footprint: Array | None,
-    settings: MultiresSettings,
+    settings: MultiresSettings, width: int = 0,
 ) -> Array:
-    """Return the radiance at the subsplats' pixels, (3, n), in the dtype of the points."""
+    """Return the radiance at some pixels, (3, n), in the dtype of the points; `width` as for `glossy_radiance`."""
     if settings.shadow_rays is None and settings.shadows is None:
-        return glossy_radiance(here, lights, settings.effective_pairs, footprint)
+        return glossy_radiance(here, lights, settings.effective_pairs, footprint, width)
     triangle_id = buffer.triangle_id.reshape(-1)[here.pixel]
     if settings.shadows is not None:
         areas, maps = cluster_lights(frame, lights, settings.shadows)

@@ -15,6 +15,7 @@ from refgi.pairs.irradiance import Receivers
 from refgi.pairs.lightcuts.tree import tree_bytes
 from refgi.pairs.loss import thinned, warn_of_clamp
 from refgi.splat.multires.error_target.error_driven import MANY, clusters, error_driven
+from refgi.splat.multires.error_target.pixel_sum import PixelSum, shadowed_by_clusters, shadowed_by_rays
 from refgi.splat.multires.light_lists.per_light import per_light
 from refgi.splat.multires.refinement.criteria import discontinuities
 from refgi.splat.multires.refinement.grid import Subsplats, top_level
@@ -26,6 +27,7 @@ from refgi.splat.multires.subsplats.evaluate import (
     evaluate_shadowed,
     evaluate_visible,
     representative_points,
+    shadowed_at,
 )
 from refgi.splat.multires.subsplats.upsample import upsample
 
@@ -68,12 +70,12 @@ def _irradiance(
     printed: dict[str, bool] = {"filter_all": "ams_filter_all" in settings.as_published,
                                 "corner_rule": "ams_all_corners" not in settings.as_published}
     _resolve_channels(buffer, subsplats)
-    few = isinstance(subsplats, ByError) and clusters(lights, settings.lightcuts)
+    few = isinstance(subsplats, ByError) and subsplats.visibility is None and clusters(lights, settings.lightcuts)
     some = thinned(lights, footprint) if few or settings.bounded is not None else (lights, footprint)
     warn_of_clamp(Receivers(buffer.position, buffer.normal, buffer.covered), some[0], pairs, some[1], "multires")
     if isinstance(subsplats, ByError):
         irradiance = error_driven(buffer, lights, subsplats, pairs, footprint, settings.lights.seed,
-                                  settings.lightcuts).irradiance
+                                  settings.lightcuts, _shadowed(frame, buffer, lights, footprint, settings)).irradiance
     elif isinstance(subsplats, ByIrradiance):
         start = None if subsplats.start is None else shared_subsplats(buffer, subsplats.start)  # Sec. 6
         irradiance = per_light(buffer, lights, subsplats, pairs, footprint, start, **printed)  # Sec. 3.3.1
@@ -88,6 +90,17 @@ def _irradiance(
         return irradiance
     eye = frame.scene.camera.eye
     return surface_detail(irradiance, buffer.position, buffer.normal, buffer.covered, eye, settings.detail)  # Eq. (3)
+
+
+def _shadowed(
+    frame: "Frame", buffer: "GBuffer", lights: "PixelLights", footprint: Array | None, settings: MultiresSettings
+) -> PixelSum | None:
+    """Return the sum of lights under the visibility that settings ask for, None without."""
+    if settings.shadow_rays is not None:
+        return shadowed_by_rays(frame.tracer, frame.scene.geometry, buffer, lights)
+    if settings.shadows is not None:
+        return shadowed_by_clusters(shadowed_at(frame, buffer, lights, settings.shadows, footprint))
+    return None
 
 
 def _resolve_channels(buffer: "GBuffer", subsplats: ByGeometry | ByIrradiance | ByError) -> None:
@@ -208,6 +221,7 @@ def extra_bytes(settings: MultiresSettings, extent: Extent) -> int:
         Bytes, rather too many than too few: as if every pixel were a subsplat.
     """
     count = most_lights(settings.lights, extent.maps, extent.texels)
-    by_error = isinstance(settings.subsplats, ByError) and settings.lightcuts is not None and count >= MANY
+    by_error = (isinstance(settings.subsplats, ByError) and settings.visibility is None
+                and settings.lightcuts is not None and count >= MANY)
     cuts = tree_bytes(count, extent.float_bytes, most_threads()) if settings.bounded is not None or by_error else 0
     return cuts + (0 if settings.shadows is None else bytes_of_shadows(settings.shadows, extent))

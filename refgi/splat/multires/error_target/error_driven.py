@@ -21,10 +21,9 @@ import numpy.typing as npt
 from refgi.draws import ERROR_SAMPLES, draws
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers, checked
-from refgi.pairs.packing import Packed
 from refgi.pairs.settings import AutoLightcuts, Lightcuts
 from refgi.splat.multires.error_target.interpolate import surface_levels
-from refgi.splat.multires.error_target.near import near_light
+from refgi.splat.multires.error_target.pixel_sum import PixelSum, unshadowed
 from refgi.splat.multires.error_target.trial import ExactIrradiance, Trials
 from refgi.splat.multires.refinement.grid import Subsplats, top_level
 from refgi.splat.multires.refinement.refine import refine
@@ -155,6 +154,7 @@ class ErrorDriven(NamedTuple):
 def error_driven(
     buffer: "GBuffer", lights: "PixelLights", settings: "ByError", pairs: "PairSettings",
     footprint: Array | None = None, seed: int = 0, lightcuts: AutoLightcuts | Lightcuts | None = None,
+    shadowed: PixelSum | None = None,
 ) -> ErrorDriven:
     """Evaluate a picture to a relative error, `settings.target`.
 
@@ -175,6 +175,8 @@ def error_driven(
     lightcuts : AutoLightcuts, Lightcuts or None
         Whether lights may be summed by clusters: "auto" takes a share of the target for it where they are many; by
         name, with an error of its own that counts against the target.
+    shadowed : PixelSum, optional
+        The same lights under their visibility, which are then never clustered.
 
     Returns
     -------
@@ -189,15 +191,19 @@ def error_driven(
     Notes
     -----
     The promise is that of a sample of one pixel in 64 (`estimate_error`). Depths are not used: without visibility,
-    irradiance changes across them by position and normal alone.
+    irradiance changes across them by position and normal alone. Edges of shadows are found as other changes of light
+    are, by cells whose irradiance is not what the coarser level says.
     """
     receivers = Receivers(*map(np.ascontiguousarray, buffer.resolve("position", "normal", "covered")))
     samples = draw_samples(receivers.covered, seed)
-    packed, exact, clustered = _evaluated_samples(receivers, lights, pairs, footprint, samples, settings.target,
-                                                  lightcuts)
+    if shadowed is None:
+        summed, exact, clustered = _evaluated_samples(receivers, lights, pairs, footprint, samples, settings.target,
+                                                      lightcuts)
+    else:
+        summed, exact, clustered = shadowed, _evaluated(receivers, shadowed, samples), 0.0
     sampled = exact.at(samples.pixel)
     typical, mean = _mean_without_brightest(sampled), estimate_mean(samples, sampled)
-    near = near_light(receivers, packed, NEAR * typical)
+    near = summed.near(receivers, NEAR * typical)
     tally("pairs", lambda: near.pairs)
     top = max(1, top_level(buffer.height, buffer.width, settings.coarsest))
     trials = Trials(exact, near, surface_levels(*receivers, top))
@@ -220,24 +226,28 @@ def clusters(lights: "PixelLights", lightcuts: AutoLightcuts | Lightcuts | None)
 def _evaluated_samples(
     receivers: Receivers, lights: "PixelLights", pairs: "PairSettings", footprint: Array | None, samples: ErrorSamples,
     target: float, lightcuts: AutoLightcuts | Lightcuts | None,
-) -> tuple[Packed, ExactIrradiance, float]:
-    """Return the packed lights, the samples' irradiance, and what clusters may take of the error, over the mean.
+) -> tuple[PixelSum, ExactIrradiance, float]:
+    """Return the sum of all lights, the samples' irradiance, and what clusters may take of the error, over the mean.
 
     Where that is more than half of the target, lights are summed in full.
     """
     if clusters(lights, lightcuts):
         error = lightcuts.error if isinstance(lightcuts, Lightcuts) else CLUSTERED * target
         packed = checked(receivers, lights, pairs, footprint, Lightcuts(min(max(error, LEAST_ERROR), 1.0)))
-        exact = ExactIrradiance(receivers, packed)
-        exact.evaluate(samples.pixel)
+        summed = unshadowed(receivers, packed)
+        exact = _evaluated(receivers, summed, samples)
         taken = 0.0 if packed.tree is None else packed.tree.error * _largest_ratio(samples, exact.at(samples.pixel))
         if taken <= target / 2:
-            return packed, exact, taken
+            return summed, exact, taken
         skip("pairs.lightcuts", f"bounds of {taken:.2%} of the mean are too much for the target")
-    packed = checked(receivers, lights, pairs, footprint)
-    exact = ExactIrradiance(receivers, packed)
+    summed = unshadowed(receivers, checked(receivers, lights, pairs, footprint))
+    return summed, _evaluated(receivers, summed, samples), 0.0
+
+
+def _evaluated(receivers: Receivers, summed: PixelSum, samples: ErrorSamples) -> ExactIrradiance:
+    exact = ExactIrradiance(receivers, summed.at)
     exact.evaluate(samples.pixel)
-    return packed, exact, 0.0
+    return exact
 
 
 def _largest_ratio(samples: ErrorSamples, sampled: Array) -> float:

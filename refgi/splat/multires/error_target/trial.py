@@ -7,14 +7,14 @@ coarser level's interpolation, at its own pixel or half of that at its neighbour
 Levels, and irradiance once it is known, stay from trial to trial in the same memory.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange, threads
-from refgi.pairs.irradiance import Receivers, add_lights
-from refgi.pairs.packing import Packed
+from refgi.pairs.irradiance import Receivers
 from refgi.pairs.tiles import put, taken
 from refgi.rsm.pool import plane
 from refgi.splat.multires.error_target.descent import fill_coarsest, fill_level, fill_picture, residuals
@@ -33,13 +33,13 @@ class ExactIrradiance:
     Parameters
     ----------
     receivers : Receivers
-        The picture's points; contiguous.
-    packed : Packed
-        The lights.
+        The picture's points.
+    sum_at : callable
+        Takes covered pixels, n flat indices, and returns their irradiance, (3, n), W/m^2, in the type of the points.
     """
 
-    def __init__(self, receivers: Receivers, packed: Packed) -> None:
-        self._receivers, self._packed = receivers, packed
+    def __init__(self, receivers: Receivers, sum_at: Callable[[Array], Array]) -> None:
+        self._sum_at = sum_at
         self.is_known = np.zeros(receivers.covered.size, np.bool_)
         self.irradiance = plane(receivers.position.shape, receivers.position.dtype)  # (3, h, w), W/m^2
         self._unlit_pixels, self._path = plane((self.is_known.size,), np.int64), _morton_path()
@@ -47,10 +47,7 @@ class ExactIrradiance:
     def evaluate(self, pixel: Array) -> None:
         """Evaluate pixels that are not known; neighbours should follow each other."""
         if len(pixel):
-            points, normals = taken(self._receivers.position, pixel), taken(self._receivers.normal, pixel)
-            sums = np.zeros_like(points)
-            add_lights(points, normals, self._packed, sums)
-            put(self.irradiance, pixel, sums)
+            put(self.irradiance, pixel, self._sum_at(pixel))
             self.is_known[pixel] = True
 
     def unlit(self, split: Array, level: SurfaceLevel) -> Array:

@@ -5,6 +5,7 @@ ray each they are those of `vpl`: the picture converges to `vpl` as subsplats be
 become many, at the subsplats' share of the rays. With the soft shadows of clusters it converges to `val`.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import PAIRS_AT_ONCE, Receivers, add_lights, checked
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.settings import Lightcuts, PairSettings
-from refgi.pairs.shadow_rays import receivers, shadowed_sum
+from refgi.pairs.shadow_rays import RayReceivers, receivers, shadowed_sum
 from refgi.pairs.tiles import taken
 from refgi.rsm import facing_normals
 from refgi.scene import Geometry
@@ -178,11 +179,15 @@ def evaluate_visible(
     offsets, lobes' norms and widening, published forms) and means over a cell, which lie on no triangle, have no
     counterpart here.
     """
+    points = ray_receivers(tracer, geometry, buffer, subsplats.pixel)
+    return shadowed_sum(tracer, points, lights).astype(buffer.position.dtype)
+
+
+def ray_receivers(tracer: "Tracer", geometry: Geometry, buffer: "GBuffer", pixel: Array) -> RayReceivers:
+    """Return covered pixels (n flat indices) of a G-buffer as receivers of shadow rays."""
     position, normal, triangle_id = buffer.resolve("position", "normal", "triangle_id")
-    triangle = triangle_id.reshape(-1)[subsplats.pixel]
-    points = receivers(geometry, taken(position, subsplats.pixel), taken(normal, subsplats.pixel), triangle,
-                       tracer.grain)
-    return shadowed_sum(tracer, points, lights).astype(np.asarray(position).dtype)
+    return receivers(geometry, taken(position, pixel), taken(normal, pixel), triangle_id.reshape(-1)[pixel],
+                     tracer.grain)
 
 
 @stage("multires.evaluate_shadowed")
@@ -217,11 +222,25 @@ def evaluate_shadowed(
     Adaptive clusters are as many as the pixels of `frame` ask for, and shadow maps hold what can block between its
     lights and the surfaces in its view (Dong et al. 2009, Sec. 4 to 6).
     """
+    return shadowed_at(frame, buffer, lights, settings, footprint)(subsplats.pixel)
+
+
+def shadowed_at(
+    frame: "Frame", buffer: "GBuffer", lights: "PixelLights", settings: "ValSettings", footprint: Array | None = None
+) -> Callable[[Array], Array]:
+    """Return a function from covered pixels (n flat indices) to what `evaluate_shadowed` gives them, (3, n), W/m^2.
+
+    Lights are clustered, and maps drawn, once.
+    """
     areas, maps = cluster_lights(frame, lights, settings)
+    reference = reference_visibility(frame, lights, areas, maps, settings)
     position, normal, triangle_id = buffer.resolve("position", "normal", "triangle_id")
-    points, normals = taken(position, subsplats.pixel)[:, None], taken(normal, subsplats.pixel)[:, None]
-    facing = facing_normals(frame.scene.geometry, triangle_id.reshape(-1)[None, subsplats.pixel], normals)
-    return clustered_irradiance(
-        Receivers(points, normals, np.ones(points.shape[1:], np.bool_)), facing, lights, areas, maps, settings,
-        footprint, reference_visibility(frame, lights, areas, maps, settings),
-        rays=frame.tracer if settings.maps.behind == "raytrace" else None)[:, 0]
+
+    def at(pixel: Array) -> Array:
+        points, normals = taken(position, pixel)[:, None], taken(normal, pixel)[:, None]
+        facing = facing_normals(frame.scene.geometry, triangle_id.reshape(-1)[None, pixel], normals)
+        return clustered_irradiance(
+            Receivers(points, normals, np.ones(points.shape[1:], np.bool_)), facing, lights, areas, maps, settings,
+            footprint, reference, rays=frame.tracer if settings.maps.behind == "raytrace" else None)[:, 0]
+
+    return at

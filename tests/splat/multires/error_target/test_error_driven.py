@@ -14,8 +14,8 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import checked
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
-from refgi.splat.multires.error_target import error_driven as module
-from refgi.splat.multires.error_target import trial as trial_module
+from refgi.splat.multires.error_target import pixel_sum as sum_module
+from refgi.splat.multires.error_target import trial
 from refgi.splat.multires.error_target.descent import fill_coarsest, fill_level, fill_picture
 from refgi.splat.multires.error_target.error_driven import draw_samples, error_driven, estimate_error, estimate_mean
 from refgi.splat.multires.error_target.interpolate import blend_weights, surface_levels
@@ -86,9 +86,9 @@ def test_pairs_are_saved_and_all_counted(monkeypatch):
     frame = frame_of("cornell_box", 300, 300)
     settings = by_error(0.05, lights=64)
     lights, area, full = full_sum(frame, settings)
-    evaluated, near, add_lights, near_light = [], [], trial_module.add_lights, module.near_light
-    monkeypatch.setattr(trial_module, "add_lights", lambda p, *how: evaluated.append(p.T) or add_lights(p, *how))
-    monkeypatch.setattr(module, "near_light", lambda *how: near.append(near_light(*how)) or near[-1])
+    evaluated, near, add_lights = [], [], sum_module.add_lights
+    monkeypatch.setattr(sum_module, "add_lights", lambda p, *how: evaluated.append(p.T) or add_lights(p, *how))
+    monkeypatch.setattr(sum_module, "near_light", lambda *how: near.append(near_light(*how)) or near[-1])
     with observe() as log:
         found = driven(frame.gbuffer, lights, settings, area)
     said = next(run.reason for run in log.runs if run.name == "multires.full_sum")
@@ -275,7 +275,7 @@ def test_cells_are_split_where_normals_or_light_promise_too_much():
     surplus, error = (rng.uniform(0, 1, (9, 11)).astype(np.float32) ** 6 for _ in range(2))
     split, pixels = np.zeros((9, 11), bool), 4.0
     most = 1.0
-    trial_module._mark_split(known, light, surplus, error, pixels, most, split)
+    trial._mark_split(known, light, surplus, error, pixels, most, split)
     for i, j in np.ndindex(9, 11):
         around = np.s_[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2]
         brightest = (light[:, *around].astype(float) ** 2).sum(axis=0).max()

@@ -1,0 +1,131 @@
+"""What error-driven refinement sums at a pixel: all lights as they are, or under their visibility.
+
+Interpolation carries no peak of a near pair, so each sum also says what single pairs give beyond a bound (`near`): the
+part that is added at every pixel. With a shadow ray for each pair that part has rays of its own. Under the soft shadows
+of clusters no pair has a visibility of its own; there the clamp bounds what is near.
+"""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.pairs.irradiance import Receivers, add_lights, checked
+from refgi.pairs.packing import Packed
+from refgi.pairs.settings import PairSettings
+from refgi.pairs.shadow_rays import BATCH, RayReceivers, Senders, shadowed_sum, summed
+from refgi.pairs.tiles import put, taken
+from refgi.rsm.pool import zeros
+from refgi.splat.multires.error_target.near import SIDE, NearLight, near_light
+from refgi.splat.multires.refinement.grid import level_shape
+from refgi.splat.multires.subsplats.evaluate import ray_receivers
+
+if TYPE_CHECKING:
+    from refgi.pairs.pixel_lights import PixelLights
+    from refgi.rays import Tracer
+    from refgi.rsm import GBuffer
+    from refgi.scene import Geometry
+
+Array = npt.NDArray[Any]
+
+
+class PixelSum(NamedTuple):
+    """A sum of lights at the pixels of a picture, and its peaks."""
+
+    at: Callable[[Array], Array]  # covered pixels, n flat indices -> irradiance (3, n), W/m^2
+    near: Callable[[Receivers, float], NearLight]  # what single lights give all pixels beyond a bound, W/m^2
+
+
+def unshadowed(receivers: Receivers, packed: Packed) -> PixelSum:
+    """Return the sum of packed lights at contiguous receivers, without visibility."""
+
+    def at(pixel: Array) -> Array:
+        points, normals = taken(receivers.position, pixel), taken(receivers.normal, pixel)
+        sums = np.zeros_like(points)
+        add_lights(points, normals, packed, sums)
+        return sums
+
+    return PixelSum(at, lambda points, most: near_light(points, packed, most))
+
+
+def shadowed_by_clusters(at: Callable[[Array], Array]) -> PixelSum:
+    """Return a sum whose lights share the visibility of their clusters; `at` finds it."""
+
+    def near(receivers: Receivers, _: float) -> NearLight:
+        return _nothing_near(receivers)
+
+    return PixelSum(at, near)
+
+
+def shadowed_by_rays(tracer: "Tracer", geometry: "Geometry", buffer: "GBuffer", lights: "PixelLights") -> PixelSum:
+    """Return the sum of `vpl`: a shadow ray for each pair, pairs not clamped.
+
+    `tracer`: the scene's rays. `geometry`: the triangles that the buffer's ids refer to. `lights`: N pixel lights.
+    """
+
+    def at(pixel: Array) -> Array:
+        points = ray_receivers(tracer, geometry, buffer, pixel)
+        return shadowed_sum(tracer, points, lights).astype(buffer.position.dtype)
+
+    def near(receivers: Receivers, most: float) -> NearLight:
+        found, width = _nothing_near(receivers), receivers.covered.shape[1]
+        if most <= 0:
+            return found
+        pixel, peaks = _pixels_with_near_pairs(receivers, lights, most), Peaks(most)
+        points = ray_receivers(tracer, geometry, buffer, pixel)
+        values = summed(tracer, points, lights, True, BATCH, None, peaks.keep).astype(receivers.position.dtype)
+        put(found.irradiance, pixel, values)
+        found.has_near[pixel // width // SIDE, pixel % width // SIDE] = True
+        return found._replace(pairs=peaks.pairs)
+
+    return PixelSum(at, near)
+
+
+class Peaks:
+    """What pairs give beyond a bound, in place of all they give; counts them.
+
+    Parameters
+    ----------
+    most : float
+        The bound of a pair's strongest channel, W/m^2.
+    """
+
+    def __init__(self, most: float) -> None:
+        self._most, self.pairs = most, 0
+
+    def keep(self, _to: RayReceivers, _receivers: tuple[int, int], _senders: Senders, _lights: tuple[int, int],
+             reach: Array, contribution: Array) -> None:
+        """Scale contributions (n, 3), W/m^2, to what exceeds the bound; clear the reach of pairs that keep below it."""
+        _keep_excess(self._most, reach, contribution)
+        self.pairs += int(np.count_nonzero(reach))
+
+
+@kernel(parallel=True)
+def _keep_excess(most: float, reach: Array, contribution: Array) -> None:
+    for i in prange(len(reach)):
+        strongest = max(contribution[i, 0], max(contribution[i, 1], contribution[i, 2]))
+        beyond = reach[i] > 0 and strongest > most
+        reach[i] = 1 if beyond else 0
+        share = 1.0 - most / strongest if beyond else 0.0
+        for c in range(3):
+            contribution[i, c] *= share
+
+
+def _nothing_near(receivers: Receivers) -> NearLight:
+    shape = receivers.covered.shape
+    return NearLight(zeros(receivers.position.shape, receivers.position.dtype),
+                     np.zeros(level_shape(shape[0], shape[1], SIDE.bit_length() - 1), np.bool_), 0)
+
+
+def _pixels_with_near_pairs(receivers: Receivers, lights: "PixelLights", most: float) -> Array:
+    """Return the covered pixels that some light, were nothing in between, gives more than a bound; all with lobes."""
+    packed = checked(receivers, lights, PairSettings(clamp=None), None)
+    if packed.lobes is not None:
+        return np.flatnonzero(receivers.covered)
+    near = near_light(receivers, packed, most)
+    bright = np.repeat(np.repeat(near.has_near, SIDE, axis=0), SIDE, axis=1)
+    bright = bright[: receivers.covered.shape[0], : receivers.covered.shape[1]] & receivers.covered
+    pixel = np.flatnonzero(bright)
+    return pixel[taken(near.irradiance, pixel).any(axis=0)]

@@ -32,6 +32,10 @@ MODES: dict[str, tuple[Mode, Mode]] = {  # the mode, and the same light in full
                                            ("val", {"lights": 1024, "interleaving": 1})),
     "vpl at subsplats": (("multires", {"lights": 64, "pattern": "grid", "visibility": "rays"}),
                          ("vpl", {"lights": 64, "pattern": "grid"})),
+    "vpl at subsplats to 5 %": (("multires", {"lights": 64, "pattern": "grid", "subsplats": "error",
+                                              "visibility": "rays"}), ("vpl", {"lights": 64, "pattern": "grid"})),
+    "val at subsplats to 5 %": (("multires", SHADOWED | {"subsplats": "error", "visibility": "val"}),
+                                ("val", {"lights": 1024, "interleaving": 1})),
 }
 
 

@@ -15,16 +15,20 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.batch import EMPTY, Part, draw, unpack
+from refgi.rsm.raster.cluster_batch import Placed, draw_clusters, local_scratch, place_clusters
 from refgi.rsm.raster.paraboloid import cut_chunks, draw_paraboloids
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.rsm.raster.triangle import LANES, bound_triangles, project_vertices
+from refgi.scene.clusters import Clusters
 from refgi.scene.cutouts import CutFaces
 from refgi.scene.model import Geometry
+from refgi.skips import left_out
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
 BATCH = 1024  # triangles whose boxes are found before they are drawn on one of several maps
+MOST_ROWS = 64  # of a band: its keys stay in cache
 CHUNKS = 32  # pieces of the list of triangles that are counted and listed on their own
 
 
@@ -50,6 +54,7 @@ class Cut(NamedTuple):
     faces: Array  # (c, 3) int32: vertices of each
     holes: CutFaces
     lists: Any  # Bands, of the same rows as those of the others; None for several maps
+    corners: Any  # (n, 4) float64: projected vertices of the geometry; None for several maps
 
 
 class Scratch(NamedTuple):
@@ -87,7 +92,7 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     is there, at the texel's centre.
     """
     vertices, faces = geometry.vertices, geometry.without_cut
-    cut = None if geometry.cut is None else Cut(geometry.faces[geometry.cut.face], geometry.cut, None)
+    cut = None if geometry.cut is None else Cut(geometry.faces[geometry.cut.face], geometry.cut, None, None)
     height, width = projection.shape
     visibility = Visibility(plane((height, width), np.int32), plane((height, width), np.float32))
     workers = numba.get_num_threads()
@@ -97,14 +102,13 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     elif projection.maps > 1:
         _draw_maps(projection, vertices, faces, cut, scratch(workers, len(vertices), projection), visibility)
     else:
-        corners, cells = plane((len(vertices), 4), np.float64), plane((len(vertices), 4), np.int32)
-        _project(projection, vertices, corners, cells)
-        rows = min(band_rows or min(max(height // 32, 4), 32), height)
-        keys = plane((workers, rows * (width + LANES)), np.int64)
-        lists = bands(corners, cells, faces, width, height, rows)
+        rows = min(band_rows or min(max(height // (8 * workers), 4), MOST_ROWS), height)
         if cut is not None:
+            corners, cells = plane((len(vertices), 4), np.float64), plane((len(vertices), 4), np.int32)
+            _project(projection, vertices, corners, cells)
             cut = cut._replace(lists=bands(corners, cells, cut.faces, width, height, rows))
-        _draw_bands(corners, faces, lists, cut, keys, visibility)
+            cut = cut._replace(corners=corners)
+        _draw_clusters(projection, geometry, rows, cut, visibility)
     return visibility
 
 
@@ -177,19 +181,59 @@ def _list(boxes: Array, band_of: Array, cursors: Array, members: Array) -> None:
                 cursors[chunk, band] += 1
 
 
+def _draw_clusters(
+    projection: Projection, geometry: Geometry, rows: int, cut: Cut | None, visibility: Visibility
+) -> None:
+    """Draw one map in bands of rows, each from the clusters that reach it, the nearest first."""
+    clusters, (height, width), workers = geometry.clusters, projection.shape, numba.get_num_threads()
+    count, band_count = len(clusters.box), -(-height // rows)
+    placed = Placed(np.empty((count, 4), np.int32), np.empty(count), np.empty(count, np.int64), np.empty(count),
+                    np.empty((count, 4)), np.empty(count))
+    place_clusters(projection, 0, clusters, placed)
+    order = np.argsort(-placed.nearest)
+    starts = np.zeros(band_count + 1, np.int64)
+    members = list_clusters(placed.rect, order, rows, starts)
+    keys = plane((workers, rows * (width + LANES)), np.int64)
+    passing = left_out("rsm.clusters", lambda: (0, 1))
+    _draw_bands(projection, clusters, placed, starts, members, rows, passing, cut, keys, visibility)
+
+
+@kernel
+def list_clusters(rect: Array, order: Array, rows: int, starts: Array) -> Array:
+    """Return the clusters of band 0, of band 1, ..., each in an order; `starts` (bands + 1,) receives where each starts.
+
+    `rect` (c, 4): texels that each cluster may cover. `order` (c,): all clusters. `rows`: height of a band.
+    """
+    for c in range(len(rect)):
+        if rect[c, 0] <= rect[c, 1] and rect[c, 2] <= rect[c, 3]:
+            for band in range(rect[c, 2] // rows, rect[c, 3] // rows + 1):
+                starts[band + 1] += 1
+    for band in range(1, len(starts)):
+        starts[band] += starts[band - 1]
+    cursors, members = starts[:-1].copy(), np.empty(starts[-1], np.int32)
+    for c in order:
+        if rect[c, 0] <= rect[c, 1] and rect[c, 2] <= rect[c, 3]:
+            for band in range(rect[c, 2] // rows, rect[c, 3] // rows + 1):
+                members[cursors[band]] = c
+                cursors[band] += 1
+    return members
+
+
 @kernel(parallel=True)
 def _draw_bands(
-    corners: Array, faces: Array, lists: Bands, cut: Cut | None, keys: Array, visibility: Visibility
+    projection: Projection, clusters: Clusters, placed: Placed, starts: Array, members: Array, rows: int,
+    passing: bool, cut: Cut | None, keys: Array, visibility: Visibility,
 ) -> None:
     workers, (height, width) = len(keys), visibility.triangle_id.shape
     for worker in prange(workers):
-        band_keys = keys[worker]
-        for band in range(worker, len(lists.starts) - 1, workers):  # interleaved: neighbours cost alike
-            top, bottom = band * lists.rows, min((band + 1) * lists.rows, height) - 1
+        band_keys, local = keys[worker], local_scratch()
+        for band in range(worker, len(starts) - 1, workers):  # interleaved: neighbours cost alike
+            top, bottom = band * rows, min((band + 1) * rows, height) - 1
             band_keys[:] = EMPTY
-            draw(corners, faces, _part_of(lists, band, top, bottom), width, None, band_keys)
+            draw_clusters(projection, 0, clusters, placed, members[starts[band] : starts[band + 1]], (top, bottom),
+                          passing, local, band_keys)
             if cut is not None:
-                draw(corners, cut.faces, _part_of(cut.lists, band, top, bottom), width, cut.holes, band_keys)
+                draw(cut.corners, cut.faces, _part_of(cut.lists, band, top, bottom), width, cut.holes, band_keys)
             unpack(band_keys, width, top, bottom, visibility.inverse_depth, visibility.triangle_id)
 
 

@@ -27,7 +27,7 @@ class Clusters(NamedTuple):
     """Triangles without holes, cluster by cluster: the last one may have fewer than `CLUSTER`."""
 
     face: Array  # (m,) int32: which triangle of the geometry
-    corner: Array  # (m, 3) int32: its vertices, as places within those of its cluster
+    corner: Array  # (m, 3) uint8: its vertices, as places within those of its cluster
     start: Array  # (c + 1,) int64: first vertex of each cluster, then one past the last
     vertex: Array  # (3, n + SPARE) float64, m: x, y, z; mostly once in a cluster
     box: Array  # (c, 6) float64, m: least x, y, z of each cluster, then greatest
@@ -59,9 +59,9 @@ def clusters(geometry: "Geometry") -> Clusters:
         places = np.delete(places, geometry.cut.face)
     places.sort()
     number = len(places)
-    face, corner = np.empty(number, np.int32), np.empty((number, 3), np.int32)
+    face, corner = np.empty(number, np.int32), np.empty((number, 3), np.uint8)
     count = -(-number // CLUSTER)
-    used, box = np.empty((count, 3 * CLUSTER), np.int32), np.empty((count, 6))
+    used, box = np.empty((count, 3 * CLUSTER + 1), np.int32), np.empty((count, 6))
     start = np.zeros(count + 1, np.int64)
     _find_vertices(faces, places, face, corner, used, start)
     np.cumsum(start, out=start)
@@ -79,9 +79,7 @@ def _place_on_curve(vertices: Array, faces: Array, low: Array, scale: float, bit
     for face in prange(len(faces)):
         place = np.int64(0)
         for axis in range(3):
-            i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-            middle = (vertices[i, axis] + vertices[j, axis] + vertices[k, axis]) * (1.0 / 3.0)
-            cell = min(max(np.int64((middle - low[axis]) * scale), np.int64(0)), most)
+            cell = min(np.int64((vertices[faces[face, 0], axis] - low[axis]) * scale), most)
             # two zeros before each bit
             cell = (cell | (cell << 16)) & 0x30000FF
             cell = (cell | (cell << 8)) & 0x300F00F
@@ -101,11 +99,13 @@ def _find_vertices(faces: Array, places: Array, face: Array, corner: Array, used
             face[place] = places[place] & 0xFFFFFFFF
             for c in range(3):
                 vertex = faces[face[place], c]
-                slot = np.int64(table[vertex & (TABLE - 1)])
-                if slot >= known or used[cluster, slot] != vertex:
-                    slot = known
-                    used[cluster, known], table[vertex & (TABLE - 1)] = vertex, known
-                    known += 1
+                entry = vertex & (TABLE - 1)
+                there = np.int64(table[entry])
+                new = (there >= known) | (used[cluster, there] != vertex)  # free of branches, which nothing foretells
+                slot = known if new else there
+                used[cluster, known] = vertex
+                known += new
+                table[entry] = slot
                 corner[place, c] = slot
         start[cluster + 1] = known
 
@@ -127,15 +127,15 @@ def _copy_vertices(vertices: Array, used: Array, start: Array, vertex: Array, bo
 def _find_planes(corner: Array, start: Array, vertex: Array, box: Array, plane: Array, product: Array) -> None:
     for cluster in prange(len(box)):
         first, last = cluster * CLUSTER, min((cluster + 1) * CLUSTER, len(corner))
-        qx, qy, qz = box[cluster, 0] + box[cluster, 3], box[cluster, 1] + box[cluster, 4], box[cluster, 2] + box[cluster, 5]
-        greatest = 0.0
+        low, high, greatest = box[cluster, :3], box[cluster, 3:], 0.0
+        qx, qy, qz = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
         for at in range(first, last):
             i, j, k = start[cluster] + corner[at, 0], start[cluster] + corner[at, 1], start[cluster] + corner[at, 2]
             x, y, z = vertex[0, i], vertex[1, i], vertex[2, i]
             ax, ay, az = vertex[0, j] - x, vertex[1, j] - y, vertex[2, j] - z
             bx, by, bz = vertex[0, k] - x, vertex[1, k] - y, vertex[2, k] - z
             nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-            offset = nx * (x - 0.5 * qx) + ny * (y - 0.5 * qy) + nz * (z - 0.5 * qz)
+            offset = nx * (x - qx) + ny * (y - qy) + nz * (z - qz)
             plane[0, at], plane[1, at], plane[2, at], plane[3, at] = nx, ny, nz, offset
             greatest = max(greatest, (ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz))
         product[cluster] = math.sqrt(greatest)

@@ -29,7 +29,7 @@ BATCH = 64  # triangles set up at once
 EMPTY = 0xFFFFFFFF  # key of a texel where nothing is; others have nearness in the upper half, EMPTY - id in the lower
 # where a batch's limits, corners and determinants start, then centres of boxes' sides; its rows in all
 LIMIT, CORNERS, DET, SIDES, ROWS = 15 * BATCH, 16 * BATCH, 28 * BATCH, 29 * BATCH, 33
-STEP, TWO, THREE, FOUR = np.uint64(BATCH), np.uint64(2), np.uint64(3), np.uint64(4)
+STEP = tuple(np.uint64(rows * BATCH) for rows in range(6))  # how far apart a batch's rows are
 
 
 class Part(NamedTuple):
@@ -176,30 +176,30 @@ def set_up(setup: Array, count: int, width: int) -> None:
     for lane in range((count + LANES - 1) & -LANES):
         b = np.uint64(lane)
         at = b + np.uint64(CORNERS)
-        xi, yi, wi, ni = setup[at], setup[at + STEP], setup[at + STEP * TWO], setup[at + STEP * THREE]
-        at += STEP * FOUR
-        xj, yj, wj, nj = setup[at], setup[at + STEP], setup[at + STEP * TWO], setup[at + STEP * THREE]
-        at += STEP * FOUR
-        xk, yk, wk, nk = setup[at], setup[at + STEP], setup[at + STEP * TWO], setup[at + STEP * THREE]
+        xi, yi, wi, ni = setup[at], setup[at + STEP[1]], setup[at + STEP[2]], setup[at + STEP[3]]
+        at += STEP[4]
+        xj, yj, wj, nj = setup[at], setup[at + STEP[1]], setup[at + STEP[2]], setup[at + STEP[3]]
+        at += STEP[4]
+        xk, yk, wk, nk = setup[at], setup[at + STEP[1]], setup[at + STEP[2]], setup[at + STEP[3]]
         det = ((xj - xi) * (yk - yi) - (xk - xi) * (yj - yi)) * (wi * wj * wk)
         sign = 1.0 if det > 0.0 else -1.0
         a0, b0, c0, t0 = edge(xj, yj, wj, xk, yk, wk, sign)
         a1, b1, c1, t1 = edge(xk, yk, wk, xi, yi, wi, sign)
         a2, b2, c2, t2 = edge(xi, yi, wi, xj, yj, wj, sign)
         scale = sign / det
-        setup[b], setup[b + STEP], setup[b + STEP * TWO], setup[b + STEP * THREE] = a0, b0, c0, t0
-        at = b + STEP * FOUR
-        setup[at], setup[at + STEP], setup[at + STEP * TWO], setup[at + STEP * THREE] = a1, b1, c1, t1
-        at += STEP * FOUR
-        setup[at], setup[at + STEP], setup[at + STEP * TWO], setup[at + STEP * THREE] = a2, b2, c2, t2
-        at += STEP * FOUR
+        setup[b], setup[b + STEP[1]], setup[b + STEP[2]], setup[b + STEP[3]] = a0, b0, c0, t0
+        at = b + STEP[4]
+        setup[at], setup[at + STEP[1]], setup[at + STEP[2]], setup[at + STEP[3]] = a1, b1, c1, t1
+        at += STEP[4]
+        setup[at], setup[at + STEP[1]], setup[at + STEP[2]], setup[at + STEP[3]] = a2, b2, c2, t2
+        at += STEP[4]
         setup[at] = (a0 * ni + a1 * nj + a2 * nk) * scale
-        setup[at + STEP] = (b0 * ni + b1 * nj + b2 * nk) * scale
-        setup[at + STEP * TWO] = (c0 * ni + c1 * nj + c2 * nk) * scale
+        setup[at + STEP[1]] = (b0 * ni + b1 * nj + b2 * nk) * scale
+        setup[at + STEP[2]] = (c0 * ni + c1 * nj + c2 * nk) * scale
         size = max(_size(xi, yi, wi, width), max(_size(xj, yj, wj, width), _size(xk, yk, wk, width)))
         # no area, or seen edge-on: nothing is near enough
         limit = 1.0 / (NEAREST * size)
-        setup[at + STEP * THREE] = limit if (det != 0.0) & (limit > 0.0) else 0.0
+        setup[at + STEP[3]] = limit if (det != 0.0) & (limit > 0.0) else 0.0
         setup[b + np.uint64(DET)] = det
 
 

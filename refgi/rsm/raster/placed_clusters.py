@@ -73,7 +73,8 @@ def _place(projection: Projection, clusters: Clusters, placed: Placed) -> None:
             behind = most_w < -IN_FRONT * reach
             rect[0], rect[1], rect[2], rect[3] = 0, -1 if behind else width - 1, 0, height - 1
             placed.nearest[c], placed.key[c] = np.inf, NEVER
-            placed.least_det[c], placed.least_volume[c], placed.ahead[c] = np.inf, np.inf, 0.0
+            placed.least_det[c], placed.least_volume[c] = np.inf, np.inf
+            placed.ahead[c, :] = 0.0
             continue
         size, share = max(abs(left), abs(right), abs(top), abs(bottom), width, height), reach / least_w
         # the rounding of a projected vertex, several times over

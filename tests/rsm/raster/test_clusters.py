@@ -80,7 +80,7 @@ def test_clusters_hold_each_triangle_once_with_its_own_corners():
 def test_a_cluster_of_a_mesh_without_order_is_small_and_shares_its_vertices():
     shape = shuffled(height_field(20_000), np.random.default_rng(2))
     side = (shape.clusters.box[:, 3:] - shape.clusters.box[:, :3]).max(axis=1)
-    assert np.median(side) < 0.25  # 64 triangles in order of the sheet take 0.06 x 0.06 of 2 x 2
+    assert np.median(side) < 0.3  # of a square of 2, of which 64 of 20,000 triangles take 0.11 x 0.11
     assert np.diff(shape.clusters.start).mean() < CLUSTER
 
 
@@ -120,7 +120,7 @@ def test_hidden_clusters_are_passed_over_and_change_no_bit(name, evidence):
 
 
 def edge_on(rng, axis):
-    """Triangles almost or wholly within planes through the eye at the origin, along rows or columns of texel centres."""
+    """Triangles almost or wholly within planes through the eye, along rows or columns of texel centres."""
     corners = rng.uniform(-1, 1, (40 * CLUSTER, 3, 3)) * (0.02, 0.02, 0.02)
     corners += rng.uniform(-0.6, 0.6, (len(corners), 1, 3)) * (1, 1, 0.2) + (0, 0, -2)
     noise = rng.choice([0.0, 1e-17, 1e-16, 1e-14, 1e-9], (len(corners), 1))

@@ -159,7 +159,11 @@ def test_bounds_of_clusters_hold_for_each_of_their_triangles(name):
     rng, projection = np.random.default_rng(7), projections()[name]
     sound = 0
     for size in (0.3, 0.05, 0.004):
-        shape = soup(rng, CLUSTER, 0.3, size)
+        corners = soup(rng, CLUSTER, 0.3, size).vertices.reshape(-1, 3, 3)
+        away = corners[::4, 0] - projection.origin[0]
+        along = np.broadcast_to(projection.frame[0, 2], away.shape) if projection.kind == ORTHOGRAPHIC else away
+        corners[::4, 1] = corners[::4, 0] + 0.1 * along  # edge-on
+        shape = geometry(corners, np.arange(3 * CLUSTER))
         placed = place(projection, shape.clusters)
         drawn = one_by_one(shape, projection)
         rows, columns = np.nonzero(drawn.triangle_id >= 0)
@@ -169,11 +173,12 @@ def test_bounds_of_clusters_hold_for_each_of_their_triangles(name):
         exact = np.abs(determinants(shape, projection))[shape.clusters.face]
         certain = volume >= placed.least_volume[0]
         assert (exact[certain] >= placed.least_det[0]).all()
+        assert not certain[shape.clusters.face % 4 == 0].any()
         sound += certain.sum()
         ids = drawn.triangle_id[rows, columns]
         trusted = np.isin(ids, np.flatnonzero(np.abs(determinants(shape, projection)) >= placed.least_det[0]))
         assert (drawn.inverse_depth[rows, columns][trusted] <= placed.nearest[0] * (1 + SLACK)).all()
-    assert sound > CLUSTER or name in ("inside", "wide")  # across the plane of the eye nothing is certain
+    assert sound > CLUSTER // 2 or name in ("inside", "wide")  # across the plane of the eye nothing is certain
 
 
 def determinants(shape, projection):

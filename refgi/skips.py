@@ -29,6 +29,7 @@ SKIPS: Mapping[str, Skip] = MappingProxyType({
     "frame.lobes": Skip("the lobes of receivers, where no visible surface is glossy", "pixels"),
     "rsm.channels": Skip("channels of a G-buffer that nothing reads yet", "channels, summed over passes"),
     "rsm.texels": Skip("channels of an RSM's texels that are no pixel light", "texels, once a look-up"),
+    "rsm.clusters": Skip("clusters of triangles that lie behind others", "clusters, once a band of rows"),
     "lights.refraction": Skip("the search for glass in maps, where no material is glass", "texels, once a search"),
     "pairs.pixels": Skip("pixels without surface", "pixels"),
     "pairs.tiles": Skip("diffuse lights that all receivers of a tile lie behind, or that lie behind all of these",

@@ -29,6 +29,7 @@ CASES = {
                     (BOX, "hssil", "visibility=bitmask"), (BOX, "gather", "disc.samples=8"), (BOX, "vpl", "lights=16")],
     "rsm.channels": [(BOX, "sii", "lights=16")],
     "rsm.texels": [(BOX, "sii", "lights=16")],
+    "rsm.clusters": [("cornell_sphere:faces=5000", "sii", "lights=16")],
     "lights.refraction": [(BOX, "sii", "lights=16"), (BOX, "sii", "lights=16", "source.refraction=two_interface")],
     "pairs.pixels": [(WEDGE, "sii", "lights=70"), (BOX, "sii", "lights=70", "pairs.clamp=sphere"),
                      (WEDGE, "val", "lights=32", "clusters=3"), (BOX, "val", "lights=16", "pairs.clamp=sphere"),
@@ -58,6 +59,7 @@ WORK = {
     "frame.lobes": {"rsm.buffers.glossy.direct_lobes": None},
     "rsm.channels": {"rsm.buffers.gbuffer._planes": lambda names, *_: len(names)},
     "rsm.texels": {"rsm.buffers.gbuffer._planes": lambda _, shape, *__: math.prod(shape)},
+    "rsm.clusters": {"rsm.raster.visibility_buffer._draw_bands": lambda *arguments: not arguments[5]},
     "lights.refraction": {"lights.refraction._refracted": None},
     "pairs.pixels": {"pairs.irradiance.taken": lambda _, places: len(places),
                      "cluster.lighting.clustered.scatter_pixels": lambda values, *_: values.shape[1],
@@ -134,7 +136,7 @@ def test_a_skip_fires_and_changes_no_bit(name, case, work, evidence):
     """The work is done with the skip off, the bits are the same."""
     place, method, *changes = case
     scene, settings = load_scene(place), settings_of(method, *changes)
-    options = LARGER if name in ("pairs.tiles", "pairs.lobe_tiles", "sssil.senders") else OPTIONS
+    options = LARGER if name in ("pairs.tiles", "pairs.lobe_tiles", "sssil.senders", "rsm.clusters") else OPTIONS
     with skips.count_skips() as counts:
         digest(scene, method, settings, options)
     assert 0 < counts[name].left_out <= counts[name].of

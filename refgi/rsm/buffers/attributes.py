@@ -102,6 +102,7 @@ def resolve(
     """
     workers, height, width = len(scratch.line), projection.height, projection.width
     strips = (height + ROWS - 1) // ROWS  # of a map
+    painted = channels.albedo | channels.material_id
     for worker in prange(workers):
         runs, records, line = _runs_of(scratch, worker), _records_of(scratch, worker), scratch.line[worker]
         for strip in range(worker, strips * len(projection.origin), workers):
@@ -110,7 +111,7 @@ def resolve(
             for left in range(0, width, SIDE):
                 tile = Tile(m * height + first, left, min(ROWS, height - first), min(SIDE, width - left))
                 count = find_runs(triangle_id, tile.top, tile.top + tile.rows, left, left + tile.columns, runs, records)
-                describe(surface, projection, m, count, records)
+                describe(surface, projection, m, count, painted, records)
                 _fill(projection, tile, False, len(surface.normals) > 0, runs, records, line, channels, planes)
 
 
@@ -159,6 +160,7 @@ def resolve_at(
     """
     runs, records, line = _runs_of(scratch, 0), _records_of(scratch, 0), scratch.line[0]
     width, height, done = projection.width, projection.height, 0
+    painted = channels.albedo | channels.material_id
     while done < len(texel):  # as many as follow one another on the same map
         m, count = texel[done] // width // height, 0
         while count < BATCH and done + count < len(texel) and texel[done + count] // width // height == m:
@@ -169,7 +171,7 @@ def resolve_at(
             write_ray(projection, row, column, count, line)
             count += 1
         runs.first[0, count], runs.number[0] = count, count
-        describe(surface, projection, m, count + 1, records)
+        describe(surface, projection, m, count + 1, painted, records)
         tile = Tile(m * height, done, 1, count)
         _fill(projection, tile, True, len(surface.normals) > 0, runs, records, line, channels, planes)
         done += count

@@ -15,8 +15,9 @@ from refgi.jit import kernel, prange
 from refgi.radiometry import FOR_FLOAT32, POINT, SPOT, falloff_in_float64, incident_light
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.reflective import Rsm
+from refgi.rsm.buffers.texel_rays import row_view
 from refgi.rsm.pool import plane
-from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection, image_point, texel_coordinates
+from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection, image_of_view, texel_coordinates
 from refgi.scene.model import Light, LightTable, light_table
 from refgi.stages import stage
 
@@ -98,7 +99,7 @@ def _shadow_lookup(
 def _shadow_lookup_rows(
     maps: Projection, receivers: SurfacePoints, shadow_map: ShadowMap, first: int, step: int, visible: Array
 ) -> None:
-    """Look up every `step`-th row; what needs no branch is done for a whole row first, in SIMD lanes."""
+    """Look up every `step`-th row: a whole row is projected first, in SIMD lanes, then what lies on a map is listed."""
     position, normal, covered = receivers.position, receivers.normal, receivers.covered
     width = visible.shape[1]
     nearest_texel, receiver_depth, above_plane = np.empty(width, np.int32), np.empty(width), np.empty(width)
@@ -131,14 +132,24 @@ def _shadow_lookup_rows(
 @kernel
 def _project_row(maps: Projection, position: Array, row: int, nearest_texel: Array, receiver_depth: Array) -> None:
     """Write the texel of the first map that sees each point, as `texel_of` does, or -1, and the point's depth."""
-    half, width = maps.half, np.int32(maps.width)
+    half, width = (maps.half[0], maps.half[1]), np.int32(maps.width)
+    curved, parallel = maps.kind == PARABOLOID, maps.kind == ORTHOGRAPHIC
     last_row = np.int32(len(maps.origin) * maps.height - 1)
     nearest_texel[:] = -1
     for m in range(len(maps.origin)):
+        # read once: the compiler does not see that what is written lies elsewhere
+        ox, oy, oz, rx, ry, rz, qx, qy, qz, fx, fy, fz = row_view(maps, m * maps.height)[0]
         for x in range(len(nearest_texel)):
-            u, v, depth = image_point(maps, m, position[0, row, x], position[1, row, x], position[2, row, x])
+            px, py, pz = position[0, row, x] - ox, position[1, row, x] - oy, position[2, row, x] - oz
+            a, b, depth = rx * px + ry * py + rz * pz, qx * px + qy * py + qz * pz, fx * px + fy * py + fz * pz
+            if curved:
+                u, v, depth = image_of_view(PARABOLOID, a, b, depth)
+            else:
+                u = a if parallel else (a / depth if depth > 0.0 else np.nan)
+                v = b if parallel else (b / depth if depth > 0.0 else np.nan)
             inside = (nearest_texel[x] < 0) & (abs(u) <= half[0]) & (abs(v) <= half[1])
-            column, line = texel_coordinates(maps, m, u if inside else 0.0, v if inside else 0.0)
+            column, line = texel_coordinates(half, maps.height, maps.width, m, u if inside else 0.0,
+                                             v if inside else 0.0)
             # int32, as no SIMD lanes of AVX2 turn float64 into int64
             texel = min(np.int32(line), last_row) * width + min(np.int32(column), width - np.int32(1))
             nearest_texel[x] = np.int32(texel) if inside else nearest_texel[x]

@@ -70,10 +70,13 @@ def barycentric_axes(v0: Any, v1: Any, v2: Any, origin: Any) -> Any:
 
 
 @kernel
-def describe(surface: Surface, projection: Projection, m: int, count: int, records: Records) -> None:
+def describe(
+    surface: Surface, projection: Projection, m: int, count: int, painted: bool, records: Records
+) -> None:
     """Fill the records of triangles that map `m` sees.
 
-    `count`: one past the last record. `records`: `face` is read, all else is written.
+    `count`: one past the last record. `painted`: whether material and albedo are read. `records`: `face` is read, all
+    else is written.
     """
     batch, fixed = records.batch, records.fixed
     smooth = len(surface.normals) > 0
@@ -81,12 +84,13 @@ def describe(surface: Surface, projection: Projection, m: int, count: int, recor
         size = min(BATCH, count - base)
         _gather(surface, records.face, base, size, batch)
         _orient(projection, m, batch)
+        _bound(projection, m, batch)
         if smooth and projection.kind == ORTHOGRAPHIC:
             _mix_parallel(projection, m, batch)
         elif smooth:
             _mix_central(projection, m, batch)
         columns = COLUMNS if smooth else MIXED
-        for b in range(size):
+        for b in range(size if painted else 0):
             face = records.face[base + b]
             material = surface.material_of_face[face]
             records.material[base + b] = material
@@ -138,21 +142,28 @@ def _orient(projection: Projection, m: int, batch: Array) -> None:
         batch[at * BATCH + b], batch[(at + 1) * BATCH + b], batch[(at + 2) * BATCH + b] = gx, gy, gz
         at, nx, ny, nz = INPUTS + NORMAL, nx * scale, ny * scale, nz * scale
         batch[at * BATCH + b], batch[(at + 1) * BATCH + b], batch[(at + 2) * BATCH + b] = nx, ny, nz
-        _bound(projection.kind == PARABOLOID, b, (ox, oy, oz), (dx, dy, dz), batch)
 
 
 @kernel
-def _bound(by_distance: bool, b: int, origin: Any, forward: Any, batch: Array) -> None:
-    """Write the least and greatest t of a triangle's points ahead: of its corners, or 0 where rays have unit length."""
-    least, greatest = np.inf, 0.0
-    for corner in range(3):
-        at = 3 * corner * BATCH + b
-        x, y, z = batch[at] - origin[0], batch[at + BATCH] - origin[1], batch[at + 2 * BATCH] - origin[2]
-        along = x * forward[0] + y * forward[1] + z * forward[2]
-        t = math.sqrt(x * x + y * y + z * z) if by_distance else along
-        least, greatest = min(least, t), max(greatest, t)
-    batch[(INPUTS + RANGE) * BATCH + b] = 0.0 if by_distance else max(least, 0.0)
-    batch[(INPUTS + RANGE + 1) * BATCH + b] = greatest
+def _bound(projection: Projection, m: int, batch: Array) -> None:
+    """Write the least and greatest t of triangles' points ahead: of their corners, or 0 where rays have unit length.
+
+    A loop of its own: called for one triangle, it would keep the caller's loop from becoming SIMD code.
+    """
+    ox, oy, oz = projection.origin[m, 0], projection.origin[m, 1], projection.origin[m, 2]
+    dx, dy, dz = projection.frame[m, 2, 0], projection.frame[m, 2, 1], projection.frame[m, 2, 2]
+    by_distance = projection.kind == PARABOLOID
+    for b in range(BATCH):
+        least, greatest = np.inf, 0.0
+        for corner in range(3):
+            at = 3 * corner * BATCH + b
+            x, y, z = batch[at] - ox, batch[at + BATCH] - oy, batch[at + 2 * BATCH] - oz
+            t = x * dx + y * dy + z * dz
+            if by_distance:
+                t = math.sqrt(x * x + y * y + z * z)
+            least, greatest = min(least, t), max(greatest, t)
+        batch[(INPUTS + RANGE) * BATCH + b] = 0.0 if by_distance else max(least, 0.0)
+        batch[(INPUTS + RANGE + 1) * BATCH + b] = greatest
 
 
 @kernel

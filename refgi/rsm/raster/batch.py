@@ -27,7 +27,9 @@ Array = npt.NDArray[Any]
 NEAREST = 1e-9  # share of a triangle's size under which a hit is rounding: its plane holds the eye
 BATCH = 64  # triangles set up at once
 EMPTY = 0xFFFFFFFF  # key of a texel where nothing is; others have nearness in the upper half, EMPTY - id in the lower
-LIMIT, CORNERS, ROWS = 15 * BATCH, 16 * BATCH, 28  # where a batch's limits and corners start, and its rows in all
+# where a batch's limits, corners and determinants start, then centres of boxes' sides; its rows in all
+LIMIT, CORNERS, DET, SIDES, ROWS = 15 * BATCH, 16 * BATCH, 28 * BATCH, 29 * BATCH, 33
+STEP = tuple(np.uint64(rows * BATCH) for rows in range(6))  # how far apart a batch's rows are
 
 
 class Part(NamedTuple):
@@ -72,55 +74,66 @@ def draw(corners: Array, faces: Array, part: Part, width: int, holes: CutFaces |
 
     The loop over triangles is inside, because a call with arrays costs atomic reference counts, which threads share.
     """
-    members, boxes, stride = part.members, part.boxes, width + LANES
-    if holes is not None:
-        table, uv = lent(holes.table), holes.uv
     setup = np.zeros(ROWS * BATCH)
     for base in range(part.start, part.stop, BATCH):
         count = min(BATCH, part.stop - base)
-        gather(corners, faces, members, base, count, setup)
-        set_up(setup, width)
-        for b in range(count):
-            face = members[base + b]
+        gather(corners, faces, part.members, base, count, setup)
+        set_up(setup, count, width)
+        draw_rows(setup, part, base, count, None, width, holes, keys)
+
+
+@kernel
+def draw_rows(
+    setup: Array, part: Part, base: int, count: int, ids: Array | None, width: int, holes: CutFaces | None, keys: Array
+) -> None:
+    """Draw a batch that is set up, row by row.
+
+    `base`: first of its `count` members of `part`. `ids`: triangle that a member stands for; itself where absent.
+    """
+    members, boxes, stride = part.members, part.boxes, width + LANES
+    if holes is not None:
+        table, uv = lent(holes.table), holes.uv
+    for b in range(count):
+        face = members[base + b]
+        if holes is None:
+            earliness = EMPTY - np.int64(face if ids is None else ids[face])
+        else:
+            earliness = EMPTY - np.int64(holes.face[face])
+            mask = holes.mask[face]
+        nearest = key_of(setup[LIMIT + b], EMPTY)
+        a0, b0, c0, t0 = setup[b], setup[BATCH + b], setup[2 * BATCH + b], setup[3 * BATCH + b]
+        a1, b1, c1, t1 = setup[4 * BATCH + b], setup[5 * BATCH + b], setup[6 * BATCH + b], setup[7 * BATCH + b]
+        a2, b2, c2, t2 = setup[8 * BATCH + b], setup[9 * BATCH + b], setup[10 * BATCH + b], setup[11 * BATCH + b]
+        an, bn, cn = setup[12 * BATCH + b], setup[13 * BATCH + b], setup[14 * BATCH + b]
+        place_of_box = face - part.base
+        left, right = integer(boxes[place_of_box, 0]), integer(boxes[place_of_box, 1])
+        upper, lower = integer(boxes[place_of_box, 2]), integer(boxes[place_of_box, 3])
+        for row in range(max(upper, part.top), min(lower, part.bottom) + 1):
+            y = row + 0.5
+            r0, r1, r2, rn = b0 * y + c0, b1 * y + c1, b2 * y + c2, bn * y + cn
+            first, last = left, right
+            if last - first > SPAN_CUT:
+                first, last = shorten(first, last, a0, r0)
+                first, last = shorten(first, last, a1, r1)
+                first, last = shorten(first, last, a2, r2)
+            place, x0 = np.uint64((row - part.top) * stride + first), first + 0.5
             if holes is None:
-                earliness = EMPTY - np.int64(face)
+                # a multiple of LANES is SIMD code without a rest; lanes outside the triangle fail by themselves
+                for lane in range((last - first + LANES) & -LANES):
+                    at, x = place + np.uint64(lane), x0 + np.int32(lane)
+                    key, before = key_of(an * x + rn, earliness), keys[at]
+                    inside = (a0 * x + r0 >= t0) & (a1 * x + r1 >= t1) & (a2 * x + r2 >= t2)
+                    keys[at] = key if inside & (key <= nearest) & (key > before) else before
             else:
-                earliness = EMPTY - np.int64(holes.face[face])
-                mask = holes.mask[face]
-            nearest = key_of(setup[LIMIT + b], EMPTY)
-            a0, b0, c0, t0 = setup[b], setup[BATCH + b], setup[2 * BATCH + b], setup[3 * BATCH + b]
-            a1, b1, c1, t1 = setup[4 * BATCH + b], setup[5 * BATCH + b], setup[6 * BATCH + b], setup[7 * BATCH + b]
-            a2, b2, c2, t2 = setup[8 * BATCH + b], setup[9 * BATCH + b], setup[10 * BATCH + b], setup[11 * BATCH + b]
-            an, bn, cn = setup[12 * BATCH + b], setup[13 * BATCH + b], setup[14 * BATCH + b]
-            place_of_box = face - part.base
-            left, right = integer(boxes[place_of_box, 0]), integer(boxes[place_of_box, 1])
-            upper, lower = integer(boxes[place_of_box, 2]), integer(boxes[place_of_box, 3])
-            for row in range(max(upper, part.top), min(lower, part.bottom) + 1):
-                y = row + 0.5
-                r0, r1, r2, rn = b0 * y + c0, b1 * y + c1, b2 * y + c2, bn * y + cn
-                first, last = left, right
-                if last - first > SPAN_CUT:
-                    first, last = shorten(first, last, a0, r0)
-                    first, last = shorten(first, last, a1, r1)
-                    first, last = shorten(first, last, a2, r2)
-                place, x0 = np.uint64((row - part.top) * stride + first), first + 0.5
-                if holes is None:
-                    # a multiple of LANES is SIMD code without a rest; lanes outside the triangle fail by themselves
-                    for lane in range((last - first + LANES) & -LANES):
-                        at, x = place + np.uint64(lane), x0 + np.int32(lane)
-                        key, before = key_of(an * x + rn, earliness), keys[at]
-                        inside = (a0 * x + r0 >= t0) & (a1 * x + r1 >= t1) & (a2 * x + r2 >= t2)
-                        keys[at] = key if inside & (key <= nearest) & (key > before) else before
-                else:
-                    for column in range(first, last + 1):
-                        x, at = column + 0.5, np.uint64((row - part.top) * stride + column)
-                        key, e0, e1, e2 = key_of(an * x + rn, earliness), a0 * x + r0, a1 * x + r1, a2 * x + r2
-                        if (e0 >= t0) & (e1 >= t1) & (e2 >= t2) & (key <= nearest) & (key > keys[at]):
-                            scale = 1.0 / (e0 + e1 + e2)
-                            u = (e0 * uv[face, 0] + e1 * uv[face, 2] + e2 * uv[face, 4]) * scale
-                            v = (e0 * uv[face, 1] + e1 * uv[face, 3] + e2 * uv[face, 5]) * scale
-                            if is_opaque(table, mask, u, v):
-                                keys[at] = key
+                for column in range(first, last + 1):
+                    x, at = column + 0.5, np.uint64((row - part.top) * stride + column)
+                    key, e0, e1, e2 = key_of(an * x + rn, earliness), a0 * x + r0, a1 * x + r1, a2 * x + r2
+                    if (e0 >= t0) & (e1 >= t1) & (e2 >= t2) & (key <= nearest) & (key > keys[at]):
+                        scale = 1.0 / (e0 + e1 + e2)
+                        u = (e0 * uv[face, 0] + e1 * uv[face, 2] + e2 * uv[face, 4]) * scale
+                        v = (e0 * uv[face, 1] + e1 * uv[face, 3] + e2 * uv[face, 5]) * scale
+                        if is_opaque(table, mask, u, v):
+                            keys[at] = key
 
 
 @kernel
@@ -158,29 +171,36 @@ def gather(corners: Array, faces: Array, members: Array, base: int, count: int, 
 
 
 @kernel
-def set_up(setup: Array, width: int) -> None:
-    """Write edges, plane of nearness and limit of a batch from its corners, in SIMD lanes."""
-    for b in range(BATCH):
-        at = CORNERS + b
-        xi, yi, wi, ni = setup[at], setup[at + BATCH], setup[at + 2 * BATCH], setup[at + 3 * BATCH]
-        xj, yj, wj, nj = setup[at + 4 * BATCH], setup[at + 5 * BATCH], setup[at + 6 * BATCH], setup[at + 7 * BATCH]
-        xk, yk, wk, nk = setup[at + 8 * BATCH], setup[at + 9 * BATCH], setup[at + 10 * BATCH], setup[at + 11 * BATCH]
+def set_up(setup: Array, count: int, width: int) -> None:
+    """Write edges, plane of nearness, limit and determinant of `count` triangles from their corners, in SIMD lanes."""
+    for lane in range((count + LANES - 1) & -LANES):
+        b = np.uint64(lane)
+        at = b + np.uint64(CORNERS)
+        xi, yi, wi, ni = setup[at], setup[at + STEP[1]], setup[at + STEP[2]], setup[at + STEP[3]]
+        at += STEP[4]
+        xj, yj, wj, nj = setup[at], setup[at + STEP[1]], setup[at + STEP[2]], setup[at + STEP[3]]
+        at += STEP[4]
+        xk, yk, wk, nk = setup[at], setup[at + STEP[1]], setup[at + STEP[2]], setup[at + STEP[3]]
         det = ((xj - xi) * (yk - yi) - (xk - xi) * (yj - yi)) * (wi * wj * wk)
         sign = 1.0 if det > 0.0 else -1.0
         a0, b0, c0, t0 = edge(xj, yj, wj, xk, yk, wk, sign)
         a1, b1, c1, t1 = edge(xk, yk, wk, xi, yi, wi, sign)
         a2, b2, c2, t2 = edge(xi, yi, wi, xj, yj, wj, sign)
         scale = sign / det
-        setup[b], setup[BATCH + b], setup[2 * BATCH + b], setup[3 * BATCH + b] = a0, b0, c0, t0
-        setup[4 * BATCH + b], setup[5 * BATCH + b], setup[6 * BATCH + b], setup[7 * BATCH + b] = a1, b1, c1, t1
-        setup[8 * BATCH + b], setup[9 * BATCH + b], setup[10 * BATCH + b], setup[11 * BATCH + b] = a2, b2, c2, t2
-        setup[12 * BATCH + b] = (a0 * ni + a1 * nj + a2 * nk) * scale
-        setup[13 * BATCH + b] = (b0 * ni + b1 * nj + b2 * nk) * scale
-        setup[14 * BATCH + b] = (c0 * ni + c1 * nj + c2 * nk) * scale
+        setup[b], setup[b + STEP[1]], setup[b + STEP[2]], setup[b + STEP[3]] = a0, b0, c0, t0
+        at = b + STEP[4]
+        setup[at], setup[at + STEP[1]], setup[at + STEP[2]], setup[at + STEP[3]] = a1, b1, c1, t1
+        at += STEP[4]
+        setup[at], setup[at + STEP[1]], setup[at + STEP[2]], setup[at + STEP[3]] = a2, b2, c2, t2
+        at += STEP[4]
+        setup[at] = (a0 * ni + a1 * nj + a2 * nk) * scale
+        setup[at + STEP[1]] = (b0 * ni + b1 * nj + b2 * nk) * scale
+        setup[at + STEP[2]] = (c0 * ni + c1 * nj + c2 * nk) * scale
         size = max(_size(xi, yi, wi, width), max(_size(xj, yj, wj, width), _size(xk, yk, wk, width)))
         # no area, or seen edge-on: nothing is near enough
         limit = 1.0 / (NEAREST * size)
-        setup[LIMIT + b] = limit if (det != 0.0) & (limit > 0.0) else 0.0
+        setup[at + STEP[3]] = limit if (det != 0.0) & (limit > 0.0) else 0.0
+        setup[b + np.uint64(DET)] = det
 
 
 @kernel

@@ -181,10 +181,11 @@ def texel_of(projection: Projection, x: float, y: float, z: float) -> tuple[floa
     `x`, `y`, `z`: the point, world space, m. Result: continuous row and column in the stacked maps, and depth as in
     `project`.
     """
+    half = projection.half[0], projection.half[1]
     for m in range(projection.origin.shape[0]):
         u, v, depth = image_point(projection, m, x, y, z)
-        if abs(u) <= projection.half[0] and abs(v) <= projection.half[1]:
-            column, row = texel_coordinates(projection, m, u, v)
+        if abs(u) <= half[0] and abs(v) <= half[1]:
+            column, row = texel_coordinates(half, projection.height, projection.width, m, u, v)
             return row, column, depth
     return np.nan, np.nan, np.nan
 
@@ -197,25 +198,34 @@ def image_point(projection: Projection, m: int, x: float, y: float, z: float) ->
     depth as in `project`.
     """
     a, b, depth = view_coordinates(projection, m, x, y, z)
-    if projection.kind == ORTHOGRAPHIC:
+    return image_of_view(projection.kind, a, b, depth)
+
+
+@kernel
+def image_of_view(kind: int, a: float, b: float, depth: float) -> tuple[float, float, float]:
+    """Return the image point, as `image_point` does, of a point given along right, down and forward."""
+    if kind == ORTHOGRAPHIC:
         return a, b, depth
     scale, ahead = depth, depth > 0.0
-    if projection.kind == PARABOLOID:
+    if kind == PARABOLOID:
         distance = math.sqrt(a * a + b * b + depth * depth)
         scale, ahead, depth = distance + depth, (depth >= 0.0) & (distance > 0.0), distance
     return (a / scale if ahead else np.nan), (b / scale if ahead else np.nan), depth
 
 
 @kernel
-def texel_coordinates(projection: Projection, m: int, u: float, v: float) -> tuple[float, float]:
+def texel_coordinates(
+    half: tuple[float, float], height: int, width: int, m: int, u: float, v: float
+) -> tuple[float, float]:
     """Return continuous column and row, in the stacked maps, of a point of the image plane of map `m`.
 
-    `u`, `v`: horizontal and vertical coordinate.
+    `half`: half extent of the map. `height`, `width`: its rows and columns. `u`, `v`: horizontal and vertical
+    coordinate.
     """
-    column = (u / projection.half[0] + 1.0) * 0.5 * projection.width
-    row = (v / projection.half[1] + 1.0) * 0.5 * projection.height
+    column = (u / half[0] + 1.0) * 0.5 * width
+    row = (v / half[1] + 1.0) * 0.5 * height
     # the bottom border is the map's own; of the sum, as adding rounds up to the next map's first row
-    return column, min(row + m * projection.height, (m + 1) * projection.height * (1.0 - 1e-16))
+    return column, min(row + m * height, (m + 1) * height * (1.0 - 1e-16))
 
 
 @kernel

@@ -91,13 +91,25 @@ def _bound_crossing(corners: Array, faces: Array, first: int, last: int, size: t
         w = corners[i, 2], corners[j, 2], corners[k, 2], corners[i, 2]
         if w[0] > 0.0 and w[1] > 0.0 and w[2] > 0.0:
             continue
-        low, high = _open_interval((corners[i, 0], corners[j, 0], corners[k, 0], corners[i, 0]), w)
-        left, right = centres_between(low, high, size[0])
-        low, high = _open_interval((corners[i, 1], corners[j, 1], corners[k, 1], corners[i, 1]), w)
-        top, bottom = centres_between(low, high, size[1])
-        if left > right or top > bottom:
-            left, right, top, bottom = 1, 0, 0, 0
+        columns = corners[i, 0], corners[j, 0], corners[k, 0], corners[i, 0]
+        rows = corners[i, 1], corners[j, 1], corners[k, 1], corners[i, 1]
+        left, right, top, bottom = crossing_box(columns, rows, w, size)
         boxes[place, 0], boxes[place, 1], boxes[place, 2], boxes[place, 3] = left, right, top, bottom
+
+
+@kernel
+def crossing_box(columns: Any, rows: Any, w: Any, size: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Return the texels that the part of a triangle in front of the eye may cover.
+
+    `columns`, `rows`, `w`: of its corners, the first again at the end. Result: as `bound_triangles` writes it.
+    """
+    low, high = _open_interval(columns, w)
+    left, right = centres_between(low, high, size[0])
+    low, high = _open_interval(rows, w)
+    top, bottom = centres_between(low, high, size[1])
+    if left > right or top > bottom:
+        left, right, top, bottom = 1, 0, 0, 0
+    return left, right, top, bottom
 
 
 @kernel

@@ -1,9 +1,10 @@
 """The visibility buffer: nearest triangle and its inverse depth at every texel.
 
-Work is split by rows. One map is cut into bands; each band keeps the list of triangles that reach it, in mesh order,
-and draws them alone, so that the result does not depend on the height of a band or the number of threads. Several maps
-are drawn one map per task without lists. Whoever draws has keys of nearness and id of its own and writes the planes at
-the end. Depth is kept as nearness in float32, ties go to the lowest id.
+Work is split by rows. One map is cut into bands; each band keeps the list of clusters that reach it, the nearest first,
+and draws them alone. Several maps are drawn one map per task, triangle by triangle in mesh order. Whoever draws has
+keys of nearness and id of its own and writes the planes at the end. The greatest key at a texel depends on no order, so
+neither the height of a band nor the number of threads changes the result. Depth is kept as nearness in float32, ties go
+to the lowest id.
 """
 
 from typing import Any, NamedTuple
@@ -14,18 +15,23 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
+from refgi.rsm.raster.bands import bands, part_of, project_all
 from refgi.rsm.raster.batch import EMPTY, Part, draw, unpack
+from refgi.rsm.raster.cluster_batch import draw_clusters, local_scratch
 from refgi.rsm.raster.paraboloid import cut_chunks, draw_paraboloids
+from refgi.rsm.raster.placed_clusters import Placed, list_clusters, place
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.rsm.raster.triangle import LANES, bound_triangles, project_vertices
+from refgi.scene.clusters import Clusters
 from refgi.scene.cutouts import CutFaces
 from refgi.scene.model import Geometry
+from refgi.skips import left_out
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
 BATCH = 1024  # triangles whose boxes are found before they are drawn on one of several maps
-CHUNKS = 32  # pieces of the list of triangles that are counted and listed on their own
+MOST_ROWS = 64  # of a band: its keys stay in cache
 
 
 class Visibility(NamedTuple):
@@ -35,12 +41,11 @@ class Visibility(NamedTuple):
     inverse_depth: Array  # (H, W) float32: 1/depth, 1/m; orthographic 1 - depth/reach; 0: nothing
 
 
-class Bands(NamedTuple):
-    """Triangles by band of rows."""
+class ClusterLists(NamedTuple):
+    """Clusters by band of rows."""
 
-    boxes: Array  # (m, 4) uint16: first and last column, first and last row; first > last: covers nothing
-    starts: Array  # (bands + 1,) where each band's triangles start in `members`
-    members: Array  # (...) int32: triangles of band 0, of band 1, ..., each in mesh order; then CHUNKS of no meaning
+    starts: Array  # (bands + 1,) where each band's clusters start in `members`
+    members: Array  # (...) int32: clusters of band 0, of band 1, ..., the nearest first
     rows: int  # height of a band
 
 
@@ -50,6 +55,7 @@ class Cut(NamedTuple):
     faces: Array  # (c, 3) int32: vertices of each
     holes: CutFaces
     lists: Any  # Bands, of the same rows as those of the others; None for several maps
+    corners: Any  # (n, 4) float64: projected vertices of the geometry; None for several maps
 
 
 class Scratch(NamedTuple):
@@ -87,7 +93,7 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     is there, at the texel's centre.
     """
     vertices, faces = geometry.vertices, geometry.without_cut
-    cut = None if geometry.cut is None else Cut(geometry.faces[geometry.cut.face], geometry.cut, None)
+    cut = None if geometry.cut is None else Cut(geometry.faces[geometry.cut.face], geometry.cut, None, None)
     height, width = projection.shape
     visibility = Visibility(plane((height, width), np.int32), plane((height, width), np.float32))
     workers = numba.get_num_threads()
@@ -97,14 +103,12 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     elif projection.maps > 1:
         _draw_maps(projection, vertices, faces, cut, scratch(workers, len(vertices), projection), visibility)
     else:
-        corners, cells = plane((len(vertices), 4), np.float64), plane((len(vertices), 4), np.int32)
-        _project(projection, vertices, corners, cells)
-        rows = min(band_rows or min(max(height // 32, 4), 32), height)
-        keys = plane((workers, rows * (width + LANES)), np.int64)
-        lists = bands(corners, cells, faces, width, height, rows)
+        rows = min(band_rows or min(max(height // (8 * workers), 4), MOST_ROWS), height)
         if cut is not None:
-            cut = cut._replace(lists=bands(corners, cells, cut.faces, width, height, rows))
-        _draw_bands(corners, faces, lists, cut, keys, visibility)
+            corners, cells = plane((len(vertices), 4), np.float64), plane((len(vertices), 4), np.int32)
+            project_all(projection, vertices, corners, cells)
+            cut = cut._replace(lists=bands(corners, cells, cut.faces, width, height, rows), corners=corners)
+        _draw_clusters(projection, geometry, rows, cut, visibility)
     return visibility
 
 
@@ -122,80 +126,41 @@ def scratch(workers: int, vertices: int, projection: Projection) -> Scratch:
     )
 
 
-def bands(corners: Array, cells: Array, faces: Array, width: int, height: int, rows: int) -> Bands:
-    """List the triangles of each band of rows.
-
-    `corners` (n, 4): projected vertices. `cells` (n, 4) int: the texels that each lies between. `faces` (m, 3):
-    vertices of each triangle. `width`, `height`: size of the map. `rows`: height of a band. Result: the lists, in mesh
-    order.
-    """
-    boxes = plane((len(faces), 4), np.uint16)
-    band_of = np.arange(height, dtype=np.int32) // np.int32(rows)
-    counts = np.zeros((CHUNKS, band_of[-1] + 1), np.int64)
-    _count(corners, cells, faces, (width, height), band_of, boxes, counts)
-    ends = np.cumsum(counts.T).reshape(counts.T.shape)  # band by band, chunk by chunk
-    members = plane((int(ends[-1, -1]) + CHUNKS,), np.int32)
-    _list(boxes, band_of, np.ascontiguousarray((ends - counts.T).T), members)
-    return Bands(boxes, np.concatenate([[0], ends[:, -1]]), members, rows)
-
-
-@kernel(parallel=True)
-def _project(projection: Projection, vertices: Array, corners: Array, cells: Array) -> None:
-    step = -(-len(vertices) // CHUNKS)
-    for chunk in prange(CHUNKS):
-        last = min((chunk + 1) * step, len(vertices))
-        project_vertices(projection, 0, vertices, chunk * step, last, corners, cells)
-
-
-@kernel(parallel=True)
-def _count(
-    corners: Array, cells: Array, faces: Array, size: tuple[int, int], band_of: Array, boxes: Array, counts: Array
+def _draw_clusters(
+    projection: Projection, geometry: Geometry, rows: int, cut: Cut | None, visibility: Visibility
 ) -> None:
-    step = -(-len(faces) // CHUNKS)
-    for chunk in prange(CHUNKS):
-        first, last = min(chunk * step, len(faces)), min((chunk + 1) * step, len(faces))
-        bound_triangles(corners, cells, faces, first, last, size, boxes[first:last])
-        for face in range(first, last):
-            upper, lower = band_of[boxes[face, 2]], band_of[boxes[face, 3]]
-            counts[chunk, upper] += boxes[face, 0] <= boxes[face, 1]
-            for band in range(upper + 1, lower + 1):
-                counts[chunk, band] += 1
+    """Draw one map in bands of rows, each from the clusters that reach it, the nearest first."""
+    clusters, (height, width) = geometry.clusters, projection.shape
+    placed, starts = place(projection, clusters), np.zeros(-(-height // rows) + 1, np.int64)
+    members = list_clusters(placed.rect, np.argsort(-placed.nearest, kind="stable"), rows, starts)
+    lists, passed = ClusterLists(starts, members, rows), np.zeros(len(starts) - 1, np.int64)
+    keys = plane((numba.get_num_threads(), rows * (width + LANES)), np.int64)
 
+    def draw_all(passing: bool) -> tuple[int, int]:
+        _draw_bands(projection, clusters, placed, lists, cut, passing, keys, passed, visibility)
+        return int(passed.sum()), len(members)
 
-@kernel(parallel=True)
-def _list(boxes: Array, band_of: Array, cursors: Array, members: Array) -> None:
-    step = -(-len(boxes) // CHUNKS)
-    for chunk in prange(CHUNKS):
-        spare = len(members) - 1 - chunk  # takes what covers nothing: no branch for it
-        for face in range(chunk * step, min((chunk + 1) * step, len(boxes))):
-            upper, lower = band_of[boxes[face, 2]], band_of[boxes[face, 3]]
-            there, cursor = boxes[face, 0] <= boxes[face, 1], cursors[chunk, upper]
-            members[cursor if there else spare] = face
-            cursors[chunk, upper] = cursor + there
-            for band in range(upper + 1, lower + 1):
-                members[cursors[chunk, band]] = face
-                cursors[chunk, band] += 1
+    draw_all(left_out("rsm.clusters", lambda: draw_all(True)))
 
 
 @kernel(parallel=True)
 def _draw_bands(
-    corners: Array, faces: Array, lists: Bands, cut: Cut | None, keys: Array, visibility: Visibility
+    projection: Projection, clusters: Clusters, placed: Placed, lists: ClusterLists, cut: Cut | None, passing: bool,
+    keys: Array, passed: Array, visibility: Visibility,
 ) -> None:
     workers, (height, width) = len(keys), visibility.triangle_id.shape
+    starts, rows = lists.starts, lists.rows
     for worker in prange(workers):
-        band_keys = keys[worker]
-        for band in range(worker, len(lists.starts) - 1, workers):  # interleaved: neighbours cost alike
-            top, bottom = band * lists.rows, min((band + 1) * lists.rows, height) - 1
+        band_keys, local = keys[worker], local_scratch()
+        for band in range(worker, len(starts) - 1, workers):  # interleaved: neighbours cost alike
+            top, bottom = band * rows, min((band + 1) * rows, height) - 1
+            members = lists.members[starts[band] : starts[band + 1]]
             band_keys[:] = EMPTY
-            draw(corners, faces, _part_of(lists, band, top, bottom), width, None, band_keys)
+            passed[band] = draw_clusters(projection, clusters, placed, members, (top, bottom), passing, local,
+                                         band_keys)
             if cut is not None:
-                draw(corners, cut.faces, _part_of(cut.lists, band, top, bottom), width, cut.holes, band_keys)
+                draw(cut.corners, cut.faces, part_of(cut.lists, band, top, bottom), width, cut.holes, band_keys)
             unpack(band_keys, width, top, bottom, visibility.inverse_depth, visibility.triangle_id)
-
-
-@kernel
-def _part_of(lists: Bands, band: int, top: int, bottom: int) -> Part:
-    return Part(lists.members, lists.starts[band], lists.starts[band + 1], lists.boxes, 0, top, bottom)
 
 
 @kernel(parallel=True)

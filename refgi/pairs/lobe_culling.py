@@ -68,14 +68,14 @@ def bound_parts(tile: Array, size: int, spheres: Array) -> bool:
     total = 0.0
     for part in range(PARTS):
         first = part * lanes if part * lanes < size else 0
-        _bound(tile, first, min(first + lanes, size), spheres, part)
+        bound_part(tile, first, min(first + lanes, size), spheres, part)
         total += spheres[RADIUS, part]
-    _bound(tile, 0, size, spheres, PARTS)
+    bound_part(tile, 0, size, spheres, PARTS)
     return bool(total < 0.7 * PARTS * spheres[RADIUS, PARTS])
 
 
 @kernel
-def _bound(tile: Array, first: int, last: int, spheres: Array, column: int) -> None:
+def bound_part(tile: Array, first: int, last: int, spheres: Array, column: int) -> None:
     real = tile.dtype.type
     for axis in range(3):
         low = high = tile[X + axis, first]
@@ -92,31 +92,24 @@ def _bound(tile: Array, first: int, last: int, spheres: Array, column: int) -> N
 
 @kernel
 def lobes_in_reach(
-    lights: Array, bounds: Array, first: int, last: int, spheres: Array, listed: Array | None, scratch: Array,
-    chosen: Array,
+    lights: Array, bounds: Array, first: int, last: int, spheres: Array, scratch: Array, chosen: Array,
 ) -> int:
     """List the lobes first to last - 1 that may light a tile, rising, in `chosen`, and return how many.
 
     `lights` (13, N) hold position, reversed normal and reversed axis first, `bounds` come from `bound_lobes`, `spheres`
-    bound the tile. `listed` (N,) is the tile's light list; without it the whole tile's sphere decides. `scratch` is
-    (MEASURES, >= last - first).
+    bound the tile in their last column. `scratch` is (MEASURES, >= last - first).
     """
     count = 0
-    if listed is None:
-        sphere = spheres[0, PARTS], spheres[1, PARTS], spheres[2, PARTS], spheres[3, PARTS]
-        for k in range(first, last):
-            i = k - first
-            scratch[ABOVE, i], scratch[NEAREST, i], scratch[GAP, i] = _measure(load_light(lights, k), sphere)
-            for row in range(BOUNDS):
-                scratch[row, i] = bounds[row, k]
-        _test_reach(scratch, last - first)
-        for k in range(first, last):
-            chosen[count] = k
-            count += scratch[PASSED, k - first] > 0
-    else:
-        for k in range(first, last):
-            chosen[count] = k
-            count += listed[k]
+    sphere = spheres[0, PARTS], spheres[1, PARTS], spheres[2, PARTS], spheres[3, PARTS]
+    for k in range(first, last):
+        i = k - first
+        scratch[ABOVE, i], scratch[NEAREST, i], scratch[GAP, i] = _measure(load_light(lights, k), sphere)
+        for row in range(BOUNDS):
+            scratch[row, i] = bounds[row, k]
+    _test_reach(scratch, last - first)
+    for k in range(first, last):
+        chosen[count] = k
+        count += scratch[PASSED, k - first] > 0
     return count
 
 

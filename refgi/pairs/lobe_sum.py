@@ -74,8 +74,9 @@ def add_lobes(
         How exponents fall near the light; None keeps them.
     reach : Range or None
         Which pairs count, and how much (procedure P3); None: all.
-    listed : (ceil(n / TILE), N) ndarray of bool or None
-        Lights that may count for each tile; the others must not count for any of its receivers. None: all may.
+    listed : (ceil(n / LANES), N) ndarray of bool or None
+        Lights that may count for each part of a tile; the others must not count for any of its receivers. None: all
+        may.
     irradiance : (3, n) ndarray
         Added to, W/m^2.
 
@@ -88,7 +89,7 @@ def add_lobes(
     1e-15 m count as that; above them powers of 2 in flux and length scale E to the bit.
     """
     count = position.shape[1]
-    bounds = bound_lobes(lights[9], _whole_from(widening))
+    bounds = bound_lobes(lights[9], whole_from(widening))
     if reach is not None and not reach.outside:
         bound_range(bounds, reach.square, reach.scale)
     for block in prange((count + TILE - 1) // TILE):
@@ -96,15 +97,17 @@ def add_lobes(
         size = min(TILE, count - first)
         tile = np.zeros((ROWS + 5, TILE), position.dtype)
         load_tile(tile, position, normal, first, size)
-        row = None if listed is None else listed[block]
-        _add_lights(tile, size, lights, bounds, clamp, widening, reach, row)
+        if listed is None:
+            _add_lights(tile, size, lights, bounds, clamp, widening, reach)
+        else:
+            _add_listed(tile, block * PARTS, lights, bounds, clamp, widening, reach, listed)
         for c in range(3):
             for i in range(size):
                 irradiance[c, first + i] += tile[TOTAL + c, i]
 
 
 @kernel
-def _whole_from(widening: Widening | None) -> float:
+def whole_from(widening: Widening | None) -> float:
     """Return the distance from which on exponents are sure to be whole, m."""
     if widening is None:
         return -1.0
@@ -113,8 +116,7 @@ def _whole_from(widening: Widening | None) -> float:
 
 @kernel
 def _add_lights(
-    tile: Array, size: int, lights: Array, bounds: Array, clamp: Clamp, widening: Widening | None,
-    reach: Range | None, listed: Array | None,
+    tile: Array, size: int, lights: Array, bounds: Array, clamp: Clamp, widening: Widening | None, reach: Range | None,
 ) -> None:
     """Add all lights to the totals of a tile, group by group and in their order."""
     spheres = np.empty((4, PARTS + 1), tile.dtype)
@@ -122,7 +124,7 @@ def _add_lights(
     scratch, chosen = np.empty((MEASURES, GROUP), tile.dtype), np.empty(GROUP, np.int64)
     for group in range(0, lights.shape[1], GROUP):
         end = min(group + GROUP, lights.shape[1])
-        found = lobes_in_reach(lights, bounds, group, end, spheres, listed, scratch, chosen)
+        found = lobes_in_reach(lights, bounds, group, end, spheres, scratch, chosen)
         low, high = PARTS, 0
         for i in range(found):
             k, first, last = chosen[i], 0, PARTS
@@ -130,10 +132,53 @@ def _add_lights(
                 first, last = parts_in_reach(lights, bounds, k, spheres, scratch)
             if first < last:
                 low, high = min(low, first), max(high, last)
-                lanes = np.uint64(first * (TILE // PARTS)), np.uint64(last * (TILE // PARTS))
-                add_lobe(tile, lanes, lights, k, bounds[LIMIT, k], clamp, widening, reach)
+                add_lobe(tile, _lanes(first, last), lights, k, bounds[LIMIT, k], clamp, widening, reach)
         if low < high:
-            _close_group(tile, (np.uint64(low * (TILE // PARTS)), np.uint64(high * (TILE // PARTS))))
+            _close_group(tile, _lanes(low, high))
+
+
+@kernel
+def _add_listed(
+    tile: Array, row: int, lights: Array, bounds: Array, clamp: Clamp, widening: Widening | None, reach: Range | None,
+    listed: Array,
+) -> None:
+    """Add the lights that the lists of a tile's parts, rows of `listed` from `row` on, hold to the tile's totals."""
+    parts = min(PARTS, len(listed) - row)
+    some = np.empty(GROUP, np.bool_)
+    for group in range(0, lights.shape[1], GROUP):
+        end = min(group + GROUP, lights.shape[1])
+        if not _any_part(listed, row, parts, group, end, some):
+            continue
+        low, high = PARTS, 0
+        for k in range(group, end):
+            if some[k - group]:
+                first, last = PARTS, 0
+                for part in range(parts):
+                    if listed[row + part, k]:
+                        first, last = min(first, part), part + 1
+                low, high = min(low, first), max(high, last)
+                add_lobe(tile, _lanes(first, last), lights, k, bounds[LIMIT, k], clamp, widening, reach)
+        _close_group(tile, _lanes(low, high))
+
+
+@kernel
+def _any_part(listed: Array, row: int, parts: int, first: int, last: int, some: Array) -> bool:
+    """Fill `some` with which of the lights first to last - 1 are in any part's list; return whether one is."""
+    for k in range(first, last):
+        some[k - first] = listed[row, k]
+    for part in range(1, parts):
+        for k in range(first, last):
+            some[k - first] |= listed[row + part, k]
+    found = False
+    for k in range(last - first):
+        found |= some[k]
+    return found
+
+
+@kernel
+def _lanes(first: int, last: int) -> Any:
+    """Return the first lane of part `first` and the one after part last - 1."""
+    return np.uint64(first * (TILE // PARTS)), np.uint64(last * (TILE // PARTS))
 
 
 @kernel

@@ -100,9 +100,9 @@ def sum_pairs_in_range(
         black = lights.shape[1] - 1
         for group in range(0, black, GROUP):
             end = min(group + GROUP, black)
-            if not any_listed(listed, block, group, end):
+            found = list_chosen(listed, block, group, end, chosen)
+            if found == 0:
                 continue
-            found = _list_chosen(listed, block, group, end, chosen)
             chosen[found] = black
             for pair in range(0, found, 2):
                 a, b = chosen[pair], chosen[pair + 1]
@@ -156,20 +156,18 @@ def sum_weighted_pairs(
 
 
 @kernel
-def any_listed(listed: Array, block: int, first: int, last: int) -> bool:
-    """Return whether the light list (m, N) of tile `block` holds any of the lights first to last - 1."""
-    some = False
-    for k in range(first, last):
-        some |= listed[block, k]
-    return some
-
-
-@kernel
-def _list_chosen(listed: Array, block: int, first: int, last: int, chosen: Array) -> int:
+def list_chosen(listed: Array, block: int, first: int, last: int, chosen: Array) -> int:
+    """List those of the lights first to last - 1 that tile `block` has in its list, rising; return how many."""
     count = 0
-    for k in range(first, last):
-        chosen[count] = k
-        count += listed[block, k]
+    for group in range(first, last, GROUP):
+        end = min(group + GROUP, last)
+        some = False
+        for k in range(group, end):  # in lanes; most groups hold none
+            some |= listed[block, k]
+        if some:
+            for k in range(group, end):
+                chosen[count] = k
+                count += listed[block, k]
     return count
 
 

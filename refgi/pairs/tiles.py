@@ -165,21 +165,27 @@ def _put(some: Array, places: Array, values: Array) -> None:
 def bound_tile(tile: Array, size: int, low: Array, high: Array) -> None:
     """Fill the corners of the bounding boxes of a tile's first `size` positions (entries 0 to 2) and normals (3 to 5).
 
-    The tile is (>= 6, TILE), TILE a power of two.
+    The tile is (>= 6, lanes), with a power of two of lanes.
     """
+    bound_rows(tile, 0, 6, size, low, high, 0)
+
+
+@kernel
+def bound_rows(tile: Array, first: int, rows: int, size: int, low: Array, high: Array, entry: int) -> None:
+    """Fill entries from `entry` on with the extremes of the rows of a tile from `first` on, of `size` lanes."""
     # by halves, element by element, which runs in lanes; a running minimum would not
     lanes = tile.shape[1]
     least, most = np.empty(lanes, tile.dtype), np.empty(lanes, tile.dtype)
-    for row in range(6):
+    for row in range(rows):
         for i in range(lanes):
-            least[i] = most[i] = tile[row, i if i < size else 0]
+            least[i] = most[i] = tile[first + row, i if i < size else 0]
         half = lanes // 2
         while half > 0:
             for i in range(half):
                 least[i] = least[i + half] if least[i + half] < least[i] else least[i]
                 most[i] = most[i + half] if most[i + half] > most[i] else most[i]
             half //= 2
-        low[row], high[row] = least[0], most[0]
+        low[entry + row], high[entry + row] = least[0], most[0]
 
 
 @kernel

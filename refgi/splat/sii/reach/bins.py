@@ -82,16 +82,6 @@ def list_lights(position: Array, normal: Array, solids: Array) -> Array:
     return listed
 
 
-def of_whole_tiles(listed: Array) -> Array:
-    """Return the light lists of tiles of TILE receivers from those (m, N) of their parts of LANES: of any of them."""
-    parts = TILE // LANES
-    whole = listed[::parts].copy()
-    for part in range(1, parts):
-        some = listed[part::parts]
-        whole[: len(some)] |= some
-    return whole
-
-
 @kernel(parallel=True)
 def _list(position: Array, normal: Array, solids: Array, balls: bool, listed: Array) -> None:
     count, parts = position.shape[1], TILE // LANES

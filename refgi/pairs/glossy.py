@@ -131,7 +131,7 @@ def _add_lights(
                            Culls(behind, off_lobes), sums)
     lobes = packed.lobes
     if lobes is not None:
-        behind = listed[1] is None and left_out("pairs.lobe_tiles", lambda: lobe_tiles(*place, lobes, LANES))
+        behind = left_out("pairs.lobe_tiles", lambda: lobe_tiles(*place, lobes, LANES))
         add_glossy_lights(*place, of, *lobes, ranges[1], listed[1], Culls(behind, off_lobes), sums)
 
 

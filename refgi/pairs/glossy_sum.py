@@ -26,7 +26,7 @@ from refgi.pairs.lobe_culling import (
     lobes_in_reach,
 )
 from refgi.pairs.lobe_shape import Widening
-from refgi.pairs.lobe_sum import TERM, lobe_terms, whole_from
+from refgi.pairs.lobe_sum import AT_ONCE, TERM, lobe_terms, whole_from
 from refgi.pairs.pair_sum import (
     GROUP,
     NX,
@@ -51,7 +51,6 @@ Array = npt.NDArray[Any]
 
 M = ROWS + 5  # first further rows of a tile: those of `lobe_sum` come before
 GAP, EXPONENT, FARTHEST, TILE_ROWS = M + 3, M + 4, M + 5, M + 6
-AT_ONCE = 4 * GROUP  # lights that are listed at once
 
 
 class ReceiverLobes(NamedTuple):
@@ -185,12 +184,10 @@ def add_glossy_lights(
         scratch, chosen = np.empty((MEASURES, AT_ONCE), position.dtype), np.empty(AT_ONCE, np.int64)
         for start in range(0, lights.shape[1], AT_ONCE):
             end = min(start + AT_ONCE, lights.shape[1])
-            if listed is not None:
-                found = list_chosen(listed, block, start, end, chosen)
-            elif culls.behind:
-                found = lobes_in_reach(lights, bounds, start, end, spheres, scratch, chosen)
-            else:
-                found = list_all(start, end, chosen)
+            found = (list_all(start, end, chosen) if listed is None else
+                     list_chosen(listed, block, start, end, chosen))
+            if culls.behind and found > 0:
+                found = lobes_in_reach(lights, bounds, spheres, found, scratch, chosen)
             if culls.off_lobes and found > 0:
                 found = lights_in_lobes(lights, low, high, cosine, found, chosen)
             if found > 0:

@@ -91,25 +91,27 @@ def bound_part(tile: Array, first: int, last: int, spheres: Array, column: int) 
 
 
 @kernel
-def lobes_in_reach(
-    lights: Array, bounds: Array, first: int, last: int, spheres: Array, scratch: Array, chosen: Array,
-) -> int:
-    """List the lobes first to last - 1 that may light a tile, rising, in `chosen`, and return how many.
+def lobes_in_reach(lights: Array, bounds: Array, spheres: Array, found: int, scratch: Array, chosen: Array) -> int:
+    """Keep those of the first `found` lobes in `chosen` that may light a tile; return how many they are.
 
     `lights` (13, N) hold position, reversed normal and reversed axis first, `bounds` come from `bound_lobes`, `spheres`
-    bound the tile in their last column. `scratch` is (MEASURES, >= last - first).
+    bound the tile in their last column. `scratch` is (MEASURES, >= found); its row LIMIT is left with 1 - cos from
+    which on each lobe that is kept adds 0 everywhere in the tile.
     """
-    count = 0
+    real = lights.dtype.type
+    slack = real(ROUNDING) * real(np.finfo(lights.dtype).eps)
     sphere = spheres[0, PARTS], spheres[1, PARTS], spheres[2, PARTS], spheres[3, PARTS]
-    for k in range(first, last):
-        i = k - first
+    for i in range(found):
+        k = chosen[i]
         scratch[ABOVE, i], scratch[NEAREST, i], scratch[GAP, i] = _measure(load_light(lights, k), sphere)
         for row in range(BOUNDS):
             scratch[row, i] = bounds[row, k]
-    _test_reach(scratch, last - first)
-    for k in range(first, last):
-        chosen[count] = k
-        count += scratch[PASSED, k - first] > 0
+    _test_reach(scratch, found)
+    count = 0
+    for i in range(found):
+        chosen[count] = chosen[i]
+        scratch[LIMIT, count] = min(scratch[LIMIT, i], scratch[RANGED, i] + slack)
+        count += scratch[PASSED, i] > 0
     return count
 
 

@@ -22,6 +22,7 @@ from refgi.pairs.lobe_culling import (
     MEASURES,
     PARTS,
     bound_lobes,
+    bound_part,
     bound_parts,
     bound_range,
     lobes_in_reach,
@@ -49,10 +50,13 @@ from refgi.pairs.pair_sum import (
     pair_cosines,
 )
 from refgi.pairs.pixel_lights import Range
+from refgi.pairs.ranged_sum import LANES, list_chosen
+from refgi.pairs.tiles import list_all
 
 Array = npt.NDArray[Any]
 
 H, TERM, SQUARE, EXPONENT, RATIO = range(ROWS, ROWS + 5)  # further rows of a tile, of one light
+AT_ONCE = 4 * GROUP  # lights that are taken from a list at once
 
 
 @kernel(parallel=True)
@@ -75,8 +79,8 @@ def add_lobes(
     reach : Range or None
         Which pairs count, and how much (procedure P3); None: all.
     listed : (ceil(n / LANES), N) ndarray of bool or None
-        Lights that may count for each part of a tile; the others must not count for any of its receivers. None: all
-        may.
+        Lights that may count for each tile; the others must not count for any of its receivers. None: all may, and
+        tiles are of TILE.
     irradiance : (3, n) ndarray
         Added to, W/m^2.
 
@@ -92,15 +96,16 @@ def add_lobes(
     bounds = bound_lobes(lights[9], whole_from(widening))
     if reach is not None and not reach.outside:
         bound_range(bounds, reach.square, reach.scale)
-    for block in prange((count + TILE - 1) // TILE):
-        first = block * TILE
-        size = min(TILE, count - first)
-        tile = np.zeros((ROWS + 5, TILE), position.dtype)
+    width = TILE if listed is None else LANES
+    for block in prange((count + width - 1) // width):
+        first = block * width
+        size = min(width, count - first)
+        tile = np.zeros((ROWS + 5, width), position.dtype)
         load_tile(tile, position, normal, first, size)
         if listed is None:
             _add_lights(tile, size, lights, bounds, clamp, widening, reach)
         else:
-            _add_listed(tile, block * PARTS, lights, bounds, clamp, widening, reach, listed)
+            _add_listed(tile, size, lights, bounds, clamp, widening, reach, listed, block)
         for c in range(3):
             for i in range(size):
                 irradiance[c, first + i] += tile[TOTAL + c, i]
@@ -123,8 +128,8 @@ def _add_lights(
     by_parts = bound_parts(tile, size, spheres)
     scratch, chosen = np.empty((MEASURES, GROUP), tile.dtype), np.empty(GROUP, np.int64)
     for group in range(0, lights.shape[1], GROUP):
-        end = min(group + GROUP, lights.shape[1])
-        found = lobes_in_reach(lights, bounds, group, end, spheres, scratch, chosen)
+        found = list_all(group, min(group + GROUP, lights.shape[1]), chosen)
+        found = lobes_in_reach(lights, bounds, spheres, found, scratch, chosen)
         low, high = PARTS, 0
         for i in range(found):
             k, first, last = chosen[i], 0, PARTS
@@ -132,53 +137,35 @@ def _add_lights(
                 first, last = parts_in_reach(lights, bounds, k, spheres, scratch)
             if first < last:
                 low, high = min(low, first), max(high, last)
-                add_lobe(tile, _lanes(first, last), lights, k, bounds[LIMIT, k], clamp, widening, reach)
+                lanes = np.uint64(first * (TILE // PARTS)), np.uint64(last * (TILE // PARTS))
+                add_lobe(tile, lanes, lights, k, bounds[LIMIT, k], clamp, widening, reach)
         if low < high:
-            _close_group(tile, _lanes(low, high))
+            _close_group(tile, (np.uint64(low * (TILE // PARTS)), np.uint64(high * (TILE // PARTS))))
 
 
 @kernel
 def _add_listed(
-    tile: Array, row: int, lights: Array, bounds: Array, clamp: Clamp, widening: Widening | None, reach: Range | None,
-    listed: Array,
+    tile: Array, size: int, lights: Array, bounds: Array, clamp: Clamp, widening: Widening | None, reach: Range | None,
+    listed: Array, block: int,
 ) -> None:
-    """Add the lights that the lists of a tile's parts, rows of `listed` from `row` on, hold to the tile's totals."""
-    parts = min(PARTS, len(listed) - row)
-    some = np.empty(GROUP, np.bool_)
-    for group in range(0, lights.shape[1], GROUP):
-        end = min(group + GROUP, lights.shape[1])
-        if not _any_part(listed, row, parts, group, end, some):
-            continue
-        low, high = PARTS, 0
-        for k in range(group, end):
-            if some[k - group]:
-                first, last = PARTS, 0
-                for part in range(parts):
-                    if listed[row + part, k]:
-                        first, last = min(first, part), part + 1
-                low, high = min(low, first), max(high, last)
-                add_lobe(tile, _lanes(first, last), lights, k, bounds[LIMIT, k], clamp, widening, reach)
-        _close_group(tile, _lanes(low, high))
-
-
-@kernel
-def _any_part(listed: Array, row: int, parts: int, first: int, last: int, some: Array) -> bool:
-    """Fill `some` with which of the lights first to last - 1 are in any part's list; return whether one is."""
-    for k in range(first, last):
-        some[k - first] = listed[row, k]
-    for part in range(1, parts):
-        for k in range(first, last):
-            some[k - first] |= listed[row + part, k]
-    found = False
-    for k in range(last - first):
-        found |= some[k]
-    return found
-
-
-@kernel
-def _lanes(first: int, last: int) -> Any:
-    """Return the first lane of part `first` and the one after part last - 1."""
-    return np.uint64(first * (TILE // PARTS)), np.uint64(last * (TILE // PARTS))
+    """Add the lights that list `block` holds to the totals of a tile of LANES, group by group and in their order."""
+    lanes = np.uint64(0), np.uint64(LANES)
+    spheres = np.empty((4, PARTS + 1), tile.dtype)
+    scratch, chosen = np.empty((MEASURES, AT_ONCE), tile.dtype), np.empty(AT_ONCE, np.int64)
+    bound_part(tile, 0, size, spheres, PARTS)
+    for start in range(0, lights.shape[1], AT_ONCE):
+        found = list_chosen(listed, block, start, min(start + AT_ONCE, lights.shape[1]), chosen)
+        if found > 0:
+            found = lobes_in_reach(lights, bounds, spheres, found, scratch, chosen)
+        group = -1
+        for i in range(found):
+            k = chosen[i]
+            if k // GROUP != group and group >= 0:
+                _close_group(tile, lanes)
+            group = k // GROUP
+            add_lobe(tile, lanes, lights, k, scratch[LIMIT, i], clamp, widening, reach)
+        if group >= 0:
+            _close_group(tile, lanes)
 
 
 @kernel

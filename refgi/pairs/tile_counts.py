@@ -84,8 +84,8 @@ def _count_lobes(
         bound_part(tile, 0, size, spheres, PARTS)
         scratch, chosen = np.empty((MEASURES, GROUP), position.dtype), np.empty(GROUP, np.int64)
         for group in range(0, lights.shape[1], GROUP):
-            end = min(group + GROUP, lights.shape[1])
-            reached[block] += lobes_in_reach(lights, bounds, group, end, spheres, scratch, chosen)
+            found = list_all(group, min(group + GROUP, lights.shape[1]), chosen)
+            reached[block] += lobes_in_reach(lights, bounds, spheres, found, scratch, chosen)
 
 
 @kernel(parallel=True)

@@ -218,7 +218,8 @@ def _reaches(lights: Array, first: int, last: int, low: Array, high: Array, reac
     slack = real(ROUNDING) * real(np.finfo(lights.dtype).eps)
     ax, ay, az, bx, by, bz = low[0], low[1], low[2], high[0], high[1], high[2]
     ux, uy, uz, vx, vy, vz = low[3], low[4], low[5], high[3], high[4], high[5]
-    for k in range(first, last):
+    start = np.uint64(first)  # unsigned, which needs no check for places counted from the end
+    for k in range(start, np.uint64(last)):
         # d = light - receiver lies between e and f
         ex, ey, ez = lights[0, k] - bx, lights[1, k] - by, lights[2, k] - bz
         fx, fy, fz = lights[0, k] - ax, lights[1, k] - ay, lights[2, k] - az
@@ -227,4 +228,4 @@ def _reaches(lights: Array, first: int, last: int, low: Array, high: Array, reac
         cx = (max(max(ex * ux, ex * vx), max(fx * ux, fx * vx)) + max(max(ey * uy, ey * vy), max(fy * uy, fy * vy))
               + max(max(ez * uz, ez * vz), max(fz * uz, fz * vz)))
         size = max(abs(ex), abs(fx)) + max(abs(ey), abs(fy)) + max(abs(ez), abs(fz))
-        reach[k - first] = (cl + slack * size > zero) & (cx + slack * size > zero)
+        reach[k - start] = (cl + slack * size > zero) & (cx + slack * size > zero)

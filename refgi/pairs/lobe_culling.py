@@ -18,6 +18,7 @@ import numpy.typing as npt
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel
 from refgi.pairs.pair_sum import TILE, X, load_light
+from refgi.pairs.tiles import extremes
 
 Array = npt.NDArray[Any]
 
@@ -76,18 +77,24 @@ def bound_parts(tile: Array, size: int, spheres: Array) -> bool:
 
 @kernel
 def bound_part(tile: Array, first: int, last: int, spheres: Array, column: int) -> None:
+    """Fill a column of the bounding spheres with that of the receivers first to last - 1 of a tile."""
     real = tile.dtype.type
     for axis in range(3):
-        low = high = tile[X + axis, first]
-        for i in range(first + 1, last):
-            low, high = min(low, tile[X + axis, i]), max(high, tile[X + axis, i])
+        low, high = extremes(tile, X + axis, first, last)
         spheres[CENTER + axis, column] = low + real(0.5) * (high - low)
     x, y, z = spheres[CENTER, column], spheres[CENTER + 1, column], spheres[CENTER + 2, column]
-    largest = real(0.0)
-    for i in range(first, last):
-        dx, dy, dz = tile[X, i] - x, tile[X + 1, i] - y, tile[X + 2, i] - z
-        largest = max(largest, dx * dx + dy * dy + dz * dz)
-    spheres[RADIUS, column] = math.sqrt(largest) * real(1.0001)
+    a = b = real(0.0)
+    for i in range(first, last, 2):  # two at a time, so that one comparison need not wait for another
+        j = i + 1 if i + 1 < last else i
+        p, q = _square_distance(tile, i, x, y, z), _square_distance(tile, j, x, y, z)
+        a, b = p if p > a else a, q if q > b else b
+    spheres[RADIUS, column] = math.sqrt(max(a, b)) * real(1.0001)
+
+
+@kernel
+def _square_distance(tile: Array, i: int, x: Any, y: Any, z: Any) -> Any:
+    dx, dy, dz = tile[X, i] - x, tile[X + 1, i] - y, tile[X + 2, i] - z
+    return dx * dx + dy * dy + dz * dz
 
 
 @kernel
@@ -102,7 +109,7 @@ def lobes_in_reach(lights: Array, bounds: Array, spheres: Array, found: int, scr
     slack = real(ROUNDING) * real(np.finfo(lights.dtype).eps)
     sphere = spheres[0, PARTS], spheres[1, PARTS], spheres[2, PARTS], spheres[3, PARTS]
     for i in range(found):
-        k = chosen[i]
+        k = np.uint64(chosen[i])  # unsigned, which needs no check for places counted from the end
         scratch[ABOVE, i], scratch[NEAREST, i], scratch[GAP, i] = _measure(load_light(lights, k), sphere)
         for row in range(BOUNDS):
             scratch[row, i] = bounds[row, k]

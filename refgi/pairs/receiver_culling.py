@@ -51,7 +51,7 @@ def lights_in_lobes(lights: Array, low: Array, high: Array, cosine: Any, found: 
     ux, uy, uz, vx, vy, vz = low[6], low[7], low[8], high[6], high[7], high[8]
     count = 0
     for j in range(found):
-        k = chosen[j]
+        k = np.uint64(chosen[j])  # unsigned, which needs no check for places counted from the end
         # d lies between e and f
         ex, ey, ez = lights[0, k] - bx, lights[1, k] - by, lights[2, k] - bz
         fx, fy, fz = lights[0, k] - ax, lights[1, k] - ay, lights[2, k] - az
@@ -60,6 +60,6 @@ def lights_in_lobes(lights: Array, low: Array, high: Array, cosine: Any, found: 
         size = max(abs(ex), abs(fx)) + max(abs(ey), abs(fy)) + max(abs(ez), abs(fz))
         gx, gy, gz = max(max(ex, -fx), zero), max(max(ey, -fy), zero), max(max(ez, -fz), zero)
         nearest = np.sqrt(gx * gx + gy * gy + gz * gz)
-        chosen[count] = k
+        chosen[count] = chosen[j]
         count += along + slack * size > cosine * nearest
     return count

@@ -189,6 +189,22 @@ def bound_rows(tile: Array, first: int, rows: int, size: int, low: Array, high: 
 
 
 @kernel
+def extremes(values: Array, row: int, first: int, last: int) -> Any:
+    """Return the least and the largest of values[row, first:last]."""
+    # four at a time, so that one comparison need not wait for another
+    a = b = c = d = e = f = g = h = values[row, first]
+    rest = first + (last - first) // 4 * 4
+    for i in range(first, rest, 4):
+        p, q, r, s = values[row, i], values[row, i + 1], values[row, i + 2], values[row, i + 3]
+        a, b, c, d = p if p < a else a, q if q < b else b, r if r < c else c, s if s < d else d
+        e, f, g, h = p if p > e else e, q if q > f else f, r if r > g else g, s if s > h else h
+    for i in range(rest, last):
+        p = values[row, i]
+        a, e = p if p < a else a, p if p > e else e
+    return min(min(a, b), min(c, d)), max(max(e, f), max(g, h))
+
+
+@kernel
 def lights_in_reach(lights: Array, first: int, last: int, low: Array, high: Array, reach: Array, chosen: Array) -> int:
     """List the lights first to last - 1 that may reach a tile, rising, in `chosen`, and return how many.
 

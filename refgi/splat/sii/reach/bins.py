@@ -18,6 +18,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.ranged_sum import LANES
+from refgi.pairs.tiles import extremes
 from refgi.rsm.pool import zeros
 from refgi.splat.sii.reach.bounds import Solids
 from refgi.stages import stage
@@ -113,8 +114,8 @@ def _bound_parts(position: Array, normal: Array, first: int, parts: int, low: Ar
         start = first + part * LANES
         end = min(start + LANES, position.shape[1])
         for axis in range(3):
-            low[part, axis], high[part, axis] = _extremes(position, axis, start, end)
-            low[part, 3 + axis], high[part, 3 + axis] = _extremes(normal, axis, start, end)
+            low[part, axis], high[part, axis] = extremes(position, axis, start, end)
+            low[part, 3 + axis], high[part, 3 + axis] = extremes(normal, axis, start, end)
 
 
 @kernel
@@ -139,22 +140,6 @@ def _narrow(
         for i in range(found):
             chosen[i] = of[chosen[i]]
     return found
-
-
-@kernel
-def _extremes(values: Array, row: int, first: int, last: int) -> Any:
-    """Return the least and the largest of values[row, first:last]."""
-    # four at a time, so that one comparison need not wait for another
-    a = b = c = d = e = f = g = h = values[row, first]
-    rest = first + (last - first) // 4 * 4
-    for i in range(first, rest, 4):
-        p, q, r, s = values[row, i], values[row, i + 1], values[row, i + 2], values[row, i + 3]
-        a, b, c, d = p if p < a else a, q if q < b else b, r if r < c else c, s if s < d else d
-        e, f, g, h = p if p > e else e, q if q > f else f, r if r > g else g, s if s > h else h
-    for i in range(rest, last):
-        p = values[row, i]
-        a, e = p if p < a else a, p if p > e else e
-    return min(min(a, b), min(c, d)), max(max(e, f), max(g, h))
 
 
 @kernel

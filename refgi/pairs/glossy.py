@@ -132,7 +132,8 @@ def _add_lights(
     lobes = packed.lobes
     if lobes is not None:
         behind = left_out("pairs.lobe_tiles", lambda: lobe_tiles(*place, lobes, LANES))
-        add_glossy_lights(*place, of, *lobes, ranges[1], listed[1], Culls(behind, off_lobes), sums)
+        add_glossy_lights(*place, of, lobes.lights, lobes.clamp, lobes.widening, ranges[1], listed[1],
+                          Culls(behind, off_lobes), sums)
 
 
 def block_order(pixel: Array, width: int) -> Array:

@@ -171,7 +171,7 @@ def list_chosen(listed: Array, block: int, first: int, last: int, chosen: Array)
             for k in range(group, end):
                 chosen[count] = k
                 count += np.uint64(listed[row, k])
-    return np.int64(count)
+    return int(count)
 
 
 @kernel

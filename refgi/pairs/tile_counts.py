@@ -1,4 +1,4 @@
-"""How many lights the kernels pass over, tile by tile: the tests of `sum_pairs`, `add_lobes` and `glossy_sum`, counted."""
+"""How many lights kernels pass over, tile by tile: the tests of `sum_pairs`, `add_lobes` and `glossy_sum`, counted."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.pairs.glossy_sum import FARTHEST, TILE_ROWS, M, ReceiverLobes, load_lobes
+from refgi.pairs.glossy_sum import ReceiverLobes, load_lobes
+from refgi.pairs.glossy_tile import FARTHEST, TILE_ROWS, M
 from refgi.pairs.lobe_culling import MEASURES, PARTS, bound_lobes, bound_part, lobes_in_reach
 from refgi.pairs.pair_sum import GROUP, ROWS, TILE, load_tile
 from refgi.pairs.ranged_sum import LANES

@@ -209,8 +209,14 @@ def test_lights_off_the_lobes_are_passed_over_to_the_same_bits(exponent, real):
 
 @pytest.mark.parametrize("real", [np.float32, np.float64])
 @pytest.mark.parametrize("exponent", [0.5, 300.0, 1e6])
-def test_a_tile_keeps_every_light_that_lies_in_a_lobe_of_it(exponent, real):
+@pytest.mark.parametrize("turn", range(6))
+def test_a_tile_keeps_every_light_that_lies_in_a_lobe_of_it(exponent, real, turn):
+    """Whichever way it faces."""
     points, lights = patch(exponent, real, 64)
+    sign = real(1 - 2 * (turn % 2))
+    points = points._replace(**{key: np.ascontiguousarray(sign * np.roll(getattr(points, key), turn // 2, axis=0))
+                                for key in ("position", "normal", "mirrored")})
+    lights = lights._replace(position=np.ascontiguousarray(sign * np.roll(lights.position, turn // 2, axis=0)))
     of = receiver_lobes_of(points.mirrored, points.exponent)
     tile = np.zeros((TILE_ROWS, LANES), real)
     load_tile(tile, points.position, points.normal, 0, 64)

@@ -36,6 +36,7 @@ SKIPS: Mapping[str, Skip] = MappingProxyType({
                         "pairs of light and tile"),
     "pairs.lobes": Skip("the sum over lobes, where no light is glossy", "lights, once a sum"),
     "pairs.lobe_tiles": Skip("glossy lights whose lobe misses a tile", "pairs of light and tile"),
+    "pairs.receiver_lobes": Skip("pixel lights that lie in no receiver's lobe of a tile", "pairs of light and tile"),
     "pairs.shadow_rays": Skip("shadow rays of pairs that face away from each other or give no light", "rays"),
     "sii.bounds": Skip("pairs outside of the bound of a light's range", "pairs of light and tile"),
     "cluster.distances": Skip("distances to area lights that the triangle inequality rules out", "clusterings"),

@@ -38,6 +38,7 @@ CASES = {
                     (SPHERE, "multires", "lights=100")],
     "pairs.lobes": [(BOX, method, "lights=64") for method in ("sii", "multires", "val", "vpl")],
     "pairs.lobe_tiles": [(RING, "sii", "lights=64")],
+    "pairs.receiver_lobes": [(RING, "sii", "lights=64"), (RING, "sii", *CUT)],
     "pairs.shadow_rays": [(BOX, "vpl", "lights=32"), (RING, "vpl", "lights=32")],
     "sii.bounds": [(BOX, "sii", *CUT, f"reach.bound={bound}") for bound in ("tangent", "quad")],
     "cluster.distances": [(BOX, "val", "lights=128", "clusters=12")],
@@ -70,6 +71,7 @@ WORK = {
     "pairs.lobes": {"pairs.irradiance.add_lobes": None,
                     "pairs.shadow_rays.fill_shadow_rays": lambda *arguments: len(arguments[2].lobe_exponent)},
     "pairs.lobe_tiles": {"pairs.irradiance.add_lobes": lambda *arguments: arguments[6] is not None},
+    "pairs.receiver_lobes": {"pairs.glossy.add_diffuse_lights": lambda *arguments: not arguments[8].off_lobes},
     "pairs.shadow_rays": {"rays.Tracer.fill_occluded": lambda *arguments: np.count_nonzero(arguments[3])},
     "sii.bounds": {"splat.sii.sii.sum_pairs_in_range": lambda *arguments: np.count_nonzero(arguments[5])},
     "cluster.distances": {"cluster.clustering.kmeans.iterate": lambda _, metric, *__: metric.slack},
@@ -136,7 +138,8 @@ def test_a_skip_fires_and_changes_no_bit(name, case, work, evidence):
     """The work is done with the skip off, the bits are the same."""
     place, method, *changes = case
     scene, settings = load_scene(place), settings_of(method, *changes)
-    options = LARGER if name in ("pairs.tiles", "pairs.lobe_tiles", "sssil.senders", "rsm.clusters") else OPTIONS
+    by_tiles = "pairs.tiles", "pairs.lobe_tiles", "pairs.receiver_lobes", "sssil.senders", "rsm.clusters"
+    options = LARGER if name in by_tiles else OPTIONS
     with skips.count_skips() as counts:
         digest(scene, method, settings, options)
     assert 0 < counts[name].left_out <= counts[name].of

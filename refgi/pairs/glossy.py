@@ -1,18 +1,19 @@
 """From pixel lights to radiance of glossy receivers: checks, packing and order around `glossy_sum`."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from refgi.pairs.glossy_sum import add_diffuse_lights, add_glossy_lights, receiver_lobes_of
+from refgi.pairs.glossy_sum import Culls, add_diffuse_lights, add_glossy_lights, receiver_lobes_of
 from refgi.pairs.irradiance import PAIRS_AT_ONCE, Receivers, checked
-from refgi.pairs.lobe_culling import LIMIT, bound_lobes
 from refgi.pairs.packing import Packed
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.pixel_lights import Range
+from refgi.pairs.ranged_sum import LANES
 from refgi.pairs.settings import PairSettings
-from refgi.pairs.tile_counts import tiles_behind
+from refgi.pairs.tile_counts import lights_off_lobes, lobe_tiles, tiles_behind
 from refgi.rsm.buffers.glossy import GlossyPoints
 from refgi.skips import left_out
 from refgi.stages import report_progress, stage, tally
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
 
 Array = npt.NDArray[Any]
+Listing = Callable[[Array, Array], tuple[Array | None, Array | None]]
 
 
 @stage("pairs.glossy_sum")
@@ -77,7 +79,10 @@ def as_receivers(points: GlossyPoints) -> Receivers:
     return Receivers(points.position[:, None], points.normal[:, None], np.ones((1, len(points.pixel)), np.bool_))
 
 
-def summed(points: GlossyPoints, packed: Packed, ranges: tuple[Range | None, Range | None], width: int = 0) -> Array:
+def summed(
+    points: GlossyPoints, packed: Packed, ranges: tuple[Range | None, Range | None], width: int = 0,
+    lists: Listing | None = None,
+) -> Array:
     """Sum packed lights at glossy receivers.
 
     Parameters
@@ -90,6 +95,9 @@ def summed(points: GlossyPoints, packed: Packed, ranges: tuple[Range | None, Ran
         Of the diffuse lights and of the lobes: which pairs count; None: all.
     width : int
         As for `glossy_radiance`.
+    lists : callable, optional
+        Returns which diffuse lights and which lobes may count for which tile of LANES receivers, of positions and
+        normals (3, m); None: any.
 
     Returns
     -------
@@ -102,23 +110,30 @@ def summed(points: GlossyPoints, packed: Packed, ranges: tuple[Range | None, Ran
     step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(packed.shines)) // TILE * TILE)
     for first in range(0, len(order), step):
         part = order[first : first + step]
+        some = GlossyPoints(*(np.ascontiguousarray(plane[..., part]) for plane in points))
         sums = np.zeros((3, len(part)), points.position.dtype)
-        _add_lights(GlossyPoints(*(np.ascontiguousarray(plane[..., part]) for plane in points)), packed, ranges, sums)
-        result[:, part] = sums * points.specular[:, part]
+        _add_lights(some, packed, ranges, (None, None) if lists is None else lists(some.position, some.normal), sums)
+        result[:, part] = sums * some.specular
         report_progress(min(1.0, (first + step) / len(order)))
     return result
 
 
-def _add_lights(points: GlossyPoints, packed: Packed, ranges: tuple[Range | None, Range | None], sums: Array) -> None:
+def _add_lights(
+    points: GlossyPoints, packed: Packed, ranges: tuple[Range | None, Range | None],
+    listed: tuple[Array | None, Array | None], sums: Array,
+) -> None:
     of = receiver_lobes_of(points.mirrored, points.exponent)
     place = points.position, points.normal
+    off_lobes = left_out("pairs.receiver_lobes", lambda: lights_off_lobes(*place, of, packed))
     if packed.diffuse.shape[1] > 1:
-        culls = left_out("pairs.tiles", lambda: tiles_behind(*place, packed.diffuse))
-        add_diffuse_lights(*place, of, packed.diffuse, packed.clamp, packed.spheres, ranges[0], culls, sums)
-    if packed.lobes is not None:
-        lights, clamp, widening = packed.lobes
-        limits = bound_lobes(lights[9], -1.0)[LIMIT].copy()
-        add_glossy_lights(*place, of, lights, limits, clamp, widening, ranges[1], sums)
+        behind = listed[0] is None and left_out("pairs.tiles", lambda: tiles_behind(*place, packed.diffuse, LANES))
+        add_diffuse_lights(*place, of, packed.diffuse, packed.clamp, packed.spheres, ranges[0], listed[0],
+                           Culls(behind, off_lobes), sums)
+    lobes = packed.lobes
+    if lobes is not None:
+        behind = left_out("pairs.lobe_tiles", lambda: lobe_tiles(*place, lobes, LANES))
+        add_glossy_lights(*place, of, lobes.lights, lobes.clamp, lobes.widening, ranges[1], listed[1],
+                          Culls(behind, off_lobes), sums)
 
 
 def block_order(pixel: Array, width: int) -> Array:

@@ -2,8 +2,8 @@
 
 L_s = specular (P + 2) / (2 pi) sum over lights of <m . w>^P I(w) c_x / r^2, where I c_x / r^2 is the term of the
 diffuse sum, clamped alike. Receivers are the SIMD lanes; norm and reflectance are theirs and are multiplied in last.
-The power is taken as 2^(P log2(1 - h)), h = |m - w|^2 / 2, as for senders' lobes (`lobe_sum`). A light's terms are
-found in a few passes over a tile of receivers; one that lies in no lobe of the tile is passed over after the first.
+The power is taken as 2^(P log2(1 - h)), h = |m - w|^2 / 2, as for senders' lobes (`lobe_sum`). Tiles are of 64
+receivers, each with lights of its own: those that planes, ranges and the receivers' lobes leave (`receiver_culling`).
 
 Symbols as in `pair_sum`; m the direction to the eye mirrored at the receiver, w unit vector from it to the light.
 """
@@ -13,36 +13,27 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
-from refgi.lobes import lobe_gap, receiver_norm
-from refgi.pairs.lobe_culling import LIMIT, bound_lobes
-from refgi.pairs.lobe_shape import Widening
-from refgi.pairs.lobe_sum import TERM, lobe_terms
-from refgi.pairs.pair_sum import (
-    GROUP,
-    NX,
-    ROWS,
-    SUM,
-    TILE,
-    TOTAL,
-    Clamp,
-    X,
-    close_group,
-    limits_of,
-    load_tile,
-    pair_term,
+from refgi.lobes import receiver_norm
+from refgi.pairs.glossy_tile import EXPONENT, FARTHEST, TILE_ROWS, M, add_diffuse_listed, add_lobes_listed
+from refgi.pairs.lobe_culling import (
+    LIMIT,
+    MEASURES,
+    PARTS,
+    bound_lobes,
+    bound_part,
+    bound_range,
+    lobes_in_reach,
 )
+from refgi.pairs.lobe_shape import Widening
+from refgi.pairs.lobe_sum import AT_ONCE, whole_from
+from refgi.pairs.pair_sum import TOTAL, Clamp, load_tile
 from refgi.pairs.pixel_lights import Range
-from refgi.pairs.ranged_sum import range_factor
-from refgi.pairs.sphere_sum import TERM as SPHERE_TERM
-from refgi.pairs.sphere_sum import cut_cones, whole_cones
-from refgi.pairs.tiles import bound_tile, lights_in_reach, list_all
+from refgi.pairs.ranged_sum import LANES, list_chosen
+from refgi.pairs.receiver_culling import CORNERS, bound_receivers, lights_in_lobes
+from refgi.pairs.tiles import lights_in_reach, list_all
 
 Array = npt.NDArray[Any]
-
-M = ROWS + 5  # first further rows of a tile: those of `lobe_sum` come before
-GAP, EXPONENT, FARTHEST, TILE_ROWS = M + 3, M + 4, M + 5, M + 6
 
 
 class ReceiverLobes(NamedTuple):
@@ -59,10 +50,17 @@ def receiver_lobes_of(mirrored: Array, exponent: Array) -> ReceiverLobes:
     return ReceiverLobes(np.ascontiguousarray(mirrored), exponent, bound_lobes(exponent, -1.0)[LIMIT].copy())
 
 
+class Culls(NamedTuple):
+    """What a sum passes over, to the same bits; whatever is not passed over adds its zeros."""
+
+    behind: bool  # lights that a tile lies behind or, of diffuse ones, that lie behind it; lobes that miss it
+    off_lobes: bool  # lights that lie in no receiver's lobe
+
+
 @kernel(parallel=True)
 def add_diffuse_lights(
     position: Array, normal: Array, of: ReceiverLobes, lights: Array, clamp: Clamp | None, spheres: Array | None,
-    reach: Range | None, culls: bool, radiance: Array,
+    reach: Range | None, listed: Array | None, culls: Culls, radiance: Array,
 ) -> None:
     """Add norm sum (Phi / pi) g <m . w>^P over diffuse lights to every receiver: radiance over its reflectance.
 
@@ -77,11 +75,14 @@ def add_diffuse_lights(
     clamp : Clamp or None
         How near pairs are kept finite; None sums the plain term.
     spheres : (N,) ndarray or None
-        Squared radii of lights that are virtual spherical lights, m^2; their lobe is that of the centre.
+        Squared radii of lights that are virtual spherical lights, m^2; their lobe is that of the centre, and planes
+        cull none.
     reach : Range or None
         Which pairs count, and how much (procedure P3); None: all.
-    culls : bool
-        Pass over lights that cannot reach a tile; without, each adds its zeros, to the same bits.
+    listed : (ceil(n / LANES), N) ndarray of bool or None
+        Lights that may count for each tile; the others must not count for any of its receivers. None: all may.
+    culls : Culls
+        What to pass over; planes where there are no lists.
     radiance : (3, n) ndarray
         Added to, W/m^2/sr.
 
@@ -92,34 +93,35 @@ def add_diffuse_lights(
     of w reach h, those of the cosines are absolute. A sum is off by at most 70 U of L_s more. Less than 2^-126 of the
     peak is 0.
     """
-    count = position.shape[1]
-    for block in prange((count + TILE - 1) // TILE):
-        first = block * TILE
-        size = min(TILE, count - first)
-        tile = np.zeros((TILE_ROWS, TILE), position.dtype)
+    count, black = position.shape[1], lights.shape[1] - 1
+    for block in prange((count + LANES - 1) // LANES):
+        first = block * LANES
+        size = min(LANES, count - first)
+        tile = np.zeros((TILE_ROWS, LANES), position.dtype)
         load_tile(tile, position, normal, first, size)
         load_lobes(tile, of, first, size)
-        low, high = np.empty(6, position.dtype), np.empty(6, position.dtype)
-        bound_tile(tile, size, low, high)
-        reached, chosen = np.empty(GROUP, np.bool_), np.empty(GROUP + 1, np.int64)
-        for group in range(0, lights.shape[1] - 1, GROUP):
-            end = min(group + GROUP, lights.shape[1] - 1)
-            listed = (lights_in_reach(lights, group, end, low, high, reached, chosen) if culls and spheres is None else
-                      list_all(group, end, chosen))
-            for j in range(listed):
-                k = chosen[j]
-                if _diffuse_terms(tile, size, lights, k, limits_of(clamp, k), spheres):
-                    if reach is not None:
-                        _weight_by_range(tile, lights, k, reach.square[k], reach.scale[k], reach.outside)
-                    _add_weighted(tile, lights[6, k], lights[7, k], lights[8, k])
-            close_group(tile)
+        low, high = np.empty(CORNERS, position.dtype), np.empty(CORNERS, position.dtype)
+        cosine = bound_receivers(tile, M, FARTHEST, size, low, high)
+        reached, chosen = np.empty(AT_ONCE, np.bool_), np.empty(AT_ONCE, np.int64)
+        for start in range(0, black, AT_ONCE):
+            end = min(start + AT_ONCE, black)
+            if listed is not None:
+                found = list_chosen(listed, block, start, end, chosen)
+            elif culls.behind and spheres is None:
+                found = lights_in_reach(lights, start, end, low, high, reached, chosen)
+            else:
+                found = list_all(start, end, chosen)
+            if culls.off_lobes and found > 0:
+                found = lights_in_lobes(lights, low, high, cosine, found, chosen)
+            if found > 0:
+                add_diffuse_listed(tile, size, lights, clamp, spheres, reach, chosen, found)
         _store(tile, of.exponent, first, size, radiance)
 
 
 @kernel(parallel=True)
 def add_glossy_lights(
-    position: Array, normal: Array, of: ReceiverLobes, lights: Array, limits: Array, clamp: Clamp,
-    widening: Widening | None, reach: Range | None, radiance: Array,
+    position: Array, normal: Array, of: ReceiverLobes, lights: Array, clamp: Clamp, widening: Widening | None,
+    reach: Range | None, listed: Array | None, culls: Culls, radiance: Array,
 ) -> None:
     """Add norm sum I(w) c_x / r^2 <m . w>^P over glossy lights to every receiver: radiance over its reflectance.
 
@@ -131,14 +133,16 @@ def add_glossy_lights(
         Their lobes.
     lights : (13, K) ndarray
         Packed lights, as for `lobe_sum.add_lobes`.
-    limits : (K,) ndarray
-        1 - cos from which on each light's lobe is 0.
     clamp : Clamp
         How near pairs are kept finite; the bound applies to c_x / r^2.
     widening : Widening or None
         How exponents fall near the light; None keeps them.
     reach : Range or None
         Which pairs count, and how much (procedure P3); None: all.
+    listed : (ceil(n / LANES), K) ndarray of bool or None
+        As for `add_diffuse_lights`.
+    culls : Culls
+        What to pass over; lobes that miss the tile where there are no lists.
     radiance : (3, n) ndarray
         Added to, W/m^2/sr.
 
@@ -147,19 +151,30 @@ def add_glossy_lights(
     A term is off by at most the sum of the bounds of `add_diffuse_lights` and `lobe_sum.add_lobes`, over their factors.
     """
     count = position.shape[1]
-    for block in prange((count + TILE - 1) // TILE):
-        first = block * TILE
-        size = min(TILE, count - first)
-        tile = np.zeros((TILE_ROWS, TILE), position.dtype)
+    bounds = bound_lobes(lights[9], whole_from(widening))
+    if reach is not None and not reach.outside:
+        bound_range(bounds, reach.square, reach.scale)
+    for block in prange((count + LANES - 1) // LANES):
+        first = block * LANES
+        size = min(LANES, count - first)
+        tile = np.zeros((TILE_ROWS, LANES), position.dtype)
         load_tile(tile, position, normal, first, size)
         load_lobes(tile, of, first, size)
-        lanes = np.uint64(0), np.uint64(TILE)
-        for group in range(0, lights.shape[1], GROUP):
-            for k in range(group, min(group + GROUP, lights.shape[1])):
-                lit = lobe_terms(tile, lanes, lights, k, limits[k], clamp, widening, reach)
-                if lit and _in_lobes(tile, lights, k):
-                    _add_weighted(tile, lights[10, k], lights[11, k], lights[12, k])
-            close_group(tile)
+        low, high = np.empty(CORNERS, position.dtype), np.empty(CORNERS, position.dtype)
+        cosine = bound_receivers(tile, M, FARTHEST, size, low, high)
+        spheres = np.empty((4, PARTS + 1), position.dtype)
+        bound_part(tile, 0, size, spheres, PARTS)
+        scratch, chosen = np.empty((MEASURES, AT_ONCE), position.dtype), np.empty(AT_ONCE, np.int64)
+        for start in range(0, lights.shape[1], AT_ONCE):
+            end = min(start + AT_ONCE, lights.shape[1])
+            found = (list_all(start, end, chosen) if listed is None else
+                     list_chosen(listed, block, start, end, chosen))
+            if culls.behind and found > 0:
+                found = lobes_in_reach(lights, bounds, spheres, found, scratch, chosen)
+            if culls.off_lobes and found > 0:
+                found = lights_in_lobes(lights, low, high, cosine, found, chosen)
+            if found > 0:
+                add_lobes_listed(tile, lights, bounds, clamp, widening, reach, chosen, found)
         _store(tile, of.exponent, first, size, radiance)
 
 
@@ -173,71 +188,6 @@ def load_lobes(tile: Array, of: ReceiverLobes, first: int, size: int) -> None:
     for i in range(np.uint64(size)):
         tile[EXPONENT, i] = of.exponent[start + i]
         tile[FARTHEST, i] = of.farthest[start + i]
-
-
-@kernel
-def _diffuse_terms(tile: Array, size: int, lights: Array, k: int, limits: Any, spheres: Array | None) -> bool:
-    """Fill rows TERM with g (1/m^2) and GAP with h, both 0 off a receiver's lobe; return whether any TERM is not 0."""
-    x, y, z, lx, ly, lz = lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k]
-    if spheres is not None:
-        whole_cones(tile, (x, y, z, lx, ly, lz), spheres[k])
-        cut_cones(tile, (x, y, z, lx, ly, lz), spheres[k], size)
-        zero = tile.dtype.type(0.0)
-        for i in range(TILE):
-            dx, dy, dz = x - tile[X, i], y - tile[X + 1, i], z - tile[X + 2, i]
-            above = dx * tile[NX, i] + dy * tile[NX + 1, i] + dz * tile[NX + 2, i] > zero
-            tile[TERM, i] = tile[SPHERE_TERM, i] if above else zero
-    else:
-        for i in range(TILE):
-            receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
-            tile[TERM, i] = pair_term((x, y, z, lx, ly, lz), receiver, limits)
-    return _in_lobes(tile, lights, k)
-
-
-@kernel
-def _in_lobes(tile: Array, lights: Array, k: int) -> bool:
-    """Fill row GAP with h of light k, clear both rows off the lobes; return whether any TERM is left.
-
-    Short loops with few rows each: from about eight pairs of rows on the compiler no longer finds out that they do not
-    overlap.
-    """
-    real = tile.dtype.type
-    zero, x, y, z = real(0.0), lights[0, k], lights[1, k], lights[2, k]
-    for i in range(TILE):
-        dx, dy, dz = x - tile[X, i], y - tile[X + 1, i], z - tile[X + 2, i]
-        tile[GAP, i] = lobe_gap(tile[M, i], tile[M + 1, i], tile[M + 2, i], dx, dy, dz)
-    for i in range(TILE):
-        counts = tile[GAP, i] < tile[FARTHEST, i]
-        tile[GAP, i] = tile[GAP, i] if counts else zero
-        tile[TERM, i] = tile[TERM, i] if counts else zero
-    found = np.int32(0)
-    for i in range(TILE):  # apart, as in `lobe_sum`
-        found |= np.int32(tile[TERM, i] > zero)
-    return bool(found)
-
-
-@kernel
-def _weight_by_range(tile: Array, lights: Array, k: int, square_range: Any, scale: Any, outside: bool) -> None:
-    """Multiply row TERM by what the range of a diffuse light makes of each pair."""
-    x, y, z, lx, ly, lz = lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k]
-    for i in range(TILE):
-        dx, dy, dz = x - tile[X, i], y - tile[X + 1, i], z - tile[X + 2, i]
-        tile[TERM, i] *= range_factor(dx, dy, dz, lx, ly, lz, square_range, scale, outside)
-
-
-@kernel
-def _add_weighted(tile: Array, red: Any, green: Any, blue: Any) -> None:
-    """Add TERM <m . w>^P times a colour to rows SUM."""
-    for i in range(TILE):
-        tile[GAP, i] = log2p1(-tile[GAP, i])
-    for i in range(TILE):
-        # f_s over its norm and reflectance
-        tile[TERM, i] *= exp2(tile[EXPONENT, i] * tile[GAP, i])
-    for i in range(TILE):
-        # AMS Eq. (2)
-        tile[SUM, i] += tile[TERM, i] * red
-        tile[SUM + 1, i] += tile[TERM, i] * green
-        tile[SUM + 2, i] += tile[TERM, i] * blue
 
 
 @kernel

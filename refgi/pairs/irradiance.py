@@ -16,6 +16,7 @@ from refgi.pairs.lightcuts.cuts import add_cuts
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.packing import Packed, PackedLobes, pack, with_tree
 from refgi.pairs.pair_sum import TILE, sum_pairs
+from refgi.pairs.ranged_sum import LANES
 from refgi.pairs.settings import Lightcuts, PairSettings, SphereClamp
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.pairs.tile_counts import lobe_tiles, tiles_behind
@@ -109,7 +110,7 @@ def _listed_lobes(position: Array, normal: Array, lobes: PackedLobes) -> Array |
     """Return None where the kernel finds out which lobes miss which tiles; without that skip a list of all."""
     if left_out("pairs.lobe_tiles", lambda: lobe_tiles(position, normal, lobes)):
         return None
-    return np.ones((-(-position.shape[1] // TILE), lobes.lights.shape[1]), np.bool_)
+    return np.ones((-(-position.shape[1] // LANES), lobes.lights.shape[1]), np.bool_)
 
 
 def checked(

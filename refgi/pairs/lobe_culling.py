@@ -18,6 +18,7 @@ import numpy.typing as npt
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel
 from refgi.pairs.pair_sum import TILE, X, load_light
+from refgi.pairs.tiles import extremes
 
 Array = npt.NDArray[Any]
 
@@ -68,55 +69,56 @@ def bound_parts(tile: Array, size: int, spheres: Array) -> bool:
     total = 0.0
     for part in range(PARTS):
         first = part * lanes if part * lanes < size else 0
-        _bound(tile, first, min(first + lanes, size), spheres, part)
+        bound_part(tile, first, min(first + lanes, size), spheres, part)
         total += spheres[RADIUS, part]
-    _bound(tile, 0, size, spheres, PARTS)
+    bound_part(tile, 0, size, spheres, PARTS)
     return bool(total < 0.7 * PARTS * spheres[RADIUS, PARTS])
 
 
 @kernel
-def _bound(tile: Array, first: int, last: int, spheres: Array, column: int) -> None:
+def bound_part(tile: Array, first: int, last: int, spheres: Array, column: int) -> None:
+    """Fill a column of the bounding spheres with that of the receivers first to last - 1 of a tile."""
     real = tile.dtype.type
     for axis in range(3):
-        low = high = tile[X + axis, first]
-        for i in range(first + 1, last):
-            low, high = min(low, tile[X + axis, i]), max(high, tile[X + axis, i])
+        low, high = extremes(tile, X + axis, first, last)
         spheres[CENTER + axis, column] = low + real(0.5) * (high - low)
     x, y, z = spheres[CENTER, column], spheres[CENTER + 1, column], spheres[CENTER + 2, column]
-    largest = real(0.0)
-    for i in range(first, last):
-        dx, dy, dz = tile[X, i] - x, tile[X + 1, i] - y, tile[X + 2, i] - z
-        largest = max(largest, dx * dx + dy * dy + dz * dz)
-    spheres[RADIUS, column] = math.sqrt(largest) * real(1.0001)
+    a = b = real(0.0)
+    for i in range(first, last, 2):  # two at a time, so that one comparison need not wait for another
+        j = i + 1 if i + 1 < last else i
+        p, q = _square_distance(tile, i, x, y, z), _square_distance(tile, j, x, y, z)
+        a, b = p if p > a else a, q if q > b else b
+    spheres[RADIUS, column] = math.sqrt(max(a, b)) * real(1.0001)
 
 
 @kernel
-def lobes_in_reach(
-    lights: Array, bounds: Array, first: int, last: int, spheres: Array, listed: Array | None, scratch: Array,
-    chosen: Array,
-) -> int:
-    """List the lobes first to last - 1 that may light a tile, rising, in `chosen`, and return how many.
+def _square_distance(tile: Array, i: int, x: Any, y: Any, z: Any) -> Any:
+    dx, dy, dz = tile[X, i] - x, tile[X + 1, i] - y, tile[X + 2, i] - z
+    return dx * dx + dy * dy + dz * dz
+
+
+@kernel
+def lobes_in_reach(lights: Array, bounds: Array, spheres: Array, found: int, scratch: Array, chosen: Array) -> int:
+    """Keep those of the first `found` lobes in `chosen` that may light a tile; return how many they are.
 
     `lights` (13, N) hold position, reversed normal and reversed axis first, `bounds` come from `bound_lobes`, `spheres`
-    bound the tile. `listed` (N,) is the tile's light list; without it the whole tile's sphere decides. `scratch` is
-    (MEASURES, >= last - first).
+    bound the tile in their last column. `scratch` is (MEASURES, >= found); its row LIMIT is left with 1 - cos from
+    which on each lobe that is kept adds 0 everywhere in the tile.
     """
+    real = lights.dtype.type
+    slack = real(ROUNDING) * real(np.finfo(lights.dtype).eps)
+    sphere = spheres[0, PARTS], spheres[1, PARTS], spheres[2, PARTS], spheres[3, PARTS]
+    for i in range(found):
+        k = np.uint64(chosen[i])  # unsigned, which needs no check for places counted from the end
+        scratch[ABOVE, i], scratch[NEAREST, i], scratch[GAP, i] = _measure(load_light(lights, k), sphere)
+        for row in range(BOUNDS):
+            scratch[row, i] = bounds[row, k]
+    _test_reach(scratch, found)
     count = 0
-    if listed is None:
-        sphere = spheres[0, PARTS], spheres[1, PARTS], spheres[2, PARTS], spheres[3, PARTS]
-        for k in range(first, last):
-            i = k - first
-            scratch[ABOVE, i], scratch[NEAREST, i], scratch[GAP, i] = _measure(load_light(lights, k), sphere)
-            for row in range(BOUNDS):
-                scratch[row, i] = bounds[row, k]
-        _test_reach(scratch, last - first)
-        for k in range(first, last):
-            chosen[count] = k
-            count += scratch[PASSED, k - first] > 0
-    else:
-        for k in range(first, last):
-            chosen[count] = k
-            count += listed[k]
+    for i in range(found):
+        chosen[count] = chosen[i]
+        scratch[LIMIT, count] = min(scratch[LIMIT, i], scratch[RANGED, i] + slack)
+        count += scratch[PASSED, i] > 0
     return count
 
 

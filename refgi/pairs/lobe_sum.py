@@ -22,6 +22,7 @@ from refgi.pairs.lobe_culling import (
     MEASURES,
     PARTS,
     bound_lobes,
+    bound_part,
     bound_parts,
     bound_range,
     lobes_in_reach,
@@ -49,10 +50,13 @@ from refgi.pairs.pair_sum import (
     pair_cosines,
 )
 from refgi.pairs.pixel_lights import Range
+from refgi.pairs.ranged_sum import LANES, list_chosen
+from refgi.pairs.tiles import list_all
 
 Array = npt.NDArray[Any]
 
 H, TERM, SQUARE, EXPONENT, RATIO = range(ROWS, ROWS + 5)  # further rows of a tile, of one light
+AT_ONCE = 4 * GROUP  # lights that are taken from a list at once
 
 
 @kernel(parallel=True)
@@ -74,8 +78,9 @@ def add_lobes(
         How exponents fall near the light; None keeps them.
     reach : Range or None
         Which pairs count, and how much (procedure P3); None: all.
-    listed : (ceil(n / TILE), N) ndarray of bool or None
-        Lights that may count for each tile; the others must not count for any of its receivers. None: all may.
+    listed : (ceil(n / LANES), N) ndarray of bool or None
+        Lights that may count for each tile; the others must not count for any of its receivers. None: all may, and
+        tiles are of TILE.
     irradiance : (3, n) ndarray
         Added to, W/m^2.
 
@@ -88,23 +93,26 @@ def add_lobes(
     1e-15 m count as that; above them powers of 2 in flux and length scale E to the bit.
     """
     count = position.shape[1]
-    bounds = bound_lobes(lights[9], _whole_from(widening))
+    bounds = bound_lobes(lights[9], whole_from(widening))
     if reach is not None and not reach.outside:
         bound_range(bounds, reach.square, reach.scale)
-    for block in prange((count + TILE - 1) // TILE):
-        first = block * TILE
-        size = min(TILE, count - first)
-        tile = np.zeros((ROWS + 5, TILE), position.dtype)
+    width = TILE if listed is None else LANES
+    for block in prange((count + width - 1) // width):
+        first = block * width
+        size = min(width, count - first)
+        tile = np.zeros((ROWS + 5, width), position.dtype)
         load_tile(tile, position, normal, first, size)
-        row = None if listed is None else listed[block]
-        _add_lights(tile, size, lights, bounds, clamp, widening, reach, row)
+        if listed is None:
+            _add_lights(tile, size, lights, bounds, clamp, widening, reach)
+        else:
+            _add_listed(tile, size, lights, bounds, clamp, widening, reach, listed, block)
         for c in range(3):
             for i in range(size):
                 irradiance[c, first + i] += tile[TOTAL + c, i]
 
 
 @kernel
-def _whole_from(widening: Widening | None) -> float:
+def whole_from(widening: Widening | None) -> float:
     """Return the distance from which on exponents are sure to be whole, m."""
     if widening is None:
         return -1.0
@@ -113,16 +121,15 @@ def _whole_from(widening: Widening | None) -> float:
 
 @kernel
 def _add_lights(
-    tile: Array, size: int, lights: Array, bounds: Array, clamp: Clamp, widening: Widening | None,
-    reach: Range | None, listed: Array | None,
+    tile: Array, size: int, lights: Array, bounds: Array, clamp: Clamp, widening: Widening | None, reach: Range | None,
 ) -> None:
     """Add all lights to the totals of a tile, group by group and in their order."""
     spheres = np.empty((4, PARTS + 1), tile.dtype)
     by_parts = bound_parts(tile, size, spheres)
     scratch, chosen = np.empty((MEASURES, GROUP), tile.dtype), np.empty(GROUP, np.int64)
     for group in range(0, lights.shape[1], GROUP):
-        end = min(group + GROUP, lights.shape[1])
-        found = lobes_in_reach(lights, bounds, group, end, spheres, listed, scratch, chosen)
+        found = list_all(group, min(group + GROUP, lights.shape[1]), chosen)
+        found = lobes_in_reach(lights, bounds, spheres, found, scratch, chosen)
         low, high = PARTS, 0
         for i in range(found):
             k, first, last = chosen[i], 0, PARTS
@@ -134,6 +141,31 @@ def _add_lights(
                 add_lobe(tile, lanes, lights, k, bounds[LIMIT, k], clamp, widening, reach)
         if low < high:
             _close_group(tile, (np.uint64(low * (TILE // PARTS)), np.uint64(high * (TILE // PARTS))))
+
+
+@kernel
+def _add_listed(
+    tile: Array, size: int, lights: Array, bounds: Array, clamp: Clamp, widening: Widening | None, reach: Range | None,
+    listed: Array, block: int,
+) -> None:
+    """Add the lights that list `block` holds to the totals of a tile of LANES, group by group and in their order."""
+    lanes = np.uint64(0), np.uint64(LANES)
+    spheres = np.empty((4, PARTS + 1), tile.dtype)
+    scratch, chosen = np.empty((MEASURES, AT_ONCE), tile.dtype), np.empty(AT_ONCE, np.int64)
+    bound_part(tile, 0, size, spheres, PARTS)
+    for start in range(0, lights.shape[1], AT_ONCE):
+        found = list_chosen(listed, block, start, min(start + AT_ONCE, lights.shape[1]), chosen)
+        if found > 0:
+            found = lobes_in_reach(lights, bounds, spheres, found, scratch, chosen)
+        group = -1
+        for i in range(found):
+            k = chosen[i]
+            if k // GROUP != group and group >= 0:
+                _close_group(tile, lanes)
+            group = k // GROUP
+            add_lobe(tile, lanes, lights, k, scratch[LIMIT, i], clamp, widening, reach)
+        if group >= 0:
+            _close_group(tile, lanes)
 
 
 @kernel

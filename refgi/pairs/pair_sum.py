@@ -98,7 +98,7 @@ def pair_term(light: Any, receiver: Any, limits: Any) -> Any:
 
 
 @kernel
-def load_light(lights: Array, k: int) -> Any:
+def load_light(lights: Array, k: Any) -> Any:
     """Return rows 0 to 8 of packed light k: position, reversed normal, then flux / pi or a lobe's reversed axis."""
     return (lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k], lights[6, k],
             lights[7, k], lights[8, k])

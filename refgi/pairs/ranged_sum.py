@@ -34,6 +34,7 @@ from refgi.pairs.pixel_lights import Range
 Array = npt.NDArray[Any]
 
 LANES = 64  # receivers a list of lights belongs to
+AT_ONCE = 16 * GROUP  # lights that are taken from a list at once
 
 
 @kernel
@@ -96,16 +97,16 @@ def sum_pairs_in_range(
         size = min(LANES, count - first)
         tile = np.zeros((ROWS, LANES), position.dtype)
         load_tile(tile, position, normal, first, size)
-        chosen = np.empty(GROUP + 1, np.int64)
+        chosen = np.empty(AT_ONCE, np.int64)
         black = lights.shape[1] - 1
-        for group in range(0, black, GROUP):
-            end = min(group + GROUP, black)
-            if not any_listed(listed, block, group, end):
-                continue
-            found = _list_chosen(listed, block, group, end, chosen)
-            chosen[found] = black
-            for pair in range(0, found, 2):
-                a, b = chosen[pair], chosen[pair + 1]
+        for start in range(0, black, AT_ONCE):
+            found = list_chosen(listed, block, start, min(start + AT_ONCE, black), chosen)
+            j = 0
+            while j < found:
+                a, b = chosen[j], black
+                if j + 1 < found and chosen[j + 1] // GROUP == a // GROUP:
+                    b = chosen[j + 1]
+                j += 1 if b == black else 2
                 one, two = load_light(lights, a), load_light(lights, b)
                 square_a, square_b = reach.square[a], reach.square[b]
                 limits_a, limits_b = limits_of(clamp, a), limits_of(clamp, b)
@@ -117,7 +118,8 @@ def sum_pairs_in_range(
                     tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6]
                     tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7]
                     tile[SUM + 2, i] = tile[SUM + 2, i] + g1 * one[8] + g2 * two[8]
-            close_group(tile)
+                if j == found or chosen[j] // GROUP != a // GROUP:
+                    close_group(tile)
         for c in range(3):
             for i in range(size):
                 irradiance[c, first + i] = tile[TOTAL + c, i]
@@ -156,21 +158,20 @@ def sum_weighted_pairs(
 
 
 @kernel
-def any_listed(listed: Array, block: int, first: int, last: int) -> bool:
-    """Return whether the light list (m, N) of tile `block` holds any of the lights first to last - 1."""
-    some = False
-    for k in range(first, last):
-        some |= listed[block, k]
-    return some
-
-
-@kernel
-def _list_chosen(listed: Array, block: int, first: int, last: int, chosen: Array) -> int:
-    count = 0
-    for k in range(first, last):
-        chosen[count] = k
-        count += listed[block, k]
-    return count
+def list_chosen(listed: Array, block: int, first: int, last: int, chosen: Array) -> int:
+    """List those of the lights first to last - 1 that tile `block` has in its list, rising; return how many."""
+    row, stop, step = np.uint64(block), np.uint64(last), np.uint64(GROUP)  # unsigned, as in `load_tile`
+    count = np.uint64(0)
+    for group in range(np.uint64(first), stop, step):
+        end = min(group + step, stop)
+        some = False
+        for k in range(group, end):  # in lanes; most groups hold none
+            some |= listed[row, k]
+        if some:
+            for k in range(group, end):
+                chosen[count] = k
+                count += np.uint64(listed[row, k])
+    return int(count)
 
 
 @kernel

@@ -75,7 +75,7 @@ def whole_cones(tile: Array, light: Any, square_radius: Any) -> None:
     real = tile.dtype.type
     one, zero = real(1.0), real(0.0)
     px, py, pz, lx, ly, lz = light
-    for i in range(TILE):
+    for i in range(tile.shape[1]):
         dx, dy, dz = px - tile[X, i], py - tile[X + 1, i], pz - tile[X + 2, i]
         nx, ny, nz = tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
         exact, cl, cx = pair_cosines(dx, dy, dz, lx, ly, lz, nx, ny, nz)

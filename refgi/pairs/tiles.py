@@ -165,21 +165,43 @@ def _put(some: Array, places: Array, values: Array) -> None:
 def bound_tile(tile: Array, size: int, low: Array, high: Array) -> None:
     """Fill the corners of the bounding boxes of a tile's first `size` positions (entries 0 to 2) and normals (3 to 5).
 
-    The tile is (>= 6, TILE), TILE a power of two.
+    The tile is (>= 6, lanes), with a power of two of lanes.
     """
+    bound_rows(tile, 0, 6, size, low, high, 0)
+
+
+@kernel
+def bound_rows(tile: Array, first: int, rows: int, size: int, low: Array, high: Array, entry: int) -> None:
+    """Fill entries from `entry` on with the extremes of the rows of a tile from `first` on, of `size` lanes."""
     # by halves, element by element, which runs in lanes; a running minimum would not
     lanes = tile.shape[1]
     least, most = np.empty(lanes, tile.dtype), np.empty(lanes, tile.dtype)
-    for row in range(6):
+    for row in range(rows):
         for i in range(lanes):
-            least[i] = most[i] = tile[row, i if i < size else 0]
+            least[i] = most[i] = tile[first + row, i if i < size else 0]
         half = lanes // 2
         while half > 0:
             for i in range(half):
                 least[i] = least[i + half] if least[i + half] < least[i] else least[i]
                 most[i] = most[i + half] if most[i + half] > most[i] else most[i]
             half //= 2
-        low[row], high[row] = least[0], most[0]
+        low[entry + row], high[entry + row] = least[0], most[0]
+
+
+@kernel
+def extremes(values: Array, row: int, first: int, last: int) -> Any:
+    """Return the least and the largest of values[row, first:last]."""
+    # four at a time, so that one comparison need not wait for another
+    a = b = c = d = e = f = g = h = values[row, first]
+    rest = first + (last - first) // 4 * 4
+    for i in range(first, rest, 4):
+        p, q, r, s = values[row, i], values[row, i + 1], values[row, i + 2], values[row, i + 3]
+        a, b, c, d = p if p < a else a, q if q < b else b, r if r < c else c, s if s < d else d
+        e, f, g, h = p if p > e else e, q if q > f else f, r if r > g else g, s if s > h else h
+    for i in range(rest, last):
+        p = values[row, i]
+        a, e = p if p < a else a, p if p > e else e
+    return min(min(a, b), min(c, d)), max(max(e, f), max(g, h))
 
 
 @kernel
@@ -212,7 +234,8 @@ def _reaches(lights: Array, first: int, last: int, low: Array, high: Array, reac
     slack = real(ROUNDING) * real(np.finfo(lights.dtype).eps)
     ax, ay, az, bx, by, bz = low[0], low[1], low[2], high[0], high[1], high[2]
     ux, uy, uz, vx, vy, vz = low[3], low[4], low[5], high[3], high[4], high[5]
-    for k in range(first, last):
+    start = np.uint64(first)  # unsigned, which needs no check for places counted from the end
+    for k in range(start, np.uint64(last)):
         # d = light - receiver lies between e and f
         ex, ey, ez = lights[0, k] - bx, lights[1, k] - by, lights[2, k] - bz
         fx, fy, fz = lights[0, k] - ax, lights[1, k] - ay, lights[2, k] - az
@@ -221,4 +244,4 @@ def _reaches(lights: Array, first: int, last: int, low: Array, high: Array, reac
         cx = (max(max(ex * ux, ex * vx), max(fx * ux, fx * vx)) + max(max(ey * uy, ey * vy), max(fy * uy, fy * vy))
               + max(max(ez * uz, ez * vz), max(fz * uz, fz * vz)))
         size = max(abs(ex), abs(fx)) + max(abs(ey), abs(fy)) + max(abs(ez), abs(fz))
-        reach[k - first] = (cl + slack * size > zero) & (cx + slack * size > zero)
+        reach[k - start] = (cl + slack * size > zero) & (cx + slack * size > zero)

@@ -9,11 +9,16 @@ from refgi.errors import InputError
 from refgi.jit import threads
 from refgi.lights import PixelLights
 from refgi.pairs.glossy import block_order, glossy_radiance, summed
+from refgi.pairs.glossy_sum import load_lobes, receiver_lobes_of
+from refgi.pairs.glossy_tile import FARTHEST, TILE_ROWS, M
 from refgi.pairs.packing import pack
+from refgi.pairs.pair_sum import load_tile
 from refgi.pairs.pixel_lights import Range
+from refgi.pairs.ranged_sum import LANES
+from refgi.pairs.receiver_culling import CORNERS, bound_receivers, lights_in_lobes
 from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, LobeSettings, PairSettings, SphereClamp
 from refgi.rsm.buffers.glossy import GlossyPoints
-from refgi.skips import without_skip
+from refgi.skips import count_skips, without_skip
 from tests.glossy import defined
 from tests.pairs.sets import random_directions
 
@@ -160,6 +165,72 @@ def test_bits_do_not_depend_on_order_tiles_threads_or_culling(rng):
         assert np.array_equal(glossy_radiance(some, lights, PLAIN), whole[:, part])
     with threads(1), without_skip("pairs.tiles"):
         assert np.array_equal(glossy_radiance(points, lights, PLAIN), whole)
+
+
+def patch(exponent, real, count=200):
+    """Return receivers of a curved patch seen from above, and lights all around it, some of them on its axes."""
+    rng = np.random.default_rng(3)
+    x, z = rng.uniform(-0.2, 0.2, (2, count))
+    position, normal = np.stack([x, 0.3 * x**2, z]), np.stack([-0.6 * x, np.ones(count), np.zeros(count)])
+    normal /= np.linalg.norm(normal, axis=0)
+    w_o = np.array([0.3, 2.0, 0.4])[:, None] - position
+    w_o /= np.linalg.norm(w_o, axis=0)
+    mirror = 2 * (w_o * normal).sum(axis=0) * normal - w_o
+    on_axes = (position + rng.uniform(0.3, 2, count) * mirror)[:, :40]
+    place = np.concatenate([rng.uniform(-2, 2, (3, 260)), on_axes], axis=1)
+    facing = -place / np.linalg.norm(place, axis=0)
+    lamps = place.shape[1]
+    lights = PixelLights(place, facing, rng.random((3, lamps)), rng.random((3, lamps)), facing,
+                         rng.uniform(0, 60, lamps), lamps)
+    points = GlossyPoints(np.arange(count), position, normal, mirror, np.resize(exponent, count).astype(float),
+                          rng.uniform(0.1, 1, (3, count)))
+    points = GlossyPoints(points.pixel, *(part.astype(real) for part in points[1:]))
+    return points, lights._replace(**{key: getattr(lights, key).astype(real) for key in (
+        "position", "normal", "flux", "lobe_flux", "lobe_axis", "lobe_exponent")})
+
+
+@pytest.mark.feature("REF-19")
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+@pytest.mark.parametrize("exponent", [0.5, 300.0, 5e3, 1e6, [50.0, 1e5]], ids=str)
+def test_lights_off_the_lobes_are_passed_over_to_the_same_bits(exponent, real):
+    points, lights = patch(exponent, real)
+    for pairs, senders in ((PLAIN, lights), (PairSettings(clamp=None, lobe=LobeSettings(widening=1.5)), lights),
+                           (PairSettings(clamp=SphereClamp()), lights._replace(lobe_flux=None))):
+        footprint = np.full(lights.position.shape[1], 0.05)
+        with count_skips() as counts:
+            got = glossy_radiance(points, senders, pairs, footprint)
+        with without_skip("pairs.tiles", "pairs.lobe_tiles", "pairs.receiver_lobes"):
+            assert np.array_equal(glossy_radiance(points, senders, pairs, footprint), got)
+        assert (got > 0).any()
+        left_out, pairs_of_tile = counts["pairs.receiver_lobes"]
+        assert pairs_of_tile % (4 * 300) == 0
+        assert left_out > 0.5 * pairs_of_tile or np.min(exponent) < 5e3
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+@pytest.mark.parametrize("exponent", [0.5, 300.0, 1e6])
+@pytest.mark.parametrize("turn", range(6))
+def test_a_tile_keeps_every_light_that_lies_in_a_lobe_of_it(exponent, real, turn):
+    """Whichever way it faces."""
+    points, lights = patch(exponent, real, 64)
+    sign = real(1 - 2 * (turn % 2))
+    points = points._replace(**{key: np.ascontiguousarray(sign * np.roll(getattr(points, key), turn // 2, axis=0))
+                                for key in ("position", "normal", "mirrored")})
+    lights = lights._replace(position=np.ascontiguousarray(sign * np.roll(lights.position, turn // 2, axis=0)))
+    of = receiver_lobes_of(points.mirrored, points.exponent)
+    tile = np.zeros((TILE_ROWS, LANES), real)
+    load_tile(tile, points.position, points.normal, 0, 64)
+    load_lobes(tile, of, 0, 64)
+    low, high, chosen = np.empty(CORNERS, real), np.empty(CORNERS, real), np.arange(300)
+    cosine = bound_receivers(tile, M, FARTHEST, 64, low, high)
+    kept = chosen[: lights_in_lobes(lights.position, low, high, cosine, 300, chosen)]
+    d = lights.position[:, :, None].astype(float) - points.position[:, None].astype(float)
+    gap = 1 - (d * points.mirrored[:, None]).sum(axis=0) / np.linalg.norm(d, axis=0)
+    inside = np.flatnonzero((gap < of.farthest).any(axis=1))
+    assert set(inside) <= set(kept)
+    assert (np.diff(kept) > 0).all()
+    assert len(inside) >= 40
+    assert len(kept) < 150 or exponent < 5e3
 
 
 @pytest.mark.parametrize("outside", [False, True])

@@ -300,7 +300,7 @@ def test_lights_and_parts_passed_over_change_no_bit(real, widening, evidence):
     """Receivers of a tile lie together or, shuffled, all over the wall, where no light can be passed over."""
     wall, lights = wall_and_lobes(real)
     shuffled = np.random.default_rng(12).permutation(wall.position.shape[2])
-    tiles = -(-len(shuffled) // 256)
+    tiles = -(-len(shuffled) // 64)
     for reach in (None, some_range(lights, real), some_range(lights, real, stochastic=True)):
         together, apart = (sum_of(wall, lights, reach, order=order, widening=widening) for order in (None, shuffled))
         np.testing.assert_array_equal(together, apart)

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import numpy.typing as npt
 
 from refgi.lights.selection import choose_lights, footprints
@@ -12,7 +13,7 @@ from refgi.rsm.buffers.glossy import GlossyPoints, spread_over_picture
 from refgi.settings import replaced
 from refgi.splat.sii.reach.lists import LightLists
 from refgi.splat.sii.reach.reference_length import with_reference_length
-from refgi.splat.sii.settings import FullBound, SiiSettings
+from refgi.splat.sii.settings import FullBound, SiiSettings, TangentBound
 from refgi.stages import stage
 
 if TYPE_CHECKING:
@@ -81,5 +82,20 @@ def glossy_in_range(
         W/m^2/sr, linear RGB.
     """
     packed = checked(as_receivers(points), lights, settings.pairs, footprint)
-    lists = LightLists(packed, replaced(settings, {"reach.bound": FullBound()}), False, 1, None)
-    return summed(points, packed, (lists.diffuse, lists.lobes), width)
+    if settings.reach.on_screen:  # receivers come as a list, not as a picture
+        settings = replaced(settings, {"reach.bound": TangentBound()})
+    lists = LightLists(packed, settings, False, 1, None)
+    ranges = lists.diffuse, lists.lobes
+    if isinstance(settings.reach.bound, FullBound):
+        return summed(points, packed, ranges, width)
+
+    def listed(position: Array, normal: Array) -> tuple[Array | None, Array | None]:
+        diffuse = lobes = None
+        places = np.arange(position.shape[1])
+        if lists.diffuse is not None and packed.spheres is None:  # spheres reach over their horizon
+            ((_, diffuse),) = lists.of_diffuse(position, normal, places)
+        if lists.lobes is not None:
+            ((_, lobes),) = lists.of_lobes(position, normal, places)
+        return diffuse, lobes
+
+    return summed(points, packed, ranges, width, listed)

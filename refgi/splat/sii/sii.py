@@ -18,7 +18,6 @@ from refgi.lights.settings import with_clamp
 from refgi.pairs.irradiance import Receivers, checked, irradiance, over_receivers
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.loss import thinned, warn_of_clamp
-from refgi.pairs.pair_sum import TILE
 from refgi.pairs.ranged_sum import LANES, sum_pairs_in_range, sum_weighted_pairs
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.splat.sii.half_resolution import half_resolution
@@ -187,7 +186,7 @@ def _sum_in_range(
         if packed.lobes is not None:
             for some, listed in lists.of_lobes(here, facing, places):
                 points, normals, found = _chosen(some, here, facing)
-                _tally(listed, TILE, found)
+                _tally(listed, LANES, found)
                 add_lobes(points, normals, *packed.lobes, lists.lobes, listed, found)
                 sums[:, some] += found
 

@@ -2,7 +2,8 @@
 
 A tile of 8 x 8 pixels is bounded by boxes around its positions and normals. A light is left out where the whole tile
 lies behind its surface, it behind the surfaces of all receivers, its solid misses the box, or the largest B that the
-box admits is below I_low. Tiles of 16 x 16 are tested first, their parts only against lights that may reach the whole.
+box admits is below I_low. Strips of 16 x 256 are tested first, then their quarters, then tiles of 16 x 16 and their
+parts, each against the lights that may reach the whole alone.
 All is done from differences of positions, with a margin for rounding: lists may be longer than need be, never shorter.
 
 Symbols: d vector from the solid's centre to the box's, q the half sides of the box; with the solid scaled to the unit
@@ -17,6 +18,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.ranged_sum import LANES
+from refgi.pairs.tiles import extremes
 from refgi.rsm.pool import zeros
 from refgi.splat.sii.reach.bounds import Solids
 from refgi.stages import stage
@@ -25,6 +27,7 @@ Array = npt.NDArray[Any]
 
 MARGIN = 1e-3  # of the solids' axes: the pair test in float32 is off by less at any angle
 ROUNDING = 32.0  # units of rounding that differences of squares may be off
+PARTS, WIDE, WIDEST = TILE // LANES, 4 * TILE // LANES, 16 * TILE // LANES  # parts that are tested together
 # rows of a packed solid
 PLACE, BACK, SHIFT, AXIS, ACROSS, FLATNESS, BALL, SQUARE, SOLID_ROWS = 0, 3, 6, 9, 12, 13, 14, 15, 16
 
@@ -82,70 +85,68 @@ def list_lights(position: Array, normal: Array, solids: Array) -> Array:
     return listed
 
 
-def of_whole_tiles(listed: Array) -> Array:
-    """Return the light lists of tiles of TILE receivers from those (m, N) of their parts of LANES: of any of them."""
-    parts = TILE // LANES
-    whole = listed[::parts].copy()
-    for part in range(1, parts):
-        some = listed[part::parts]
-        whole[: len(some)] |= some
-    return whole
-
-
 @kernel(parallel=True)
 def _list(position: Array, normal: Array, solids: Array, balls: bool, listed: Array) -> None:
-    count, parts = position.shape[1], TILE // LANES
-    for block in prange((count + TILE - 1) // TILE):
-        low, high = np.empty((parts + 1, 6), position.dtype), np.empty((parts + 1, 6), position.dtype)
-        here = min(parts, (count - block * TILE + LANES - 1) // LANES)
-        _bound_parts(position, normal, block * TILE, here, low, high)
-        passed = np.empty(solids.shape[1], np.bool_)
-        _reach(solids, solids.shape[1], low[parts], high[parts], balls, passed)
-        near, chosen = np.empty_like(solids), np.empty(solids.shape[1], np.uint32)
-        found = _compact(solids, passed, near, chosen)
-        for part in range(here):
-            _reach(near, found, low[part], high[part], balls, passed)
-            _scatter(listed[block * parts + part], chosen, passed, found)
+    count = len(listed)
+    for strip in prange((count + WIDEST - 1) // WIDEST):
+        first = strip * WIDEST
+        here = min(WIDEST, count - first)
+        low, high = np.empty((WIDEST + 1, 6), position.dtype), np.empty((WIDEST + 1, 6), position.dtype)
+        _bound_parts(position, normal, first * LANES, here, low, high)
+        near = np.empty((3, *solids.shape), solids.dtype)
+        chosen, passed = np.empty((3, solids.shape[1]), np.uint32), np.empty(solids.shape[1], np.bool_)
+        found = _narrow(solids, solids.shape[1], None, low, high, 0, here, balls, passed, near[0], chosen[0])
+        for a in range(0, here if found > 0 else 0, WIDE):
+            wide = min(a + WIDE, here)
+            some = _narrow(near[0], found, chosen[0], low, high, a, wide, balls, passed, near[1], chosen[1])
+            for b in range(a, wide if some > 0 else a, PARTS):
+                end = min(b + PARTS, wide)
+                few = _narrow(near[1], some, chosen[1], low, high, b, end, balls, passed, near[2], chosen[2])
+                for part in range(b, end if few > 0 else b):
+                    _reach(near[2], few, low[part], high[part], balls, passed)
+                    _scatter(listed[first + part], chosen[2], passed, few)
 
 
 @kernel
 def _bound_parts(position: Array, normal: Array, first: int, parts: int, low: Array, high: Array) -> None:
-    """Bound each part of a tile, and in the last row the whole."""
-    last = len(low) - 1
+    """Bound each part of LANES receivers, from receiver `first` on."""
     for part in range(parts):
         start = first + part * LANES
         end = min(start + LANES, position.shape[1])
         for axis in range(3):
-            low[part, axis], high[part, axis] = _extremes(position, axis, start, end)
-            low[part, 3 + axis], high[part, 3 + axis] = _extremes(normal, axis, start, end)
-    for row in range(6):
-        low[last, row], high[last, row] = low[0, row], high[0, row]
-        for part in range(1, parts):
-            low[last, row] = min(low[last, row], low[part, row])
-            high[last, row] = max(high[last, row], high[part, row])
+            low[part, axis], high[part, axis] = extremes(position, axis, start, end)
+            low[part, 3 + axis], high[part, 3 + axis] = extremes(normal, axis, start, end)
 
 
 @kernel
-def _extremes(values: Array, row: int, first: int, last: int) -> Any:
-    """Return the least and the largest of values[row, first:last]."""
-    # four at a time, so that one comparison need not wait for another
-    a = b = c = d = e = f = g = h = values[row, first]
-    rest = first + (last - first) // 4 * 4
-    for i in range(first, rest, 4):
-        p, q, r, s = values[row, i], values[row, i + 1], values[row, i + 2], values[row, i + 3]
-        a, b, c, d = p if p < a else a, q if q < b else b, r if r < c else c, s if s < d else d
-        e, f, g, h = p if p > e else e, q if q > f else f, r if r > g else g, s if s > h else h
-    for i in range(rest, last):
-        p = values[row, i]
-        a, e = p if p < a else a, p if p > e else e
-    return min(min(a, b), min(c, d)), max(max(e, f), max(g, h))
+def _narrow(
+    solids: Array, count: int, of: Array | None, low: Array, high: Array, first: int, last: int, balls: bool,
+    passed: Array, near: Array, chosen: Array,
+) -> int:
+    """Copy those of `count` solids that may reach the boxes first to last - 1 to `near`; return how many there are.
+
+    `chosen` is filled with which lights they are of, `of` says so for the solids; None: they are all there are. The
+    last row of `low` and `high` is scratch.
+    """
+    row = len(low) - 1
+    for axis in range(6):
+        low[row, axis], high[row, axis] = low[first, axis], high[first, axis]
+        for part in range(first + 1, last):
+            low[row, axis] = min(low[row, axis], low[part, axis])
+            high[row, axis] = max(high[row, axis], high[part, axis])
+    _reach(solids, count, low[row], high[row], balls, passed)
+    found = _compact(solids, count, passed, near, chosen)
+    if of is not None:
+        for i in range(found):
+            chosen[i] = of[chosen[i]]
+    return found
 
 
 @kernel
-def _compact(solids: Array, passed: Array, near: Array, chosen: Array) -> int:
-    """Copy the solids that passed to the front and return how many there are."""
+def _compact(solids: Array, tested: int, passed: Array, near: Array, chosen: Array) -> int:
+    """Copy those of the `tested` solids that passed to the front and return how many there are."""
     count = 0
-    for k in range(len(passed)):
+    for k in range(tested):
         chosen[count] = k
         count += passed[k]
     for row in range(SOLID_ROWS):

@@ -13,7 +13,6 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers, checked, over_receivers
 from refgi.pairs.lobe_shape import Widening
-from refgi.pairs.pair_sum import TILE
 from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import LANES, reached
 from refgi.splat.sii.reach.lists import LightLists, listed_pairs
@@ -118,13 +117,12 @@ def fragments(
                              for some, listed in lists.of_diffuse(here, facing, places))
         if packed.lobes is not None and lists.lobes is not None:
             for some, listed in lists.of_lobes(here, anywhere, places):
-                finer = np.repeat(listed, TILE // LANES, axis=0)[: -(-len(places[some]) // LANES)]
-                counts, total = np.zeros(finer.shape, np.uint8), np.zeros(len(places[some]), np.int32)
+                counts, total = np.zeros(listed.shape, np.uint8), np.zeros(len(places[some]), np.int32)
                 points = np.ascontiguousarray(here[:, some])
-                _count_lobes(points, packed.lobes.lights, packed.lobes.widening, lists.lobes, finer, counts, total)
+                _count_lobes(points, packed.lobes.lights, packed.lobes.widening, lists.lobes, listed, counts, total)
                 overdraw.reshape(-1)[places[some]] += total
                 of_light[packed.glossy] += counts.sum(axis=0, dtype=int)
-            evaluated += sum(listed_pairs(listed, TILE, len(places[some]))
+            evaluated += sum(listed_pairs(listed, LANES, len(places[some]))
                              for some, listed in lists.of_lobes(here, facing, places))
 
     over_receivers(receivers, packed, add)

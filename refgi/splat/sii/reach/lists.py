@@ -11,7 +11,7 @@ from refgi.pairs.packing import Packed
 from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import LANES
 from refgi.skips import left_out
-from refgi.splat.sii.reach.bins import list_lights, of_whole_tiles, pack_solids
+from refgi.splat.sii.reach.bins import list_lights, pack_solids
 from refgi.splat.sii.reach.bounds import Solids, light_solids
 from refgi.splat.sii.reach.screen_bounds import covered_pixels, screen_quads, tiles_of_pixels, tiles_of_quads
 from refgi.splat.sii.reach.threshold import DIFFUSE, GLOSSY, all_peaks, light_range, threshold
@@ -74,10 +74,9 @@ class LightLists:
         return self._lists(position, normal, places, self._packed.diffuse[:, :-1], self.diffuse_solids(), nearest=True)
 
     def of_lobes(self, position: Array, normal: Array, places: Array) -> Iterator[tuple[Some, Array]]:
-        """Yield receivers, and which lobes may count for which tile of TILE of them, (ceil(n / TILE), K)."""
+        """Yield receivers, and which lobes may count for which tile of LANES of them, (ceil(n / LANES), K)."""
         assert self._packed.lobes is not None
-        lists = self._lists(position, normal, places, self._packed.lobes.lights, self.lobe_solids(), nearest=False)
-        return ((some, of_whole_tiles(listed)) for some, listed in lists)
+        return self._lists(position, normal, places, self._packed.lobes.lights, self.lobe_solids(), nearest=False)
 
     def diffuse_solids(self) -> Solids:
         """Return the bounds of the diffuse lights, without the black one."""

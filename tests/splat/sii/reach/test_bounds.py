@@ -254,3 +254,28 @@ def test_no_light_that_counts_is_left_out_of_a_list(seed, spread, far, kind, nea
             assert not reached(*(lights[:, k] - place[:, lane]), *-facing[:, k], square[k])
     if spread == 1e-3 and far == 0:
         assert listed.mean() < 0.8
+
+
+@pytest.mark.feature("REF-14")
+@pytest.mark.parametrize("count", [LANES, 4096 + 3 * 256 + 70, 2 * 4096])
+def test_lists_of_many_tiles_are_those_of_each_tile_alone(count):
+    """Strips that are tested first leave out no light that counts, and no list is longer than its tile's own."""
+    rng = np.random.default_rng(5)
+    place = np.stack([0.02 * np.arange(count), *rng.uniform(-0.3, 0.3, (2, count))]).astype(np.float32)
+    normal = np.broadcast_to(np.array([[0.0], [0.0], [1.0]], np.float32), place.shape).copy()
+    lights = rng.uniform([[-5], [-2], [-1]], [[0.02 * count + 5], [2], [2]], (3, 300)).astype(np.float32)
+    facing = sets.random_directions(rng, 300).astype(np.float32)
+    square = rng.uniform(0.05, 9, 300).astype(np.float32) ** 2
+    packed = pack_solids(light_solids(lights, facing, np.ones(300), square, True), -facing, nearest=True)
+    listed = list_lights(place, normal, packed)
+    assert listed.shape == (-(-count // LANES), 300)
+    for tile, found in enumerate(listed):
+        part = slice(tile * LANES, (tile + 1) * LANES)
+        here, up = np.ascontiguousarray(place[:, part]), np.ascontiguousarray(normal[:, part])
+        alone = list_lights(here, up, packed)[0]
+        assert not (found & ~alone).any()
+        for k in np.flatnonzero(alone & ~found):
+            for lane in range(here.shape[1]):
+                assert not reached(*(lights[:, k] - here[:, lane]), *-facing[:, k], square[k])
+        assert found.sum() >= 0.9 * alone.sum() - 1
+    assert 0.01 < listed.mean() < 0.9

@@ -105,4 +105,4 @@ def test_kinds_hold_for_float64(name, size):
             assert (texels[few & ~empty] <= 1 << kind[few & ~empty]).all()
             passed, small = passed + none.sum(), small + few.sum()
     assert passed > 0
-    assert small > 0 or name == "near"
+    assert small > 0 or name == "near" or size > 256

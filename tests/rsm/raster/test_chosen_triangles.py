@@ -24,6 +24,13 @@ def moved(shape, shift, scale, rng):
     return geometry(scale * (shape.vertices @ rotation(rng).T + shift), shape.faces)
 
 
+def shell(rng, count, radius, size):
+    """Small triangles about as far from the origin as a ball reaches that is cut away."""
+    outward = rng.normal(size=(count, 1, 3))
+    outward *= radius / np.linalg.norm(outward, axis=2, keepdims=True)
+    return geometry(outward + rng.normal(0, size, (count, 3, 3)), np.arange(3 * count))
+
+
 SHAPES = {
     "dense": lambda _: sphere(60, 1.0, (0, 0, 0.4)),
     "dust": lambda rng: soup(rng, 4000, 1.0, 0.004),
@@ -31,6 +38,7 @@ SHAPES = {
     "slivers": lambda rng: soup(rng, 1500, 1.0, np.array([0.3, 1e-5, 1e-3])),
     "degenerate": lambda rng: geometry(soup(rng, 900, 1.0, 0.01).vertices, np.arange(2700) - (np.arange(2700) % 3 > 1)),
     "near": lambda rng: soup(rng, 3000, 0.02, 0.002),
+    "shell": lambda rng: shell(rng, 3000, 0.6, 0.006),
     "on the axes": lambda rng: geometry(np.round(soup(rng, 1500, 1.0, 0.05).vertices * 32) / 32, np.arange(4500)),
 }
 
@@ -48,7 +56,7 @@ def test_distances_keep_their_bits(name, size, scale, shift):
         shape = geometry(scale * shape.vertices, shape.faces)
     maps = paraboloid_projection(scale * (centers + shift), [(0, 0, 1.0), *rng.normal(size=(3, 3))], size)
     laid = chunks(shape.vertices, shape.faces)
-    none, radius = np.zeros(4), scale * np.array([0.0, 0.01, 0.2, 0.6])
+    none, radius = np.zeros(4), scale * np.array([0.6, 0.01, 0.2, 0.0])
     for ignored in (Ignored(none, none), Ignored(none, radius), Ignored(radius, none)):
         drawn, plain = np.empty((2, 4 * size, size))
         found = draw_distances(maps, laid, ignored, 2, drawn)

@@ -109,24 +109,40 @@ def _longest(x: float, y: float, z: float) -> Any:
 
 
 @kernel
-def transform_chunk(corners: Array, chunk: int, view: Any, half: float, size: int, ball: float, setup: Array) -> None:
-    """Write where every triangle of a chunk lies on a map.
+def gather(vertices: Array, faces: Array, members: Array, count: int, setup: Array) -> None:
+    """Write the corners of some triangles, world space: loads that wait for memory, many under way at once.
 
-    `corners` (c, 9, CHUNK): corners of the triangles of each chunk, world space, m. `view`: centre of the map, then its
-    frame, row by row. `half`: half extent of the map. `size`: texels along a side. `ball`: triangles all nearer than
-    this to the centre are `NEAR`, m. `setup` (ROWS * CHUNK,): receives corners, state and box of each.
+    `vertices` (n, 3): m. `faces` (m, 3): vertices of each triangle. `members`: triangles, of which the first `count`
+    are taken. `setup` (ROWS * CHUNK,): receives corners.
+    """
+    for b in range(count):
+        face = members[b]
+        i, j, k, at = faces[face, 0], faces[face, 1], faces[face, 2], CORNERS + b
+        for axis in range(3):
+            setup[at + axis * CHUNK] = vertices[i, axis]
+            setup[at + (3 + axis) * CHUNK] = vertices[j, axis]
+            setup[at + (6 + axis) * CHUNK] = vertices[k, axis]
+
+
+@kernel
+def transform(view: Any, half: float, size: int, ball: float, setup: Array) -> None:
+    """Write where every triangle of a batch lies on a map.
+
+    `view`: centre of the map, then its frame, row by row. `half`: half extent of the map. `size`: texels along a side.
+    `ball`: triangles all nearer than this to the centre are `NEAR`, m. `setup` (ROWS * CHUNK,): corners are taken to
+    the map's frame; receives state and box of each.
     """
     ox, oy, oz, rx, ry, rz, dx, dy, dz, fx, fy, fz = view
     texels, within = 0.5 * size / half, ball * ball
     low_offset, high_offset = half * texels - (0.5 + BOX_PAD), half * texels + (BOX_PAD - 0.5)
     for b in range(CHUNK):
-        px, py, pz = corners[chunk, 0, b] - ox, corners[chunk, 1, b] - oy, corners[chunk, 2, b] - oz
-        xi, yi, zi = rx * px + ry * py + rz * pz, dx * px + dy * py + dz * pz, fx * px + fy * py + fz * pz
-        px, py, pz = corners[chunk, 3, b] - ox, corners[chunk, 4, b] - oy, corners[chunk, 5, b] - oz
-        xj, yj, zj = rx * px + ry * py + rz * pz, dx * px + dy * py + dz * pz, fx * px + fy * py + fz * pz
-        px, py, pz = corners[chunk, 6, b] - ox, corners[chunk, 7, b] - oy, corners[chunk, 8, b] - oz
-        xk, yk, zk = rx * px + ry * py + rz * pz, dx * px + dy * py + dz * pz, fx * px + fy * py + fz * pz
         at = CORNERS + b
+        px, py, pz = setup[at] - ox, setup[at + CHUNK] - oy, setup[at + 2 * CHUNK] - oz
+        xi, yi, zi = rx * px + ry * py + rz * pz, dx * px + dy * py + dz * pz, fx * px + fy * py + fz * pz
+        px, py, pz = setup[at + 3 * CHUNK] - ox, setup[at + 4 * CHUNK] - oy, setup[at + 5 * CHUNK] - oz
+        xj, yj, zj = rx * px + ry * py + rz * pz, dx * px + dy * py + dz * pz, fx * px + fy * py + fz * pz
+        px, py, pz = setup[at + 6 * CHUNK] - ox, setup[at + 7 * CHUNK] - oy, setup[at + 8 * CHUNK] - oz
+        xk, yk, zk = rx * px + ry * py + rz * pz, dx * px + dy * py + dz * pz, fx * px + fy * py + fz * pz
         setup[at], setup[at + CHUNK], setup[at + 2 * CHUNK] = xi, yi, zi
         setup[at + 3 * CHUNK], setup[at + 4 * CHUNK], setup[at + 5 * CHUNK] = xj, yj, zj
         setup[at + 6 * CHUNK], setup[at + 7 * CHUNK], setup[at + 8 * CHUNK] = xk, yk, zk

@@ -4,7 +4,7 @@ A vertex is kept as (column, row, w, n): its continuous texel coordinates, w (ax
 (1; the nearness 1 - depth/reach when orthographic). Nothing is clipped: of a triangle that crosses the plane of the
 eye, the box is that of its forward part.
 
-`chunks` groups consecutive triangles, corners in the order of SIMD lanes, each chunk with its bounding box.
+`chunks` groups consecutive triangles, each chunk with its bounding box and float32 corners in the order of SIMD lanes.
 """
 
 from typing import Any, NamedTuple
@@ -147,34 +147,42 @@ def _open_interval(place: Any, w: Any) -> tuple[float, float]:
 class Chunks(NamedTuple):
     """Triangles of c chunks, in mesh order; the last is filled up with triangles without area."""
 
-    corners: Array  # (c, 9, CHUNK) float64, m: x, y, z of the first corner, of the second, of the third
+    vertices: Array  # (n, 3) float64, m
+    faces: Array  # (c CHUNK, 3) int32
+    corners: Array  # (c, 9, CHUNK) float32, m: x, y, z of the corners from the least of the box, first to third
     box: Array  # (c, 6) float64, m: least x, y, z, then greatest
 
 
 def chunks(vertices: Array, faces: Array) -> Chunks:
     """Group triangles in chunks.
 
-    `vertices` (n, 3) float64: world space, m. `faces` (m, 3): vertices of each triangle. Result: a copy of their
-    corners.
+    `vertices` (n, 3) float64: world space, m. `faces` (m, 3): vertices of each triangle. Result: the same vertices, and
+    a copy of corners.
     """
     number = (len(faces) + CHUNK - 1) // CHUNK
-    filled = Chunks(plane((number, 9, CHUNK), np.float64), np.empty((number, 6)))
-    _fill_chunks(vertices, faces, filled.corners, filled.box)
+    filled = Chunks(np.ascontiguousarray(vertices, np.float64), plane((number * CHUNK, 3), np.int32),
+                    plane((number, 9, CHUNK), np.float32), np.empty((number, 6)))
+    _fill_chunks(faces, filled)
     return filled
 
 
 @kernel(parallel=True)
-def _fill_chunks(vertices: Array, faces: Array, corners: Array, box: Array) -> None:
+def _fill_chunks(faces: Array, filled: Chunks) -> None:
+    vertices, corners, box = filled.vertices, filled.corners, filled.box
     for chunk in prange(len(box)):
-        first = np.int64(chunk) * CHUNK
+        first, last = np.int64(chunk) * CHUNK, len(faces) - 1
         for axis in range(3):
             box[chunk, axis], box[chunk, 3 + axis] = np.inf, -np.inf
-        for b in range(CHUNK):
-            face, here = first + b, first + b < len(faces)
+        for face in range(first, first + CHUNK):
             for corner in range(3):
-                vertex = faces[face if here else len(faces) - 1, corner if here else 0]
+                vertex = faces[min(face, last), corner if face <= last else 0]
+                filled.faces[face, corner] = vertex
                 for axis in range(3):
                     value = vertices[vertex, axis]
-                    corners[chunk, 3 * corner + axis, b] = value
                     box[chunk, axis] = min(box[chunk, axis], value)
                     box[chunk, 3 + axis] = max(box[chunk, 3 + axis], value)
+        for b in range(CHUNK):
+            for corner in range(3):
+                vertex = filled.faces[first + b, corner]
+                for axis in range(3):
+                    corners[chunk, 3 * corner + axis, b] = vertices[vertex, axis] - box[chunk, axis]

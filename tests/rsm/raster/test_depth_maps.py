@@ -52,8 +52,10 @@ def test_skipped_chunks_hold_nothing_that_is_seen(count):
 def test_chunks_hold_every_triangle_and_their_boxes():
     shape = soup(np.random.default_rng(3), CHUNK + 5)
     laid = chunks(shape.vertices, shape.faces)
-    corners = laid.corners.transpose(0, 2, 1).reshape(-1, 3, 3)
+    corners = laid.vertices[laid.faces]
     np.testing.assert_array_equal(corners[: CHUNK + 5], shape.vertices[shape.faces])
+    local = (corners - laid.box[:, :3].repeat(CHUNK, axis=0)[:, None]).astype(np.float32)
+    np.testing.assert_array_equal(laid.corners.transpose(0, 2, 1).reshape(-1, 3, 3), local)
     padding = corners[CHUNK + 5 :]
     np.testing.assert_array_equal(padding, np.repeat(padding[:, :1], 3, axis=1))
     for chunk, part in enumerate((corners[:CHUNK], corners[CHUNK : CHUNK + 5])):

@@ -168,9 +168,9 @@ def _average_rounded(values: Array, depths: Array, means: Array, row: int, row_z
         a, b, c, d = values[0, lane], values[1, lane], values[2, lane], values[3, lane]
         means[row, lane] = quarter * ((eight_bits(a) + eight_bits(b)) + (eight_bits(c) + eight_bits(d)))
     for lane in range(LANES):
-        a, b = depths[0, lane] * values[0, lane], depths[1, lane] * values[1, lane]
-        c, d = depths[2, lane] * values[2, lane], depths[3, lane] * values[3, lane]
-        means[row_z, lane] = quarter * ((half_precision(a) + half_precision(b)) + (half_precision(c) + half_precision(d)))
+        a, b = half_precision(depths[0, lane] * values[0, lane]), half_precision(depths[1, lane] * values[1, lane])
+        c, d = half_precision(depths[2, lane] * values[2, lane]), half_precision(depths[3, lane] * values[3, lane])
+        means[row_z, lane] = quarter * ((a + b) + (c + d))
 
 
 @kernel

@@ -46,7 +46,8 @@ def maps(n, dtype):
 @pytest.mark.feature("VAL-16")
 @pytest.mark.parametrize("n", SIZES)
 @pytest.mark.parametrize(("terms", "dtype", "quantised"), [
-    (4, np.float32, False), (4, np.float32, True), (5, np.float32, False), (1, np.float64, False), (3, np.float64, True)])
+    (4, np.float32, False), (4, np.float32, True), (5, np.float32, False), (1, np.float64, False),
+    (3, np.float64, True)])
 def test_level_1_is_the_mean_of_all_texels_to_the_bit(n, terms, dtype, quantised):
     for name, depth in maps(n, dtype).items():
         mip = reads.mip(depth, terms, quantised=quantised, mirrored=True)

@@ -75,11 +75,11 @@ def half_precision(value: Any) -> Any:
 @kernel
 def normalise(depth: Array, scale: DepthScale, out: Array) -> None:
     """Fill `out` (n, n) with t of the distances `depth` (n, n), m; `scale.most` where the map is empty (inf)."""
-    real, n = depth.dtype.type, depth.shape[0]
+    real, columns = depth.dtype.type, depth.shape[1]
     most, nothing = real(scale.most), real(np.inf)
-    for i in range(n):
-        for first in range(0, n, RUN):
-            last, empty = min(first + RUN, n), True
+    for i in range(depth.shape[0]):
+        for first in range(0, columns, RUN):
+            last, empty = min(first + RUN, columns), True
             for j in range(np.uint64(first), np.uint64(last)):
                 empty &= depth[i, j] == nothing
             if empty:

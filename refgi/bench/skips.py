@@ -48,6 +48,8 @@ UNMEASURED = (
     Kernel(frozenset({"val"}), "visibility at the receivers of a tile that get no light",
            "those with light move together inside of the kernel that also lights them"),
     Kernel(frozenset({"val"}), "triangles wholly behind a map's hemisphere", "inside of the rasterizer"),
+    Kernel(frozenset({"val"}), "the basis of a map's texels where it is empty",
+           "they are all alike, and copied inside of the kernel that filters the others"),
     Kernel(frozenset({"multires"}), "cells of subsplats without surface", "the list of leaves is made without them"),
     Kernel(frozenset({"hssil"}), "samples that are dark for a whole strip of a level",
            "the others are summed in twos: dark ones among them would move which"),

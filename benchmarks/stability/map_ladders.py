@@ -39,7 +39,7 @@ FACES = (((1, 0, 0), (0, 1, 0)), ((-1, 0, 0), (0, 1, 0)), ((0, 1, 0), (0, 0, 1))
 def _fill_points(maps: Projection, x: Array, out: Array) -> None:
     for i in range(x.shape[1]):
         u, v, out[2, i] = image_point(maps, i, x[0, i], x[1, i], x[2, i])
-        column, row = texel_coordinates(maps, 0, u, v)
+        column, row = texel_coordinates((maps.half[0], maps.half[1]), maps.height, maps.width, 0, u, v)
         out[0, i], out[1, i] = column, row
 
 

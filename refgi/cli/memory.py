@@ -16,7 +16,7 @@ PIXEL_FLOATS = 32  # G-buffer, visibility, direct and indirect light, radiance, 
 TRUTH_PIXEL_BYTES = 250  # receivers, moments, results
 COMPARED_PIXEL_BYTES = 90  # a method's or reference's pictures, maps and figures
 TEXEL_FLOATS = 36
-FACE_BYTES = 400  # vertices, faces, Embree's tree
+FACE_BYTES = 460  # vertices, faces, clusters, Embree's tree
 
 
 def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4, rsm_resolution: int = 512,

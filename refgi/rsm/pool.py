@@ -17,8 +17,21 @@ Array = npt.NDArray[Any]
 PAGE = 4096  # bytes
 SMALL = 1 << 18  # bytes; smaller arrays are left to NumPy
 STEPS = 5  # a block is up to 2^(1 - STEPS) larger than what is asked for
-# bytes that the pool keeps: a frame of 1024 x 1024 pixels takes about 100 MB, one of 4096 x 4096 sixteen times as much
-MOST_IDLE = max(1 << 28, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 16)
+
+
+def most_idle() -> int:
+    """Return how many bytes the pool keeps: a sixteenth of the machine's memory, 256 MB at least.
+
+    A frame of 1024 x 1024 pixels takes about 100 MB, one of 4096 x 4096 sixteen times as much.
+    """
+    try:
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):  # a system that does not tell
+        memory = 0
+    return max(1 << 28, memory // 16)
+
+
+MOST_IDLE = most_idle()
 
 
 class _Pool:

@@ -76,13 +76,13 @@ def write(path):
     time.sleep(0.2)  # in which the host sees that it heeds signals
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, signal.SIG_DFL)
-    time.sleep(0.5)
+    time.sleep(1.0)
     path.write_text(TEXT)
 """
 SPEAKS = """
 def write(path):
     try:
-        time.sleep(1.0)  # most of its time, also beside other work
+        time.sleep(2.5)  # most of its time, also where the host was measured beside other work
     except BaseException:
         raise ValueError("by the way")
     path.write_text(TEXT)

@@ -12,7 +12,7 @@ from refgi.pairs.glossy import block_order, glossy_radiance, summed
 from refgi.pairs.glossy_sum import load_lobes, receiver_lobes_of
 from refgi.pairs.glossy_tile import FARTHEST, TILE_ROWS, M
 from refgi.pairs.packing import pack
-from refgi.pairs.pair_sum import load_tile
+from refgi.pairs.pair_sum import GROUP, load_tile
 from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import LANES
 from refgi.pairs.receiver_culling import CORNERS, bound_receivers, lights_in_lobes
@@ -264,3 +264,24 @@ def test_blocks_follow_blocks():
     assert (row.max(), column.max()) == (15, 15)
     assert (row[:64].max(), column[:64].max()) == (7, 7)
     assert (row[:16].max(), column[:16].max()) == (3, 3)
+
+
+@pytest.mark.parametrize("lobe", [False, True], ids=["diffuse", "lobe"])
+def test_groups_are_summed_apart(lobe):
+    """Analytic: lights of a second group that are too dim to be added to the first's sum one by one count together."""
+    real, count = np.float32, 2 * GROUP
+    share = np.full(count, 2.0**-60)
+    share[0], share[GROUP:] = 1.0, 2.0**-25
+    above, flux = np.array([[0.0], [0.0], [1.0]], real), np.tile(share, (3, 1)).astype(real)
+    everywhere, none = np.repeat(above, count, axis=1), np.zeros((3, count), real)
+    points = GlossyPoints(np.zeros(1, int), np.zeros((3, 1), real), above, above, np.full(1, 8, real),
+                          np.ones((3, 1), real))
+    lights = PixelLights(everywhere, -everywhere, none if lobe else flux, flux if lobe else none, -everywhere,
+                         np.full(count, 4, real), count)
+    if not lobe:
+        lights = lights._replace(lobe_flux=None, lobe_axis=None, lobe_exponent=None)
+    alone = lights._replace(**{key: part[..., :1] for key, part in lights._asdict().items()
+                               if part is not None and key != "drawn"})
+    ratio = glossy_radiance(points, lights, PLAIN).astype(float) / glossy_radiance(points, alone, PLAIN)
+    # roundings of both sums and of the norm; joined, the second group's lights would be lost: 32 U
+    np.testing.assert_allclose(ratio, 1 + GROUP * 2.0**-25, rtol=0, atol=4 * U)

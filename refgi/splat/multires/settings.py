@@ -176,7 +176,7 @@ class ByError(Settings):
     PRINCIPAL = "target"
 
     target: float = setting(0.05, "RMSE to the full sum over its mean; saves pairs, and time from about 1000 lights on "
-                                  "or with shadow rays", least=LEAST_TARGET)
+                                  "or, on most scenes, with shadow rays", least=LEAST_TARGET)
     coarsest: int = setting(16, "cells of the coarsest level along the longer side", least=1, most=MOST_CELLS)
     visibility: Rays | ClusteredShadows | None = setting(None, SEEN)
 

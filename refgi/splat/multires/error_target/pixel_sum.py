@@ -15,12 +15,12 @@ from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers, add_lights, checked
 from refgi.pairs.packing import Packed
 from refgi.pairs.settings import PairSettings
-from refgi.pairs.shadow_rays import BATCH, RayReceivers, Senders, shadowed_sum, summed
+from refgi.pairs.shadow_rays import BATCH, RayReceivers, Senders, summed
 from refgi.pairs.tiles import put, taken
 from refgi.rsm.pool import zeros
 from refgi.splat.multires.error_target.near import SIDE, NearLight, near_light
 from refgi.splat.multires.refinement.grid import level_shape
-from refgi.splat.multires.subsplats.evaluate import ray_receivers
+from refgi.splat.multires.subsplats.evaluate import ray_receivers, visible_at
 
 if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
@@ -65,10 +65,6 @@ def shadowed_by_rays(tracer: "Tracer", geometry: "Geometry", buffer: "GBuffer", 
     `tracer`: the scene's rays. `geometry`: the triangles that the buffer's ids refer to. `lights`: N pixel lights.
     """
 
-    def at(pixel: Array) -> Array:
-        points = ray_receivers(tracer, geometry, buffer, pixel)
-        return shadowed_sum(tracer, points, lights).astype(buffer.position.dtype)
-
     def near(receivers: Receivers, most: float) -> NearLight:
         found, width = _nothing_near(receivers), receivers.covered.shape[1]
         if most <= 0:
@@ -80,7 +76,7 @@ def shadowed_by_rays(tracer: "Tracer", geometry: "Geometry", buffer: "GBuffer", 
         found.has_near[pixel // width // SIDE, pixel % width // SIDE] = True
         return found._replace(pairs=peaks.pairs)
 
-    return PixelSum(at, near)
+    return PixelSum(visible_at(tracer, geometry, buffer, lights), near)
 
 
 class Peaks:

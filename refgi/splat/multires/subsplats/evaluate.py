@@ -179,8 +179,19 @@ def evaluate_visible(
     offsets, lobes' norms and widening, published forms) and means over a cell, which lie on no triangle, have no
     counterpart here.
     """
-    points = ray_receivers(tracer, geometry, buffer, subsplats.pixel)
-    return shadowed_sum(tracer, points, lights).astype(buffer.position.dtype)
+    return visible_at(tracer, geometry, buffer, lights)(subsplats.pixel)
+
+
+def visible_at(
+    tracer: "Tracer", geometry: Geometry, buffer: "GBuffer", lights: "PixelLights"
+) -> Callable[[Array], Array]:
+    """Return a function from covered pixels (n flat indices) to what `evaluate_visible` gives them, (3, n), W/m^2."""
+
+    def at(pixel: Array) -> Array:
+        points = ray_receivers(tracer, geometry, buffer, pixel)
+        return shadowed_sum(tracer, points, lights).astype(buffer.position.dtype)
+
+    return at
 
 
 def ray_receivers(tracer: "Tracer", geometry: Geometry, buffer: "GBuffer", pixel: Array) -> RayReceivers:

@@ -2,13 +2,14 @@
 
 A direction of density cos/pi that finds radiance L contributes pi L. Both estimators are combined by multiple
 importance sampling (MIS) at a bounded geometry term G: the light side has min(G, b), weight min(1, b / G); here the
-rest remains, weight max(0, (G - b) / G) of each part's radiance (Kollig & Keller 2004). Without bound the weight is 1.
+rest remains, weight max(0, (G - b) / G) of diffuse radiance (Kollig & Keller 2004). Without bound the weight is 1.
+Lobes are weighted by how densely both estimators sample a point instead (`refgi.truth.cell_picks`).
 Directions are points of a low-discrepancy set that is scrambled anew in every pass and shifted by a random word per
 pixel.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,8 @@ from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS, STEPS, ray_offset
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.scene import LightTable
+from refgi.truth.cell_picks import density_at, directions_density
+from refgi.truth.lobe_cells import LobeCells
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point, row
 from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_pattern, shading_normal
 from refgi.truth.textured import diffuse_at
@@ -101,23 +104,34 @@ def _send(receivers: RayReceivers, first: int, span: tuple[int, int], points: Ar
             ray += 1
 
 
+class Beside(NamedTuple):
+    """What the light's side does for lobes, as the weights of directions need it."""
+
+    cells: LobeCells
+    receivers: RayReceivers
+    totals: Array  # (r,) float64: of `fill_totals`
+    picks: int  # of each receiver
+    first: int  # receiver of the first path
+    directions: int  # of each receiver
+
+
 @kernel(parallel=True)
 def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, float, float], paths: Paths,
-           shadows: Shadows) -> None:
+           shadows: Shadows, beside: Beside | None) -> None:
     """Next-event estimation: write the shadow ray from each hit point to one light, and its contribution.
 
     `limits`: bound on G in units of 1 / footprint (0: none), measure of one light direction (sr or m^2), and the
-    tracer's grain: how far rays start above faces (m). `shadows`: origins, directions, reach and contribution are
+    tracer's grain: how far rays start above faces (m). `beside`: None where lobes come by directions alone. `shadows`: origins, directions, reach and contribution are
     filled; the reach is 0 where nothing contributes.
     """
     count = len(paths.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):
-        _gather(surfaces, lights, k, limits, paths, shadows, (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
+        _gather(surfaces, lights, k, limits, paths, shadows, beside, (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
 
 
 @kernel
 def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, float, float], paths: Paths,
-            shadows: Shadows, span: tuple[int, int]) -> None:
+            shadows: Shadows, beside: Beside | None, span: tuple[int, int]) -> None:
     bound, measure, grain = limits
     directional = lights.kind[k] == DIRECTIONAL
     for ray in range(span[0], span[1]):
@@ -155,7 +169,10 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         # pattern times the MIS weight max(0, (G - b) / G)
         diffuse, lobe = max(0.0, dot(n, w) - least), 0.0
         if has_lobe:
-            lobe = max(0.0, lobe_pattern(surfaces, material, n, light, w) - least)
+            lobe = lobe_pattern(surfaces, material, n, light, w)
+            if beside is not None:
+                lobe *= _share_beside(beside, k, y, paths, ray, (dot(g, w), dot(g, light), 1.0 if directional else
+                                                                 dot(toward, toward)))
         most = 0.0
         for c in range(3):
             contribution = paths.weight[ray, c] * factor * irradiance[c] * (rho[c] * diffuse + glossy[c] * lobe)
@@ -163,6 +180,17 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
             shadows.contribution[ray, c] = contribution
         if most > 0:
             aim_at_light(lights, k, (y, g, toward), far, lift(surfaces, triangle, y, g, grain), grain, shadows, ray)
+
+
+@kernel
+def _share_beside(beside: Beside, k: int, y: tuple[float, float, float], paths: Paths, ray: int,
+                  sender: tuple[float, float, float]) -> float:
+    """Return n_a / (n_a + n_b) for the lobe that a path found; `sender`: cosines to receiver and light, d^2."""
+    r = beside.first + ray // beside.directions
+    near = directions_density(beside.directions, np.float64(paths.cosine[ray]), *sender)
+    length = np.float64(paths.travelled[ray]) + paths.distance[ray]
+    far = density_at(beside.cells, k, y, beside.receivers, r, beside.totals[r], beside.picks)
+    return near / (near + far * length * length) if near > 0 else 0.0
 
 
 @kernel

@@ -1,7 +1,6 @@
 """Stratified directions of a light: n x n cells of equal probability, one jittered ray in each.
 
-Spots and points get equal-area maps of the square to the cap or the sphere; a directional light gets a rectangle across
-the scene's bounds. Without a density each ray stands for the same solid angle or area, exactly; with one, for that over
+Without a density each ray stands for the same solid angle or area, exactly; with one, for that over
 the density at its place. The cells are ordered along a Hilbert curve: neighbours in the list are neighbours on the
 surfaces they reach, which is what makes systematic picks even.
 
@@ -21,7 +20,8 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.sampling import ONE_ULP_BELOW_1, hilbert_order
-from refgi.scene import DirectionalLight, Geometry, Light, SpotLight
+from refgi.scene import DirectionalLight, Geometry, Light
+from refgi.truth.light_square import fill_rays, light_squares
 
 Array = npt.NDArray[Any]
 
@@ -127,16 +127,10 @@ def rays_through(light: Light, geometry: Geometry, square: Array, cells: int,
     often than elsewhere; evenly where absent. Result: in the order of the points.
     """
     square, weight = (square, np.ones(len(square))) if density is None else warp(density, square)
-    if isinstance(light, DirectionalLight):
-        return _parallel(light, geometry, square, cells, weight)
-    if isinstance(light, SpotLight):
-        axis = np.asarray(light.direction, np.float64) / np.linalg.norm(light.direction)
-        local, measure = _cap(square, 2 * math.sin(light.outer_half_angle / 2) ** 2)
-        directions = local @ _frame(axis)
-    else:
-        directions, measure = _sphere(square), 4 * math.pi
-    return LightRays(np.broadcast_to(np.asarray(light.position, np.float64), directions.shape), directions,
-                     measure / cells, weight)
+    squares = light_squares((light,), geometry)
+    origins, directions = np.empty((len(square), 3)), np.empty((len(square), 3))
+    fill_rays(squares, 0, square, origins, directions)
+    return LightRays(origins, directions, float(squares.measure[0]) / cells, weight)
 
 
 def footprint(light: Light, geometry: Geometry, n: int) -> tuple[float, float]:
@@ -145,7 +139,7 @@ def footprint(light: Light, geometry: Geometry, n: int) -> tuple[float, float]:
     `geometry`: what it shines on. `n`: cells along one side of the grid. Result: solid angle (sr) or area (m^2) of a
     ray, and the largest measure x distance^2 (m^2).
     """
-    measure = rays_through(light, geometry, np.full((1, 2), 0.5), n * n).measure
+    measure = float(light_squares((light,), geometry).measure[0]) / (n * n)
     if isinstance(light, DirectionalLight):
         return measure, measure
     reach = np.maximum(*(np.abs(np.subtract(corner, light.position)) for corner in geometry.bounds))
@@ -157,51 +151,3 @@ def _cells(n: int) -> Array:
     """Return the cells of an n x n grid along a Hilbert curve: (n * n, 2) integers as floats."""
     order = hilbert_order(n, n)
     return np.stack([order % n, order // n], axis=1).astype(np.float64)
-
-
-def _disc(square: Array) -> tuple[Array, Array]:
-    """Map the unit square to the unit disc, areas in proportion, rings of squares to rings: radius and angle."""
-    a, b = 2 * square[:, 0] - 1, 2 * square[:, 1] - 1
-    wide = np.abs(a) > np.abs(b)
-    radius = np.where(wide, a, b)
-    ratio = np.divide(np.where(wide, b, a), radius, out=np.zeros_like(radius), where=radius != 0)
-    return radius, np.where(wide, math.pi / 4 * ratio, math.pi / 2 - math.pi / 4 * ratio)
-
-
-def _cap(square: Array, most: float) -> tuple[Array, float]:
-    """Map the unit square to the cap of 1 - cos theta <= most around z, solid angles in proportion (Lambert's map)."""
-    radius, phi = _disc(square)
-    height = radius * radius * most  # 1 - cos theta
-    across = np.sqrt(height * (2 - height)) * np.sign(radius)
-    return np.stack([across * np.cos(phi), across * np.sin(phi), 1 - height], axis=1), 2 * math.pi * most
-
-
-def _sphere(square: Array) -> Array:
-    """Map the unit square to all directions, solid angles in proportion: the middle diamond is the upper half."""
-    a, b = 2 * square[:, 0] - 1, 2 * square[:, 1] - 1
-    inside = 1 - (np.abs(a) + np.abs(b))  # > 0 in the diamond
-    radius = 1 - np.abs(inside)
-    turn = np.divide(np.abs(b) - np.abs(a), radius, out=np.zeros_like(radius), where=radius > 0)
-    phi = math.pi / 4 * (turn + 1)
-    across = radius * np.sqrt(2 - radius * radius)
-    return np.stack([np.copysign(across * np.cos(phi), a), np.copysign(across * np.sin(phi), b),
-                     np.copysign(1 - radius * radius, inside)], axis=1)
-
-
-def _parallel(light: DirectionalLight, geometry: Geometry, square: Array, cells: int, weight: Array) -> LightRays:
-    axis = np.asarray(light.direction, np.float64) / np.linalg.norm(light.direction)
-    frame = _frame(axis)
-    corners = np.stack(np.meshgrid(*np.stack(geometry.bounds, axis=1), indexing="ij"), axis=-1).reshape(-1, 3)
-    low, high = (corners @ frame.T).min(axis=0), (corners @ frame.T).max(axis=0)
-    margin = 1e-3 * (high - low).max()  # rays start before everything, and no edge is missed by rounding
-    low, high = low - margin, high + margin
-    local = np.column_stack([low[:2] + square * (high - low)[:2], np.full(len(square), low[2])])
-    area = float(np.prod((high - low)[:2]))
-    return LightRays(local @ frame, np.broadcast_to(axis, (len(square), 3)), area / cells, weight)
-
-
-def _frame(axis: Array) -> Array:
-    """Return a right-handed frame as rows, the last one the axis."""
-    across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    across /= np.linalg.norm(across)
-    return np.stack([across, np.cross(axis, across), axis])

@@ -50,12 +50,12 @@ class PointSets(NamedTuple):
 
 
 def trace_light_vertices(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: int, rays: LightRays,
-                     bound: float) -> LightVertices:
+                         bound: float, *, lobes: bool) -> LightVertices:
     """Trace one light's rays to light vertices.
 
     `surfaces`: the scene's triangles and materials. `bound`: largest geometry term in units of 1 / footprint; inf for
-    no bound. Result: diffuse parts, then lobes if the scene has any, each in the order of the rays; power 0 where a ray
-    finds nothing that reflects.
+    no bound. Result: diffuse parts, then `lobes` if the scene has any, each in the order of the rays; power 0 where a
+    ray finds nothing that reflects.
     """
     # a lamp may lie in a surface: start just beyond it
     beyond = tracer.offsets(rays.origins)
@@ -65,7 +65,7 @@ def trace_light_vertices(tracer: Tracer, surfaces: Surfaces, lights: LightTable,
     triangle_id, distance = np.empty(count, np.int32), np.empty(count, np.float32)
     tracer.fill_closest(origins, directions, np.full(count, np.inf, np.float32), triangle_id, distance)
     distance += beyond.astype(np.float32)
-    kinds = 2 if surfaces.specular.any() else 1
+    kinds = 2 if lobes and surfaces.specular.any() else 1
     points = _allocate(kinds * count)
     points.ray[:] = np.tile(np.arange(k * count, (k + 1) * count), kinds)
     points.lobe[count:] = True

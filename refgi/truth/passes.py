@@ -15,7 +15,7 @@ from refgi.rays import MISS
 from refgi.sampling import hash_bits
 from refgi.truth.camera_visibility import aim_paths
 from refgi.truth.caustics import photon_pass
-from refgi.truth.hemisphere import cosine_direction, gather, scrambled_points, send
+from refgi.truth.hemisphere import Beside, cosine_direction, gather, scrambled_points, send
 from refgi.truth.light_grid import footprint
 from refgi.truth.light_pass import add_light_side
 from refgi.truth.paths import Paths, dot, hit_point, row
@@ -24,8 +24,6 @@ from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
 from refgi.truth.textured import diffuse_at
 
 Array = npt.NDArray[Any]
-# A lobe may point below an interpolated horizon: K is 1/2 no more, but <r.w>^P / K stays below 18 for K >= 1e-12.
-BELOW_HORIZON = 9.0
 
 
 @kernel(parallel=True)
@@ -147,10 +145,14 @@ def _hemisphere(task: Task, words: Array, sums: Array) -> None:
         for bounce in range(task.settings.bounces):
             if bounce:
                 scatter(task.surfaces, task.tracer.grain, int(words[3 + bounce]), task.receivers, first, count, paths)
-            follow(task, paths, first, count, task.settings.shared_bound if bounce == 0 else 0.0, sums)
+            beside = None
+            if bounce == 0 and task.cells is not None:
+                beside = Beside(task.cells, task.receivers, task.cell_totals, task.picks, first, count)
+            follow(task, paths, first, count, task.settings.shared_bound if bounce == 0 else 0.0, sums, beside)
 
 
-def follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums: Array) -> None:
+def follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums: Array,
+           beside: Beside | None = None) -> None:
     """Trace paths to the next surface, next-event estimation there; to every surface along them without visibility."""
     while True:
         task.tracer.fill_closest(paths.origin, paths.direction, paths.reach, paths.triangle_id, paths.distance)
@@ -158,7 +160,7 @@ def follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums:
         for k, light in enumerate(task.scene.lights):
             measure, _ = footprint(light, task.scene.geometry, task.settings.light_grid)
             shadows = shadow_batch(len(paths.reach))
-            gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.grain), paths, shadows)
+            gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.grain), paths, shadows, beside)
             if hidden is not None:
                 shadows.reach[hidden] = 0
             add_unblocked(task, shadows, first, count, sums, True)
@@ -180,16 +182,13 @@ def hidden_from_camera(task: Task, paths: Paths) -> Array | None:
 
 
 def _reach(task: Task) -> float:
-    """Return the length of hemisphere rays: beyond, the geometry term stays below the bound."""
+    """Return the length of hemisphere rays: beyond, the geometry term stays below the bound; lobes know none."""
     bound, surfaces = task.settings.shared_bound, task.surfaces
-    if bound == 0 or task.settings.bounces > 1:
+    if bound == 0 or task.settings.bounces > 1 or surfaces.specular.any():
         return np.inf
     most = max((footprint(light, task.scene.geometry, task.settings.light_grid)[1] for light in task.scene.lights),
                default=0.0)
-    peak = float((surfaces.exponent + 1)[surfaces.specular.any(axis=1)].max(initial=1.0))  # of (P + 1) / (2 K)
-    if len(surfaces.normals):
-        peak *= BELOW_HORIZON
-    return float(np.sqrt(peak * most / bound))
+    return float(np.sqrt(most / bound))
 
 
 def paths_for(count: int) -> Paths:

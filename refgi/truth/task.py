@@ -34,6 +34,8 @@ class Task(NamedTuple):
     left_to_photons: float = math.inf  # exponent from which on a sender's lobe comes by photons alone
     view: Projection | None = None  # only surfaces visible in it emit; None: all do
     densities: tuple[Density | None, ...] = ()  # of each light's rays; none: even ones
+    cells: Any = None  # LobeCells of senders' lobes; None: no lobe comes by them
+    cell_totals: Array | None = None  # (r,) float64: what they send each receiver
     lobes: Lobes | None = None  # of the receivers, where their lobes and not their irradiance are asked for
 
     @property

@@ -21,8 +21,10 @@ from refgi.scene import Scene
 from refgi.skips import left_out
 from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
+from refgi.truth.cell_picks import fill_totals
 from refgi.truth.checkpoint import Checkpoint
 from refgi.truth.light_pass import pilot
+from refgi.truth.lobe_cells import lobe_cells
 from refgi.truth.lobe_pass import lobe_pass
 from refgi.truth.lobe_receivers import glossy_triangles, lobes_of, meets_photons
 from refgi.truth.passes import one_pass
@@ -191,7 +193,7 @@ def _averaged(prepare: Prepare, scene: Scene, tracer: Any, buffer: tuple[Array, 
     moments = file.moments if file else no_passes(values)
     ready: Task | None = None
     while not _is_done(moments, len(block), settings, time.perf_counter() - started):
-        ready = ready or task._replace(densities=pilot(task))
+        ready = ready or _guided(task)
         add_pass(moments, with_means(_pass(ready, int(moments.passes)), block, grid[0] * grid[1]))
         if file:
             file.save_when_due()
@@ -237,7 +239,7 @@ def _warm_up(prepare: Prepare, scene: Scene, tracer: Any, buffer: tuple[Array, A
     covered = np.flatnonzero(buffer[2].reshape(-1) >= 0)[:1]
     position, normal = (field.reshape(3, 1, -1)[..., covered] for field in buffer[:2])
     task = prepare(scene, tracer, position, normal, buffer[2].reshape(1, -1)[:, covered], settings)
-    values = with_means(_pass(task._replace(densities=pilot(task)), 0), np.zeros(len(covered), np.int64), 1)
+    values = with_means(_pass(_guided(task), 0), np.zeros(len(covered), np.int64), 1)
     add_pass(no_passes(values.shape[1]), values)
 
 
@@ -248,8 +250,18 @@ def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_
     `position`, `normal` (3, h, w): the G-buffer's, world space. `triangle_id` (h, w) int: which triangle each pixel
     sees; -1 for none. Result: with the densities that the pilot found.
     """
-    task = _without_pilot(scene, tracer, position, normal, triangle_id, settings)
-    return task._replace(densities=pilot(task))
+    return _guided(_without_pilot(scene, tracer, position, normal, triangle_id, settings))
+
+
+def _guided(task: Task) -> Task:
+    """Return a task with what the light's side is guided by: densities of its rays, and cells of lobes."""
+    task = task._replace(densities=pilot(task))
+    cells = lobe_cells(task) if task.lobes is None and task.picks else None
+    if cells is None:
+        return task
+    totals = np.empty(len(task.receivers.pixel))
+    fill_totals(cells, task.receivers, totals)
+    return task._replace(cells=cells, cell_totals=totals)
 
 
 def _without_pilot(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,

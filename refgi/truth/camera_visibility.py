@@ -15,6 +15,7 @@ from refgi.rsm.raster.projection import Projection, texel_of
 from refgi.truth.light_vertices import LightVertices
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point
 from refgi.truth.surfaces import Surfaces, face_normal, lift
+from refgi.truth.task import Task, shadow_batch
 
 Array = npt.NDArray[Any]
 
@@ -82,3 +83,13 @@ def _aim_paths(view: Projection, surfaces: Surfaces, grain: float, paths: Paths,
             w, y = hit_point(paths, ray)
             g = face_normal(surfaces, paths.triangle_id[ray], -w[0], -w[1], -w[2])  # where light leaves to the path
             aim_at_eye(view, lift(surfaces, paths.triangle_id[ray], y, g, grain), y, g, written, ray)
+
+
+def hidden_from_camera(task: Task, paths: Paths) -> Array | None:
+    """Return which paths end at points that the camera does not see; None where that does not matter."""
+    if task.view is None:
+        return None
+    rays = shadow_batch(len(paths.reach))
+    aim_paths(task.view, task.surfaces, task.tracer.grain, paths, rays)
+    task.tracer.fill_occluded(rays.origin, rays.direction, rays.reach, rays.blocked)
+    return rays.blocked

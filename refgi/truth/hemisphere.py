@@ -3,13 +3,13 @@
 A direction of density cos/pi that finds radiance L contributes pi L. Both estimators are combined by multiple
 importance sampling (MIS) at a bounded geometry term G: the light side has min(G, b), weight min(1, b / G); here the
 rest remains, weight max(0, (G - b) / G) of diffuse radiance (Kollig & Keller 2004). Without bound the weight is 1.
-Lobes are weighted by how densely both estimators sample a point instead (`refgi.truth.cell_picks`).
+Lobes are weighted by how densely both estimators sample a point instead (`refgi.truth.cell_rays`).
 Directions are points of a low-discrepancy set that is scrambled anew in every pass and shifted by a random word per
 pixel.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,11 +17,12 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import DIRECTIONAL, incident_light
-from refgi.rays import MISS, STEPS, ray_offset
+from refgi.rays import MISS
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.scene import LightTable
-from refgi.truth.cell_picks import density_at, directions_density
-from refgi.truth.lobe_cells import LobeCells
+from refgi.truth.cell_rays import Beside, near_density, rays_beside
+from refgi.truth.cell_walk import column, found_at
+from refgi.truth.next_event import aim_at_light, toward_light
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point, row
 from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_pattern, shading_normal
 from refgi.truth.textured import diffuse_at
@@ -104,17 +105,6 @@ def _send(receivers: RayReceivers, first: int, span: tuple[int, int], points: Ar
             ray += 1
 
 
-class Beside(NamedTuple):
-    """What the light's side does for lobes, as the weights of directions need it."""
-
-    cells: LobeCells
-    receivers: RayReceivers
-    totals: Array  # (r,) float64: of `fill_totals`
-    picks: int  # of each receiver
-    first: int  # receiver of the first path
-    directions: int  # of each receiver
-
-
 @kernel(parallel=True)
 def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, float, float], paths: Paths,
            shadows: Shadows, beside: Beside | None) -> None:
@@ -171,8 +161,8 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         if has_lobe:
             lobe = lobe_pattern(surfaces, material, n, light, w)
             if beside is not None:
-                lobe *= _share_beside(beside, k, y, paths, ray, (dot(g, w), dot(g, light), 1.0 if directional else
-                                                                 dot(toward, toward)))
+                lobe *= _share_beside(beside, k, y, paths, ray, (
+                    dot(g, w), 1.0 if directional else dot(toward, toward), dot(g, light)))
         most = 0.0
         for c in range(3):
             contribution = paths.weight[ray, c] * factor * irradiance[c] * (rho[c] * diffuse + glossy[c] * lobe)
@@ -185,36 +175,11 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
 @kernel
 def _share_beside(beside: Beside, k: int, y: tuple[float, float, float], paths: Paths, ray: int,
                   sender: tuple[float, float, float]) -> float:
-    """Return n_a / (n_a + n_b) for the lobe that a path found; `sender`: cosines to receiver and light, d^2."""
-    r = beside.first + ray // beside.directions
-    near = directions_density(beside.directions, np.float64(paths.cosine[ray]), *sender)
+    """Return the share of directions, n_a / (n_a + n_b + n_c), in the lobe that one of them found."""
+    r = beside.first + ray // beside.counts.directions
+    w, cosine = row(paths.direction, ray), np.float64(paths.cosine[ray])
+    found = found_at(beside.cells, k, y, column(beside.receivers.position, r), column(beside.receivers.normal, r),
+                     beside.totals[r])
     length = np.float64(paths.travelled[ray]) + paths.distance[ray]
-    far = density_at(beside.cells, k, y, beside.receivers, r, beside.totals[r], beside.picks)
-    return near / (near + far * length * length) if near > 0 else 0.0
-
-
-@kernel
-def aim_at_light(
-    lights: LightTable, k: int, hit: tuple[Any, Any, Any], far: float, offset: float, grain: float, shadows: Shadows,
-    ray: int,
-) -> None:
-    """Write the shadow ray from a hit point to a light.
-
-    `hit`: the point, its face normal on the light's side, and the vector to the light. `far`: distance of the light, m.
-    `offset`: how far above the face the ray starts, m. A lamp may lie in a surface itself: rays end short of it.
-    """
-    y, g, toward = hit
-    directional = lights.kind[k] == DIRECTIONAL
-    for c in range(3):
-        shadows.origin[ray, c] = y[c] + offset * g[c]
-        shadows.direction[ray, c] = toward[c] if directional else toward[c] - offset * g[c]
-    short = ray_offset(lights.position[k, 0], lights.position[k, 1], lights.position[k, 2], grain) / far
-    shadows.reach[ray] = np.inf if directional else max(0.0, 1.0 - STEPS - short)
-
-
-@kernel
-def toward_light(lights: LightTable, k: int, y: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return the vector from a point to a light, of length 1 if that is infinitely far."""
-    if lights.kind[k] == DIRECTIONAL:
-        return -lights.direction[k, 0], -lights.direction[k, 1], -lights.direction[k, 2]
-    return lights.position[k, 0] - y[0], lights.position[k, 1] - y[1], lights.position[k, 2] - y[2]
+    near = near_density(beside.counts.directions, cosine, 0.0, sender)
+    return near / rays_beside(beside, k, found, r, (w, cosine, length), sender) if near > 0 else 0.0

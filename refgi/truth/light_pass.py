@@ -15,7 +15,6 @@ import numpy.typing as npt
 
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.truth.camera_visibility import visible_vertices
-from refgi.truth.cell_picks import cell_rays, connect_lobes, pick_cells
 from refgi.truth.light_grid import Density, cell_centres, density_of, footprint, rays_through, stratified_sets
 from refgi.truth.light_side import pick, tiles
 from refgi.truth.light_vertices import PointSets, join, trace_light_vertices, with_areas
@@ -35,27 +34,12 @@ def add_light_side(task: Task, words: Array, sums: Array) -> None:
     `words` (3,) uint32: the pass's random numbers: two for the light vertices, one for the picks. `sums` (3, r)
     float64: added to, W/m^2.
     """
-    if task.cells is not None:
-        _add_cells(task, int(words[2]), sums)
     sets, picks = fresh_points(task, np.random.default_rng(words[:2])), task.picks
     if not len(sets.points.power):
         return
     for first, last in spans(task, picks):
         rays, _ = pick_points(task, sets, (first, last), picks, int(words[2]))
         add_unblocked(task, rays, first, picks, sums, task.settings.visibility)
-
-
-def _add_cells(task: Task, seed: int, sums: Array) -> None:
-    """Add what lobes of senders send from picked cells, W/m^2."""
-    assert task.cells is not None
-    picks, visibility = task.picks, task.settings.visibility
-    for first, last in spans(task, picks):
-        rays, shadows = cell_rays((last - first) * picks), shadow_batch((last - first) * picks)
-        pick_cells(task.cells, task.receivers, (first, last), (picks, seed, task.tracer.grain), rays)
-        task.tracer.fill_closest(rays.origin, rays.direction, rays.reach, rays.triangle_id, rays.distance)
-        connect_lobes(task.surfaces, task.lights, task.receivers, first, (picks, task.directions), task.tracer.grain,
-                      rays, shadows)
-        add_unblocked(task, shadows, first, picks, sums, visibility)
 
 
 def fresh_points(task: Task, random: np.random.Generator) -> PointSets:

@@ -46,33 +46,6 @@ def _bounded_geometry(
 
 
 @kernel
-def _lobe(points: LightVertices, j: int) -> Any:
-    """Return what `_lobe_geometry` needs of sender j: axis, normal, pattern on the axis."""
-    return (points.axis[0, j], points.axis[1, j], points.axis[2, j], points.normal[0, j], points.normal[1, j],
-            points.normal[2, j], points.peak[j])
-
-
-@kernel
-def _lobe_geometry(lobe: Any, dx: Any, dy: Any, dz: Any, nx: Any, ny: Any, nz: Any) -> Any:
-    """Return -h = <a.w> - 1 and f, of which G = f 2^(P log2(1 - h)) for a lobe around a; free of branches.
-
-    h = |a - w|^2 / 2, w the direction from the sender: near the axis of a sharp lobe h keeps its digits.
-    """
-    ax, ay, az, mx, my, mz, peak = lobe
-    zero = np.float32(0)
-    r2 = dx * dx + dy * dy + dz * dz
-    inverse = np.float32(1) / np.sqrt(r2 if r2 > TINY else TINY)
-    cos_x = (nx * dx + ny * dy + nz * dz) * inverse
-    above = -(mx * dx + my * dy + mz * dz)
-    ex, ey, ez = ax + dx * inverse, ay + dy * inverse, az + dz * inverse
-    h = np.float32(0.5) * (ex * ex + ey * ey + ez * ez)
-    factor = peak * (cos_x if cos_x > zero else zero) * (inverse * inverse)
-    factor = factor if h < BELOW_1 else zero
-    factor = factor if above > zero else zero
-    return -(h if h < BELOW_1 else BELOW_1), factor
-
-
-@kernel
 def _sum_diffuse(points: LightVertices, tile: Array, first: int, count: int, parts: Array) -> None:
     """Fill the sums of the terms of each part of diffuse senders at each receiver of a tile, two senders at a time."""
     for p in range(count):
@@ -90,42 +63,12 @@ def _sum_diffuse(points: LightVertices, tile: Array, first: int, count: int, par
 
 
 @kernel
-def _sum_lobes(points: LightVertices, tile: Array, first: int, done: int, parts: Array) -> None:
-    """Fill the sums of the terms of each part of lobes at each receiver of a tile: one loop a function, for SIMD."""
-    power_of, factor = np.empty(TILE, np.float32), np.empty(TILE, np.float32)
-    for p in range(done, parts.shape[0]):
-        for j in range(first + p * PART, first + p * PART + PART):
-            px, py, pz = points.position[0, j], points.position[1, j], points.position[2, j]
-            power, exponent, bound, lobe = points.power[j], points.exponent[j], points.bound[j], _lobe(points, j)
-            for i in range(TILE):
-                x, y, z, nx, ny, nz = tile[0, i], tile[1, i], tile[2, i], tile[3, i], tile[4, i], tile[5, i]
-                power_of[i], factor[i] = _lobe_geometry(lobe, px - x, py - y, pz - z, nx, ny, nz)
-            for i in range(TILE):
-                power_of[i] = log2p1(power_of[i])
-            for i in range(TILE):
-                power_of[i] = exp2(exponent * power_of[i])
-            for i in range(TILE):
-                geometry = factor[i] * power_of[i]
-                parts[p, i] += power * (geometry if geometry < bound else bound)
-
-
-@kernel
 def _diffuse_term(points: LightVertices, j: int, tile: Array, i: int) -> Any:
     """Return the term of one diffuse sender at one receiver, bit for bit that which was summed."""
     dx, dy = points.position[0, j] - tile[0, i], points.position[1, j] - tile[1, i]
     dz = points.position[2, j] - tile[2, i]
     return points.power[j] * _bounded_geometry(dx, dy, dz, tile[3, i], tile[4, i], tile[5, i], points.axis[0, j],
                                       points.axis[1, j], points.axis[2, j], points.bound[j])
-
-
-@kernel
-def _lobe_term(points: LightVertices, j: int, tile: Array, i: int) -> Any:
-    """Return the term of one lobe at one receiver, bit for bit that which was summed."""
-    dx, dy = points.position[0, j] - tile[0, i], points.position[1, j] - tile[1, i]
-    dz = points.position[2, j] - tile[2, i]
-    power_of, factor = _lobe_geometry(_lobe(points, j), dx, dy, dz, tile[3, i], tile[4, i], tile[5, i])
-    geometry = factor * exp2(points.exponent[j] * log2p1(power_of))
-    return points.power[j] * (geometry if geometry < points.bound[j] else points.bound[j])
 
 
 @kernel
@@ -165,7 +108,7 @@ def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: t
          sampling: tuple[int, int, int, Any], rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Pick light vertices for each receiver of some tiles; write shadow rays and their contributions.
 
-    `starts` (sets, 3) int64: first block of each set, its first of lobes and one past its last. `tiles`: receivers
+    `starts` (sets, 2) int64: first block of each set and one past its last. `tiles`: receivers
     sorted by set, and the table of tiles. `sampling`: first receiver of the span; picks of each; seed of the random
     shift, a hash of it and the receiver's pixel; the tracer's grain: segments end above the sender's face by
     `ray_offset` and `far_offset`, m. `rays`: filled: origins, directions (n, 3), reach (n,), contribution (n, 3) W/m^2,
@@ -181,27 +124,24 @@ def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: t
             for i in range(count):
                 tile[c, i] = receivers.position[c, members[low + i]]
                 tile[3 + c, i] = receivers.normal[c, members[low + i]]
-        first, first_lobe, size = starts[chosen, 0], starts[chosen, 1], starts[chosen, 2] - starts[chosen, 0]
-        start = (first * BLOCK, first_lobe * BLOCK)
+        first, size = starts[chosen, 0] * BLOCK, starts[chosen, 1] - starts[chosen, 0]
         parts = np.zeros((size * PARTS, TILE), np.float32)
-        diffuse = (first_lobe - first) * PARTS
-        _sum_diffuse(points, tile, start[0], diffuse, parts)
-        _sum_lobes(points, tile, start[0], diffuse, parts)
+        _sum_diffuse(points, tile, first, size * PARTS, parts)
         blocks = np.zeros((size, TILE), np.float32)
         for p in range(parts.shape[0]):
             for i in range(TILE):
                 blocks[p // PARTS, i] += parts[p, i]
-        _pick_all(points, receivers, members[low:high], tile, sampling, (start, blocks, parts), rays)
+        _pick_all(points, receivers, members[low:high], tile, sampling, (first, blocks, parts), rays)
 
 
 @kernel
 def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array, tile: Array,
-              sampling: tuple[int, int, int, Any], sums: tuple[tuple[int, int], Array, Array],
+              sampling: tuple[int, int, int, Any], sums: tuple[int, Array, Array],
               rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Let receivers pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""
     origins, directions, reach, contribution, picked = rays
     first, picks, seed, grain = sampling
-    (first_point, first_lobe), blocks, parts = sums
+    first_point, blocks, parts = sums
     real = np.float32
     for i in range(len(members)):
         r, total = members[i], real(0)
@@ -216,18 +156,11 @@ def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array, ti
             target = (real(s) + shift) * share
             b, before, p, rest = part_of(blocks, parts, i, target, b, before)
             j, end = first_point + p * PART, first_point + p * PART + PART - 1
-            if j < first_lobe:
+            term = _diffuse_term(points, j, tile, i)
+            while j < end and term <= rest:
+                rest -= term
+                j += 1
                 term = _diffuse_term(points, j, tile, i)
-                while j < end and term <= rest:
-                    rest -= term
-                    j += 1
-                    term = _diffuse_term(points, j, tile, i)
-            else:
-                term = _lobe_term(points, j, tile, i)
-                while j < end and term <= rest:
-                    rest -= term
-                    j += 1
-                    term = _lobe_term(points, j, tile, i)
             if term > real(0):
                 reach[ray] = aim(points, j, receivers, r, grain, origins, directions, ray)
                 picked[ray] = j

@@ -19,6 +19,7 @@ from refgi.scene import DirectionalLight, Geometry, Light, PointLight, SpotLight
 Array = npt.NDArray[Any]
 
 CHUNK = 4096
+RIM = 1e-5  # how far outside its square rounding may put a ray of a cone's rim
 
 
 class LightSquares(NamedTuple):
@@ -114,7 +115,7 @@ def place_of(squares: LightSquares, k: int, y: tuple[float, float, float]) -> tu
         d = (d[0] / length, d[1] / length, d[2] / length)
         if squares.kind[k] == SPOT:
             a, b = _from_cap(_to_local(squares, k, d), squares.height[k])
-            if not 0 <= a <= 1 or not 0 <= b <= 1:
+            if not -RIM <= a <= 1 + RIM or not -RIM <= b <= 1 + RIM:
                 return -1.0, -1.0
         else:
             a, b = _from_sphere(d)

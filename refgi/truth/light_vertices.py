@@ -46,7 +46,7 @@ class PointSets(NamedTuple):
     """Sets of light vertices, each padded with dark points to whole blocks."""
 
     points: LightVertices
-    starts: Array  # (sets, 3) int64, in blocks: first diffuse one, first of lobes, one past the last
+    starts: Array  # (sets, 2) int64, in blocks: first one, one past the last
 
 
 def trace_light_vertices(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: int, rays: LightRays,
@@ -89,7 +89,7 @@ def join(parts: list[LightVertices], sets: int, per_set: int) -> PointSets:
     place = np.arange(len(order)) + np.repeat(blocks[:-1] * BLOCK - (np.cumsum(counts) - counts), counts)
     points = _allocate(int(blocks[-1]) * BLOCK)
     _copy_vertices(together, bright[order], place, points)
-    return PointSets(points, np.stack([blocks[:-2:2], blocks[1:-1:2], blocks[2::2]], axis=1))
+    return PointSets(points, np.stack([blocks[:-2:2], blocks[2::2]], axis=1))
 
 
 def with_areas(points: LightVertices, light: Light, measure: float) -> LightVertices:

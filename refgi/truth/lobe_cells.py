@@ -1,4 +1,4 @@
-"""Cells of light: a quadtree over each light's directions of what lobes of senders do with them, once a task.
+"""Cells of light: a quadtree over each light's directions of what lobes of senders do with them, once a source.
 
 A cell knows where its rays land (a ball), where lobes send them (an axis, and how far axes and lobes spread around it)
 and how much flux that is. Cells are split where axes spread by more than a lobe is wide, the brightest first, so that
@@ -14,14 +14,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.radiometry import DIRECTIONAL
+from refgi.rays import Tracer
+from refgi.scene import LightTable, Scene
 from refgi.truth.light_grid import rays_through
 from refgi.truth.light_square import LightSquares, light_squares
 from refgi.truth.light_vertices import trace_light_vertices
-from refgi.truth.task import Task
+from refgi.truth.surfaces import Surfaces
 
 Array = npt.NDArray[Any]
 
 FIRST_CELLS, MOST_CELLS = 1 << 12, 1 << 16  # before any is split by its spread; leaves at the most
+FLAT = 0.5  # blur of a mirror's image of the light, in widths of its lobes, below which it counts as plane
 ROWS = 14
 TOPS = 1024  # cells that a receiver looks at before it goes into one
 DEEPEST = 24  # level of the smallest cell: halved so often
@@ -41,6 +45,8 @@ class LobeCells(NamedTuple):
     light: Array  # (t,) int32: of each of them
     is_top: Array  # (n,) bool
     columns: Array  # (ROWS, t) float32: `row` of the top cells, for SIMD lanes
+    mirror: Array  # (n, 8) float64: a point and the normal of the plane that mirrors the light, exponent + 1 of what it
+    #                sends by that, 1 where that may be used
 
 
 class _Leaves(NamedTuple):
@@ -57,25 +63,34 @@ class _Leaves(NamedTuple):
     normal: Array  # (m, 3) mean face normal
     tilt: Array  # (m,) rad: half-angle of the cone of face normals
     thick: Array  # (m,) m: off the plane across that normal
+    shading: Array  # (m, 3) mean shading normal
+    bend: Array  # (m,) rad: half-angle of the cone of shading normals
+    offset: Array  # (m,) m: off the plane across that normal
 
 
-def lobe_cells(task: Task) -> LobeCells | None:
-    """Grow the trees of a task; None where no lobe of a sender is left to them."""
-    lights = task.scene.lights
-    if not lights or not task.surfaces.specular.any():
-        return None
-    parts = [_grown(task, k) for k in range(len(lights))]
-    return _joined(light_squares(lights, task.scene.geometry), parts)
+class _Source(NamedTuple):
+    """Where rays come from, and what they meet."""
+
+    scene: Scene
+    tracer: Tracer
+    surfaces: Surfaces
+    lights: LightTable
 
 
-def _grown(task: Task, k: int) -> list[tuple[_Leaves, Array]]:
+def lobe_cells(scene: Scene, tracer: Tracer, surfaces: Surfaces, lights: LightTable) -> LobeCells:
+    """Grow the trees of all lights, of which there is at least one; `surfaces` with the lobes that count."""
+    parts = [_grown(_Source(scene, tracer, surfaces, lights), k) for k in range(len(scene.lights))]
+    return _joined(light_squares(scene.lights, scene.geometry), parts)
+
+
+def _grown(source: _Source, k: int) -> list[tuple[_Leaves, Array]]:
     """Return a light's cells level by level, each with which of them are split (bool)."""
-    lights = len(task.scene.lights)
+    lights = len(source.scene.lights)
     base = max(1, int(np.log2(FIRST_CELLS / lights) / 2))
     left = MOST_CELLS // lights
     levels, corner = [], np.zeros((1, 3), np.int64)
     for level in range(DEEPEST + 1):
-        leaves = _sampled(task, k, corner) if level >= base else _unsampled(corner)
+        leaves = _sampled(source, k, corner) if level >= base else _unsampled(corner)
         split = np.ones(len(corner), np.bool_)
         if level >= base:
             excess = (leaves.spread / SPLIT) ** 2 / leaves.width
@@ -96,26 +111,27 @@ def _grown(task: Task, k: int) -> list[tuple[_Leaves, Array]]:
 def _unsampled(corner: Array) -> _Leaves:
     m = len(corner)
     return _Leaves(corner, np.zeros((m, 3)), np.zeros(m), np.zeros((m, 3)), np.zeros(m), np.ones(m), np.zeros(m),
-                   np.zeros(m, np.bool_), np.zeros((m, 3)), np.zeros(m), np.zeros(m))
+                   np.zeros(m, np.bool_), *(np.zeros((m, 3)), np.zeros(m), np.zeros(m)) * 2)
 
 
-def _sampled(task: Task, k: int, corner: Array) -> _Leaves:
+def _sampled(source: _Source, k: int, corner: Array) -> _Leaves:
     """Trace four rays through each cell and describe the lobes they find."""
     m, cells = len(corner), 2.0 ** corner[:, 2]
     square = ((corner[:, None, :2] + QUARTERS) / cells[:, None, None]).reshape(-1, 2)
-    rays = rays_through(task.scene.lights[k], task.scene.geometry, square, 1)
-    points = trace_light_vertices(task.tracer, task.surfaces, task.lights, k, rays, np.inf, lobes=True)
+    rays = rays_through(source.scene.lights[k], source.scene.geometry, square, 1)
+    points = trace_light_vertices(source.tracer, source.surfaces, source.lights, k, rays, np.inf, lobes=True)
     power = points.power[4 * m :].reshape(m, 4).astype(np.float64)
-    position, axis, facing = (field[:, 4 * m :].T.reshape(m, 4, 3).astype(np.float64)
-                              for field in (points.position, points.axis, points.facing))
+    position, axis, facing, shading = (field[:, 4 * m :].T.reshape(m, 4, 3).astype(np.float64) for field in
+                                       (points.position, points.axis, points.facing, points.normal))
     found, nothing = power > 0, np.zeros((m, 4))
-    total, (centre, mean, normal) = _means(power, position, axis, facing)
+    total, (centre, mean, normal, bent) = _means(power, position, axis, facing, shading)
     width = (power / (points.exponent[4 * m :].reshape(m, 4) + 1)).sum(axis=1) / np.where(total > 0, total, 1)
     # the rays span half of the cell
     return _Leaves(corner, centre, 2 * _radius(found, position, nothing, centre), mean,
                    2 * _spread(found, axis, nothing, mean), np.where(total > 0, width, 1), total / 4 / cells**2,
                    found.any(axis=1) & ~found.all(axis=1), normal, 2 * _spread(found, facing, nothing, normal),
-                   2 * _thickness(found, position, nothing, centre, normal))
+                   2 * _thickness(found, position, nothing, centre, normal), bent,
+                   2 * _spread(found, shading, nothing, bent), 2 * _thickness(found, position, nothing, centre, bent))
 
 
 def _means(power: Array, position: Array, *directions: Array) -> tuple[Array, list[Array]]:
@@ -161,8 +177,9 @@ def _joined(squares: LightSquares, parts: list[list[tuple[_Leaves, Array]]]) -> 
     is_top = np.zeros(len(child), np.bool_)
     is_top[top] = True
     row = row.astype(np.float32)
+    light_of = np.repeat(np.tile(np.arange(len(parts)), depth), np.ravel([[len(levels[level][0].corner) if level < len(levels) else 0 for levels in parts] for level in range(depth)]))
     return LobeCells(squares, child, whole.corner.astype(np.int32), row, top, light, is_top,
-                     np.ascontiguousarray(row[top].T))
+                     np.ascontiguousarray(row[top].T), _mirrors(squares, light_of, whole, child < 0))
 
 
 def _tops(child: Array, cells: _Leaves, lights: int) -> tuple[Array, Array]:
@@ -195,12 +212,26 @@ def _along_curve(corner: Array) -> int:
 def _describe(cells: _Leaves, split: Array, children: _Leaves) -> None:
     """Fill what split cells know from their four children: a ball and cones around theirs."""
     four = _Leaves(*(field.reshape(-1, 4, *field.shape[1:]) for field in children))
-    total, (centre, mean, normal) = _means(four.power, four.centre, four.axis, four.normal)
+    total, (centre, mean, normal, bent) = _means(four.power, four.centre, four.axis, four.normal, four.shading)
     bright = four.power > 0
-    cells.centre[split], cells.axis[split], cells.normal[split], cells.power[split] = centre, mean, normal, total
+    cells.centre[split], cells.axis[split], cells.power[split] = centre, mean, total
+    cells.normal[split], cells.shading[split] = normal, bent
     cells.radius[split] = _radius(bright, four.centre, four.radius, centre)
     cells.spread[split] = _spread(bright, four.axis, four.spread, mean)
     cells.tilt[split] = _spread(bright, four.normal, four.tilt, normal)
+    cells.bend[split] = _spread(bright, four.shading, four.bend, bent)
     off = four.thick + four.radius * np.minimum(1, np.linalg.norm(four.normal - normal[:, None], axis=2))
     cells.thick[split] = _thickness(bright, four.centre, off, centre, normal)
+    off = four.offset + four.radius * np.minimum(1, np.linalg.norm(four.shading - bent[:, None], axis=2))
+    cells.offset[split] = _thickness(bright, four.centre, off, centre, bent)
     cells.width[split] = (four.power * four.width).sum(axis=1) / np.where(total > 0, total, 1) + (total <= 0)
+
+
+def _mirrors(squares: LightSquares, light: Array, cells: _Leaves, leaf: Array) -> Array:
+    """Return the plane mirror that each cell nearly is; where it is not and has children, these are asked instead."""
+    height = ((squares.origin[light] - cells.centre) * cells.shading).sum(axis=1)
+    height[squares.kind[light] == DIRECTIONAL] = np.inf
+    known = (cells.power > 0) & (height > 0)
+    blur = (2 * cells.bend) ** 2 + (2 * cells.offset / np.where(known, height, 1)) ** 2
+    usable = known & (leaf | (blur < FLAT**2 * cells.width))
+    return np.column_stack([cells.centre, cells.shading, 1 / (cells.width + blur), usable])

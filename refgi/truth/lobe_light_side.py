@@ -117,7 +117,7 @@ def pick_for_lobes(points: LightVertices, starts: Array, receivers: RayReceivers
         # lanes beyond the count receive nothing
         tile = np.zeros((ROWS, TILE), np.float32)
         _fill_tile(receivers, lobes, members[low:high], sampling[4], tile)
-        first, size = starts[chosen, 0], starts[chosen, 2] - starts[chosen, 0]
+        first, size = starts[chosen, 0], starts[chosen, 1] - starts[chosen, 0]
         parts, blocks = np.zeros((size * PARTS, TILE), np.float32), np.zeros((size, TILE), np.float32)
         lanes = min(TILE, (high - low + LANES - 1) // LANES * LANES)
         _sum_terms(points, tile, lanes, first * BLOCK, parts)

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.truth.camera_visibility import hidden_from_camera
 from refgi.truth.hemisphere import scrambled_points
 from refgi.truth.light_grid import footprint
 from refgi.truth.light_pass import add_light_side
 from refgi.truth.lobe_directions import gather_along_lobes, send_along_lobes
 from refgi.truth.lobe_photons import lobe_photon_pass
-from refgi.truth.passes import follow, hidden_from_camera, pass_through, paths_for, scatter
-from refgi.truth.paths import Paths
+from refgi.truth.passes import follow, scatter
+from refgi.truth.paths import Paths, pass_through, paths_for
 from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
 
 Array = npt.NDArray[Any]

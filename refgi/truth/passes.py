@@ -13,42 +13,19 @@ from refgi.lobes import inverse_fraction, lobe_direction
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.rays import MISS
 from refgi.sampling import hash_bits
-from refgi.truth.camera_visibility import aim_paths
+from refgi.truth.camera_visibility import hidden_from_camera
 from refgi.truth.caustics import photon_pass
-from refgi.truth.hemisphere import Beside, cosine_direction, gather, scrambled_points, send
+from refgi.truth.cell_pass import add_cells, beside_of
+from refgi.truth.cell_rays import Beside
+from refgi.truth.hemisphere import cosine_direction, gather, scrambled_points, send
 from refgi.truth.light_grid import footprint
 from refgi.truth.light_pass import add_light_side
-from refgi.truth.paths import Paths, dot, hit_point, row
+from refgi.truth.paths import Paths, dot, hit_point, pass_through, paths_for, row
 from refgi.truth.surfaces import Surfaces, around, face_normal, lift, shading_normal
 from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
 from refgi.truth.textured import diffuse_at
 
 Array = npt.NDArray[Any]
-
-
-@kernel(parallel=True)
-def pass_through(surfaces: Surfaces, grain: float, paths: Paths) -> None:
-    """Move each ray to the far side of what it found, with the same direction.
-
-    `grain`: the tracer's: how far rays start above faces, m. `paths`: origins, reach and lengths are moved on; rays
-    that found nothing end.
-    """
-    for ray in prange(len(paths.reach)):
-        _pass_through(surfaces, grain, paths, ray)
-
-
-@kernel
-def _pass_through(surfaces: Surfaces, grain: float, paths: Paths, ray: int) -> None:
-    if paths.triangle_id[ray] == MISS:
-        paths.reach[ray] = 0
-        return
-    w, y = hit_point(paths, ray)
-    g = face_normal(surfaces, paths.triangle_id[ray], w[0], w[1], w[2])  # on the side the ray leaves to
-    offset = lift(surfaces, paths.triangle_id[ray], y, g, grain)
-    for c in range(3):
-        paths.origin[ray, c] = y[c] + offset * g[c]
-    paths.travelled[ray] += paths.distance[ray]
-    paths.reach[ray] -= paths.distance[ray]
 
 
 @kernel(parallel=True)
@@ -126,6 +103,8 @@ def one_pass(task: Task, number: int) -> Array:
     if len(task.receivers.pixel):
         if task.settings.picks_per_pass:
             add_light_side(task, words[:3], sums)
+        if task.cells is not None:
+            add_cells(task, words[:2], sums)
         if task.settings.directions_per_pass:
             _hemisphere(task, words, sums)
         if task.caustics is not None:
@@ -145,10 +124,8 @@ def _hemisphere(task: Task, words: Array, sums: Array) -> None:
         for bounce in range(task.settings.bounces):
             if bounce:
                 scatter(task.surfaces, task.tracer.grain, int(words[3 + bounce]), task.receivers, first, count, paths)
-            beside = None
-            if bounce == 0 and task.cells is not None:
-                beside = Beside(task.cells, task.receivers, task.cell_totals, task.picks, first, count)
-            follow(task, paths, first, count, task.settings.shared_bound if bounce == 0 else 0.0, sums, beside)
+            bound, beside = (task.settings.shared_bound, beside_of(task, first)) if bounce == 0 else (0.0, None)
+            follow(task, paths, first, count, bound, sums, beside)
 
 
 def follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums: Array,
@@ -171,16 +148,6 @@ def follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums:
             return
 
 
-def hidden_from_camera(task: Task, paths: Paths) -> Array | None:
-    """Return which paths end at points that the camera does not see; None where that does not matter."""
-    if task.view is None:
-        return None
-    rays = shadow_batch(len(paths.reach))
-    aim_paths(task.view, task.surfaces, task.tracer.grain, paths, rays)
-    task.tracer.fill_occluded(rays.origin, rays.direction, rays.reach, rays.blocked)
-    return rays.blocked
-
-
 def _reach(task: Task) -> float:
     """Return the length of hemisphere rays: beyond, the geometry term stays below the bound; lobes know none."""
     bound, surfaces = task.settings.shared_bound, task.surfaces
@@ -189,10 +156,3 @@ def _reach(task: Task) -> float:
     most = max((footprint(light, task.scene.geometry, task.settings.light_grid)[1] for light in task.scene.lights),
                default=0.0)
     return float(np.sqrt(most / bound))
-
-
-def paths_for(count: int) -> Paths:
-    """Allocate a batch of paths."""
-    origin, direction, weight = (np.empty((count, 3), np.float32) for _ in range(3))
-    reach, travelled, cosine, distance = (np.empty(count, np.float32) for _ in range(4))
-    return Paths(origin, direction, reach, travelled, cosine, np.empty(count, np.int32), distance, weight)

@@ -10,7 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel
+from refgi.jit import kernel, prange
+from refgi.rays import MISS
+from refgi.truth.surfaces import Surfaces, face_normal, lift
 
 Array = npt.NDArray[Any]
 
@@ -65,3 +67,35 @@ def hit_point(paths: Paths, ray: int) -> tuple[tuple[float, float, float], tuple
     dx, dy, dz = row(paths.direction, ray)
     ox, oy, oz = row(paths.origin, ray)
     return (-dx, -dy, -dz), (ox + t * dx, oy + t * dy, oz + t * dz)
+
+
+@kernel(parallel=True)
+def pass_through(surfaces: Surfaces, grain: float, paths: Paths) -> None:
+    """Move each ray to the far side of what it found, with the same direction.
+
+    `grain`: the tracer's: how far rays start above faces, m. `paths`: origins, reach and lengths are moved on; rays
+    that found nothing end.
+    """
+    for ray in prange(len(paths.reach)):
+        _pass_through(surfaces, grain, paths, ray)
+
+
+@kernel
+def _pass_through(surfaces: Surfaces, grain: float, paths: Paths, ray: int) -> None:
+    if paths.triangle_id[ray] == MISS:
+        paths.reach[ray] = 0
+        return
+    w, y = hit_point(paths, ray)
+    g = face_normal(surfaces, paths.triangle_id[ray], w[0], w[1], w[2])  # on the side the ray leaves to
+    offset = lift(surfaces, paths.triangle_id[ray], y, g, grain)
+    for c in range(3):
+        paths.origin[ray, c] = y[c] + offset * g[c]
+    paths.travelled[ray] += paths.distance[ray]
+    paths.reach[ray] -= paths.distance[ray]
+
+
+def paths_for(count: int) -> Paths:
+    """Allocate a batch of paths."""
+    origin, direction, weight = (np.empty((count, 3), np.float32) for _ in range(3))
+    reach, travelled, cosine, distance = (np.empty(count, np.float32) for _ in range(4))
+    return Paths(origin, direction, reach, travelled, cosine, np.empty(count, np.int32), distance, weight)

@@ -11,7 +11,9 @@ from refgi.rays import Tracer
 from refgi.rsm.raster.projection import Projection
 from refgi.scene import LightTable, Scene
 from refgi.truth.caustics import Film
+from refgi.truth.cell_rays import Counts
 from refgi.truth.light_grid import Density
+from refgi.truth.lobe_cells import LobeCells
 from refgi.truth.lobe_receivers import Lobes
 from refgi.truth.paths import Shadows
 from refgi.truth.settings import TruthSettings
@@ -34,9 +36,15 @@ class Task(NamedTuple):
     left_to_photons: float = math.inf  # exponent from which on a sender's lobe comes by photons alone
     view: Projection | None = None  # only surfaces visible in it emit; None: all do
     densities: tuple[Density | None, ...] = ()  # of each light's rays; none: even ones
-    cells: Any = None  # LobeCells of senders' lobes; None: no lobe comes by them
+    cells: LobeCells | None = None  # of senders' lobes; None: no lobe comes by them
     cell_totals: Array | None = None  # (r,) float64: what they send each receiver
     lobes: Lobes | None = None  # of the receivers, where their lobes and not their irradiance are asked for
+
+    @property
+    def counts(self) -> Counts:
+        """Samples of each receiver in a pass that meet senders' lobes; the light estimator alone knows no directions."""
+        mirrors = self.picks // 2 if self.directions else 0
+        return Counts(self.directions, self.picks - mirrors, mirrors)
 
     @property
     def picks(self) -> int:

@@ -21,10 +21,9 @@ from refgi.scene import Scene
 from refgi.skips import left_out
 from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
-from refgi.truth.cell_picks import fill_totals
+from refgi.truth.cell_pass import with_cells
 from refgi.truth.checkpoint import Checkpoint
 from refgi.truth.light_pass import pilot
-from refgi.truth.lobe_cells import lobe_cells
 from refgi.truth.lobe_pass import lobe_pass
 from refgi.truth.lobe_receivers import glossy_triangles, lobes_of, meets_photons
 from refgi.truth.passes import one_pass
@@ -255,13 +254,7 @@ def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_
 
 def _guided(task: Task) -> Task:
     """Return a task with what the light's side is guided by: densities of its rays, and cells of lobes."""
-    task = task._replace(densities=pilot(task))
-    cells = lobe_cells(task) if task.lobes is None and task.picks else None
-    if cells is None:
-        return task
-    totals = np.empty(len(task.receivers.pixel))
-    fill_totals(cells, task.receivers, totals)
-    return task._replace(cells=cells, cell_totals=totals)
+    return with_cells(task._replace(densities=pilot(task)))
 
 
 def _without_pilot(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,

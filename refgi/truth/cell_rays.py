@@ -1,0 +1,335 @@
+"""Lobes of senders: rays into cells of light, directions to mirror images of lights, and their share beside the rest.
+
+The directions of hemisphere sampling rarely meet a lobe, and by then it is bright. So each receiver picks cells of
+light besides (`refgi.truth.cell_walk`), and
+
+- b: sends a fresh ray of the light through a random place of a cell, and connects what it finds, or
+- c: sends a direction around the image of the light in the plane mirror that the cell is, and connects what it finds in
+  this very cell to the light. The image's lobe is P (1 + r/d)^2 sharp: what x sees of a lobe turns with x and y both.
+
+With r and d the distances from the point y to the receiver and to the light, g the face normal at y, p the chance of a
+cell and W its measure, N directions (a), k_b and k_c picks put
+
+    n_a = N <n_x.w> / pi F,   n_b = k_b ((1 - e) p_b / W + e / (lights W_light)),   n_c = k_c p_c D(w) F,
+
+F = <g.-w> d^2 / (r^2 <g.l>), rays on a unit of the light's measure, and each adds the lobe's term over n_a + n_b + n_c (the
+balance heuristic of multiple importance sampling). So no contribution is larger than what the best of them would give:
+near a flat mirror n_c follows the lobe itself, however sharp it is.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.lobes import lobe_direction, lobe_gap, lobe_power
+from refgi.pairs.shadow_rays import RayReceivers
+from refgi.radiometry import DIRECTIONAL, incident_light, radiant_intensity
+from refgi.rays import MISS, far_offset, ray_offset
+from refgi.sampling import hash_bits
+from refgi.scene import LightTable
+from refgi.truth.cell_walk import CHUNK, Found, Path, column, fill_tops, found_at, found_in, go_down, next_top
+from refgi.truth.light_square import ray_through
+from refgi.truth.lobe_cells import DEEPEST, LobeCells
+from refgi.truth.next_event import aim_at_light, toward_light
+from refgi.truth.paths import Paths, Shadows, dot, hit_point, row
+from refgi.truth.surfaces import (
+    Surfaces, around, face_normal, height_above, lift, lobe_pattern, shading_normal,
+)
+
+Array = npt.NDArray[Any]
+
+EVEN = 1 / 16  # e: share of the rays of b that are even over the lights' directions
+
+
+class Counts(NamedTuple):
+    """Samples of each receiver in a pass."""
+
+    directions: int  # N
+    cells: int  # k_b
+    mirrors: int  # k_c
+
+
+class Beside(NamedTuple):
+    """What the densities of a point depend on."""
+
+    cells: LobeCells
+    receivers: RayReceivers
+    totals: Array  # (r,) float64: of `refgi.truth.cell_walk.fill_totals`
+    counts: Counts
+    first: int  # receiver of the first ray
+
+
+class Picks(NamedTuple):
+    """Rays of b from lights, or of c from receivers, with the cells that they were picked by."""
+
+    paths: Paths
+    light: Array  # (n,) int32
+    density: Array  # (n,) float64: n_b
+    mirror: Array  # (n,) int32
+    mirror_chance: Array  # (n,) float64
+
+
+@kernel
+def near_density(directions: float, cos_x: float, image: float, sender: tuple[float, float, float]) -> float:
+    """Return (n_a + n_c) r^2; `image`: k_c p_c D. `sender`: <g.-w>, d^2 (1 for a directional light), <g.l>."""
+    return (directions * cos_x / np.pi + image) * sender[0] * sender[1] / max(sender[2], 1e-30)
+
+
+@kernel
+def rays_beside(beside: Beside, k: int, found: Found, r: int, way: tuple[tuple[float, float, float], float, float],
+                sender: tuple[float, float, float]) -> float:
+    """Return (n_a + n_b + n_c) r^2 at a point of cells `found`; `way`: unit vector to it, its cosine, its length."""
+    w, cosine, length = way
+    image = 0.0
+    if found.mirror >= 0:
+        image = beside.counts.mirrors * found.mirror_chance * image_density(beside, k, found.mirror, r, w)
+    far = even_density(beside.cells, k, found.leaf, found.chance, beside.counts.cells)
+    return near_density(beside.counts.directions, cosine, image, sender) + far * length * length
+
+
+@kernel
+def even_density(cells: LobeCells, k: int, leaf: int, chance: float, picks: int) -> float:
+    """Return n_b in a leaf that is picked with a probability of `chance`."""
+    share = (1 - EVEN) * chance * 4.0 ** cells.corner[leaf, 2] + EVEN / len(cells.squares.kind)
+    return picks * share / cells.squares.measure[k]
+
+
+@kernel
+def image_of(cells: LobeCells, k: int, mirror: int, x: tuple[float, float, float]) -> Any:
+    """Return unit vector from x to the image of light k in a cell's mirror, and exponent + 1 of its lobe; 0: none."""
+    m, squares = cells.mirror, cells.squares
+    n = (m[mirror, 3], m[mirror, 4], m[mirror, 5])
+    if squares.kind[k] == DIRECTIONAL:
+        d = row(squares.frame[k], 2)
+        twice = 2 * dot(n, d)
+        return (twice * n[0] - d[0], twice * n[1] - d[1], twice * n[2] - d[2]), m[mirror, 6] if twice < 0 else 0.0
+    o = row(squares.origin, k)
+    height = (o[0] - m[mirror, 0]) * n[0] + (o[1] - m[mirror, 1]) * n[1] + (o[2] - m[mirror, 2]) * n[2]
+    above = (x[0] - m[mirror, 0]) * n[0] + (x[1] - m[mirror, 1]) * n[1] + (x[2] - m[mirror, 2]) * n[2]
+    v = (o[0] - 2 * height * n[0] - x[0], o[1] - 2 * height * n[1] - x[1], o[2] - 2 * height * n[2] - x[2])
+    length = math.sqrt(dot(v, v))
+    if height <= 0 or above <= 0 or length == 0:
+        return (0.0, 0.0, 1.0), 0.0
+    ratio = 1 + above / height  # 1 + r/d
+    return (v[0] / length, v[1] / length, v[2] / length), m[mirror, 6] * ratio * ratio
+
+
+@kernel
+def image_density(beside: Beside, k: int, mirror: int, r: int, w: tuple[float, float, float]) -> float:
+    """Return D(w), 1/sr."""
+    u, sharpness = image_of(beside.cells, k, mirror, point_of(beside.receivers.position, r))
+    if sharpness == 0:
+        return 0.0
+    gap = lobe_gap(u[0], u[1], u[2], w[0], w[1], w[2])
+    return sharpness / (2 * np.pi) * lobe_power(gap, sharpness - 1)
+
+
+@kernel(parallel=True)
+def pick_cells(beside: Beside, span: tuple[int, int], sampling: tuple[int, float, bool], picks: Picks) -> None:
+    """Fill the rays of a span's receivers (first, one past the last).
+
+    `sampling`: seed of a hash with the receiver's pixel; the tracer's grain, m; whether they are those of c.
+    """
+    count = span[1] - span[0]
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        _pick_chunk(beside, span[0], (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)), sampling, picks)
+
+
+@kernel
+def _pick_chunk(beside: Beside, first: int, part: tuple[int, int], sampling: tuple[int, float, bool],
+                picks: Picks) -> None:
+    depth, cells, receivers = DEEPEST + 2, beside.cells, beside.receivers
+    path = Path(np.empty(depth, np.int64), np.empty(depth), np.empty((depth, 4)), np.empty((depth, 5)))
+    found = np.empty(len(cells.top), np.float32)
+    seed, grain, mirrors = sampling
+    count = beside.counts.mirrors if mirrors else beside.counts.cells
+    for i in range(part[0], part[1]):
+        x, n = column(receivers.position, first + i), column(receivers.normal, first + i)
+        word = hash_bits(np.uint32(receivers.pixel[first + i]) ^ np.uint32(seed))
+        total, shift = fill_tops(cells, x, n, found), _uniform(word ^ np.uint32(0x1B56C4E9))
+        top, level, even = -1, 0, 0.0 if mirrors else EVEN
+        for s in range(count):
+            ray, place, (u, v) = i * count + s, (s + shift) / count, _place(word, s)
+            picks.paths.reach[ray] = 0
+            if place < even:
+                k = min(len(cells.squares.kind) - 1, int(place / even * len(cells.squares.kind)))
+                _send(cells, k, found_in(cells, k, u, v, x, n, total), (u, v, grain), beside.counts, ray, picks)
+            elif total > 0:
+                place = (place - even) / (1 - even) * total
+                top, level = next_top(cells, found, total, place, top, level, path)
+                while cells.child[path.node[level]] >= 0 and path.chance[level] > 0 and not (
+                        mirrors and cells.mirror[path.node[level], 7] > 0):
+                    level = go_down(cells, x, n, level, place, total, path)
+                if path.chance[level] > 0 and mirrors:
+                    _send_to_image(beside, cells.light[top], path.node[level], first + i, (u, v), ray, picks)
+                elif path.chance[level] > 0:
+                    _send_into(cells, cells.light[top], path, level, (u, v, grain), beside.counts, ray, picks)
+
+
+@kernel
+def _send_into(cells: LobeCells, k: int, path: Path, level: int, place: tuple[float, float, float], counts: Counts,
+               ray: int, picks: Picks) -> None:
+    """Write the ray of b through a place of the leaf at the end of a path."""
+    leaf, mirror, chance = path.node[level], -1, 0.0
+    for above in range(level + 1):
+        if mirror < 0 and cells.mirror[path.node[above], 7] > 0:
+            mirror, chance = path.node[above], path.chance[above]
+    side = 2.0 ** -cells.corner[leaf, 2]
+    a, b = (cells.corner[leaf, 0] + place[0]) * side, (cells.corner[leaf, 1] + place[1]) * side
+    _send(cells, k, Found(leaf, path.chance[level], mirror, chance), (a, b, place[2]), counts, ray, picks)
+
+
+@kernel
+def _send(cells: LobeCells, k: int, found: Found, place: tuple[float, float, float], counts: Counts, ray: int,
+          picks: Picks) -> None:
+    """Write the ray of light k through a place of its square, just beyond the lamp: that may lie in a surface."""
+    o, d = ray_through(cells.squares, k, place[0], place[1])
+    beyond = ray_offset(o[0], o[1], o[2], place[2])
+    for c in range(3):
+        picks.paths.origin[ray, c], picks.paths.direction[ray, c] = o[c] + beyond * d[c], d[c]
+    picks.paths.reach[ray], picks.light[ray] = np.inf, k
+    picks.density[ray] = even_density(cells, k, found.leaf, found.chance, counts.cells)
+    picks.mirror[ray], picks.mirror_chance[ray] = found.mirror, found.mirror_chance
+
+
+@kernel
+def _send_to_image(beside: Beside, k: int, mirror: int, r: int, place: tuple[float, float], ray: int,
+                   picks: Picks) -> None:
+    """Write the direction of c around the image of light k in a cell's mirror."""
+    receivers, paths = beside.receivers, picks.paths
+    u, sharpness = image_of(beside.cells, k, mirror, point_of(receivers.position, r))
+    if sharpness == 0 or beside.cells.mirror[mirror, 7] == 0:
+        return
+    x, y, z = lobe_direction(place[0], place[1], sharpness - 1)
+    w = around(u, x, y, z)
+    picks.light[ray], picks.mirror[ray] = k, mirror
+    if dot(point_of(receivers.facing, r), w) > 0 and dot(point_of(receivers.normal, r), w) > 0:
+        paths.reach[ray], paths.travelled[ray] = np.inf, 0
+        for c in range(3):
+            paths.origin[ray, c], paths.direction[ray, c] = receivers.origin[c, r], w[c]
+
+
+@kernel
+def _place(word: Any, pick: int) -> tuple[float, float]:
+    word = hash_bits(word + np.uint32(pick))
+    return _uniform(word ^ np.uint32(0x68E31DA4)), _uniform(word ^ np.uint32(0xB5297A4D))
+
+
+@kernel
+def _uniform(word: Any) -> Any:
+    return (hash_bits(word) + 0.5) * 2.0**-32
+
+
+@kernel
+def point_of(rows: Array, i: int) -> tuple[float, float, float]:
+    """Return column i of (3, n) as float64 scalars."""
+    return np.float64(rows[0, i]), np.float64(rows[1, i]), np.float64(rows[2, i])
+
+
+@kernel(parallel=True)
+def connect(beside: Beside, surfaces: Surfaces, lights: LightTable, sampling: tuple[int, float, bool], picks: Picks,
+            shadows: Shadows) -> None:
+    """Write the shadow ray that is left of each pick, and what the lobe at the point that it found sends.
+
+    From there to the receiver for b, to the light for c (`sampling` as for `pick_cells`). `shadows`: origins,
+    directions, reach and contribution are filled; the reach is 0 where nothing arrives.
+    """
+    count = len(picks.light)
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        for ray in range(chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)):
+            if sampling[2]:
+                _connect_to_light(beside, surfaces, lights, sampling[1], picks, shadows, ray)
+            else:
+                _connect_to_receiver(beside, surfaces, lights, sampling[1], picks, shadows, ray)
+
+
+@kernel
+def _connect_to_receiver(beside: Beside, surfaces: Surfaces, lights: LightTable, grain: float, picks: Picks,
+                         shadows: Shadows, ray: int) -> None:
+    shadows.reach[ray] = 0
+    triangle, k, receivers = picks.paths.triangle_id[ray], picks.light[ray], beside.receivers
+    if picks.paths.reach[ray] == 0 or triangle == MISS or not _has_lobe(surfaces, triangle):
+        return
+    r = beside.first + ray // beside.counts.cells
+    back, y = hit_point(picks.paths, ray)
+    g = face_normal(surfaces, triangle, -back[0], -back[1], -back[2])
+    height = height_above(surfaces, triangle, y, g)
+    y = (y[0] - height * g[0], y[1] - height * g[1], y[2] - height * g[2])
+    way, n = subtract(y, point_of(receivers.position, r)), point_of(receivers.normal, r)
+    length = math.sqrt(dot(way, way))
+    if length == 0 or dot(g, way) >= 0 or dot(point_of(receivers.facing, r), way) <= 0 or dot(n, way) <= 0:
+        return
+    w = (way[0] / length, way[1] / length, way[2] / length)
+    toward, power = toward_light(lights, k, y), (lights.intensity[k, 0], lights.intensity[k, 1], lights.intensity[k, 2])
+    if lights.kind[k] != DIRECTIONAL:
+        power = radiant_intensity(lights, k, -toward[0], -toward[1], -toward[2])
+    image = 0.0
+    if picks.mirror[ray] >= 0:
+        image = beside.counts.mirrors * picks.mirror_chance[ray] * image_density(beside, k, picks.mirror[ray], r, w)
+    total = near_density(beside.counts.directions, dot(n, w), image, (-dot(g, w), dot(toward, toward), dot(g, back)))
+    total += picks.density[ray] * length * length
+    if _fill_lobe(surfaces, triangle, (y, g, back, w), dot(n, w), power, total, shadows, ray):
+        offset = ray_offset(y[0], y[1], y[2], grain) + far_offset(way[0], way[1], way[2])
+        for c in range(3):
+            shadows.origin[ray, c] = receivers.origin[c, r]
+            shadows.direction[ray, c] = y[c] + offset * g[c] - receivers.origin[c, r]
+        shadows.reach[ray] = 1
+
+
+@kernel
+def _connect_to_light(beside: Beside, surfaces: Surfaces, lights: LightTable, grain: float, picks: Picks,
+                      shadows: Shadows, ray: int) -> None:
+    shadows.reach[ray] = 0
+    triangle, k, receivers = picks.paths.triangle_id[ray], picks.light[ray], beside.receivers
+    if picks.paths.reach[ray] == 0 or triangle == MISS or not _has_lobe(surfaces, triangle):
+        return
+    r = beside.first + ray // beside.counts.mirrors
+    back, y = hit_point(picks.paths, ray)
+    toward = toward_light(lights, k, y)
+    g = face_normal(surfaces, triangle, -toward[0], -toward[1], -toward[2])
+    lx, ly, lz, far, red, green, blue = incident_light(lights, k, y[0], y[1], y[2])
+    if dot(g, back) <= 0 or max(red, green, blue) <= 0:
+        return
+    found = found_at(beside.cells, k, y, column(receivers.position, r), column(receivers.normal, r), beside.totals[r])
+    if found.mirror != picks.mirror[ray]:
+        return
+    w, square = (-back[0], -back[1], -back[2]), dot(toward, toward)
+    cosine = dot(point_of(receivers.normal, r), w)
+    length = np.float64(picks.paths.travelled[ray]) + picks.paths.distance[ray]
+    total = rays_beside(beside, k, found, r, (w, cosine, length), (dot(g, back), square, dot(g, (lx, ly, lz))))
+    power = (red * square, green * square, blue * square)
+    if _fill_lobe(surfaces, triangle, (y, g, (lx, ly, lz), w), cosine, power, total, shadows, ray):
+        aim_at_light(lights, k, (y, g, toward), far, lift(surfaces, triangle, y, g, grain), grain, shadows, ray)
+
+
+@kernel
+def _has_lobe(surfaces: Surfaces, triangle: int) -> bool:
+    glossy = row(surfaces.specular, surfaces.material_of_face[triangle])
+    return max(glossy[0], glossy[1], glossy[2]) > 0
+
+
+@kernel
+def subtract(a: tuple[float, float, float], b: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@kernel
+def _fill_lobe(surfaces: Surfaces, triangle: int, sender: Any, cosine: float, power: Any, total: float,
+               shadows: Shadows, ray: int) -> bool:
+    """Fill rho I pattern <n_x.w> / (pi r^2) over all densities, `total` r^2; return whether that is light.
+
+    `sender`: the point, its face normal, towards the light, and the direction from the receiver. `power`: I, W/sr.
+    """
+    y, g, light, w = sender
+    material = surfaces.material_of_face[triangle]
+    n, glossy = shading_normal(surfaces, triangle, y, g), row(surfaces.specular, material)
+    pattern = lobe_pattern(surfaces, material, n, light, (-w[0], -w[1], -w[2]))
+    most = 0.0
+    for c in range(3):
+        shadows.contribution[ray, c] = glossy[c] * power[c] * pattern * cosine / (np.pi * total) if total > 0 else 0.0
+        most = max(most, shadows.contribution[ray, c])
+    return most > 0

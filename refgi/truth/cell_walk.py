@@ -1,0 +1,165 @@
+"""How a receiver finds its way in the cells of `refgi.truth.lobe_cells`, and with what probability.
+
+A receiver looks at all top cells, and goes down from those that its picks fall into, child by child, by what each may
+send it (`_expected`). Places of picks are evenly spaced with one random shift, in the order of the cells.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.jit import kernel, prange
+from refgi.pairs.shadow_rays import RayReceivers
+from refgi.truth.light_square import place_of
+from refgi.truth.lobe_cells import LobeCells
+
+Array = npt.NDArray[Any]
+
+CHUNK = 64  # receivers that one parallel iteration owns
+LEAST = np.float32(1e-30)  # m^2, against 0 / 0
+
+
+class Path(NamedTuple):
+    """The way down to a pick, level by level."""
+
+    node: Array
+    chance: Array
+    share: Array  # (levels, 4) of each child
+    edge: Array  # (levels, 5): where each child begins and ends among places; the last below 0 until they are known
+
+
+class Found(NamedTuple):
+    """The cells that hold a place of a light's square."""
+
+    leaf: int
+    chance: float  # of the leaf, when one cell is picked
+    mirror: int  # the first cell on the way down that mirrors the light; -1: none
+    mirror_chance: float
+
+
+@kernel
+def _expected(cell: Any, x: Any, n: Any) -> Any:
+    """Return about what a cell sends a receiver without visibility: flux, cosine, lobe and distance, each widened.
+
+    `cell`: a row of `LobeCells`. `x`, `n`: place and normal. All float32; free of branches.
+    """
+    cx, cy, cz, radius, ax, ay, az, spread, flux, gx, gy, gz, thick, tilt = cell
+    zero, one, quarter = np.float32(0), np.float32(1), np.float32(0.25)
+    dx, dy, dz = cx - x[0], cy - x[1], cz - x[2]
+    size, square = radius * radius + LEAST, dx * dx + dy * dy + dz * dz + LEAST
+    inverse = one / np.sqrt(square)
+    along, height = n[0] * gx + n[1] * gy + n[2] * gz, n[0] * dx + n[1] * dy + n[2] * dz
+    # the highest point of the cell above the receiver's horizon, and the receiver above the cell's
+    across = one - along * along
+    cosine = (height + radius * np.sqrt(across if across > zero else zero) + thick * abs(along)) * inverse
+    above = thick + tilt * (radius + square * inverse) - (gx * dx + gy * dy + gz * dz)
+    cosine = cosine if cosine < one else one
+    cosine = cosine if (cosine > zero) & (above > zero) else zero
+    gap = one + (ax * dx + ay * dy + az * dz) * inverse
+    width = spread + size / square
+    fall = one / (one + quarter * (gap if gap > zero else zero) / width)
+    fall *= fall
+    return flux * cosine * (fall * fall) / (width * (square if square > size else size))
+
+
+@kernel
+def _of_node(cells: LobeCells, node: int, x: Any, n: Any) -> Any:
+    r = cells.row
+    return _expected((r[node, 0], r[node, 1], r[node, 2], r[node, 3], r[node, 4], r[node, 5], r[node, 6], r[node, 7],
+                      r[node, 8], r[node, 9], r[node, 10], r[node, 11], r[node, 12], r[node, 13]), x, n)
+
+
+@kernel
+def column(rows: Array, i: int) -> tuple[Any, Any, Any]:
+    """Return column i of (3, n)."""
+    return rows[0, i], rows[1, i], rows[2, i]
+
+
+@kernel
+def fill_tops(cells: LobeCells, x: Any, n: Any, found: Array) -> float:
+    """Fill what each top cell sends, in SIMD lanes; return the sum, in their order."""
+    c = cells.columns
+    for t in range(len(found)):
+        found[t] = _expected((c[0, t], c[1, t], c[2, t], c[3, t], c[4, t], c[5, t], c[6, t], c[7, t], c[8, t], c[9, t],
+                              c[10, t], c[11, t], c[12, t], c[13, t]), x, n)
+    total = 0.0
+    for t in range(len(found)):
+        total += found[t]
+    return total
+
+
+@kernel(parallel=True)
+def fill_totals(cells: LobeCells, receivers: RayReceivers, totals: Array) -> None:
+    """Fill what all cells send each receiver, (r,) float64: the same in every pass."""
+    for chunk in prange((len(totals) + CHUNK - 1) // CHUNK):
+        found = np.empty(len(cells.top), np.float32)
+        for r in range(chunk * CHUNK, min(len(totals), chunk * CHUNK + CHUNK)):
+            totals[r] = fill_tops(cells, column(receivers.position, r), column(receivers.normal, r), found)
+
+
+@kernel
+def found_at(cells: LobeCells, k: int, y: tuple[float, float, float], x: Any, n: Any, total: float) -> Found:
+    """Return the cells that hold a point y that light k reaches, for a receiver; `total` of `fill_tops`."""
+    a, b = place_of(cells.squares, k, y)
+    return found_in(cells, k, a, b, x, n, total) if a >= 0 else Found(np.int64(k), 0.0, -1, 0.0)
+
+
+@kernel
+def found_in(cells: LobeCells, k: int, a: float, b: float, x: Any, n: Any, total: float) -> Found:
+    """Return the cells that hold a place of light k's square, for a receiver at x with normal n."""
+    node, mirror, mirror_chance = np.int64(k), -1, 0.0
+    while not cells.is_top[node]:
+        node, a, b = _child_at(cells, node, a, b)
+    chance = _of_node(cells, node, x, n) / total if total > 0 else 0.0
+    while True:
+        if mirror < 0 and cells.mirror[node, 7] > 0:
+            mirror, mirror_chance = node, chance
+        if cells.child[node] < 0 or chance <= 0:
+            return Found(node, chance, mirror, mirror_chance)
+        first, whole = cells.child[node], 0.0
+        node, a, b = _child_at(cells, node, a, b)
+        for sibling in range(4):
+            whole += _of_node(cells, first + sibling, x, n)
+        chance = chance * (_of_node(cells, node, x, n) / whole) if whole > 0 else 0.0
+
+
+@kernel
+def _child_at(cells: LobeCells, node: int, a: float, b: float) -> tuple[int, float, float]:
+    """Return the child of a cell that holds a place of it, and where in the child, all in [0, 1)."""
+    i, j = int(2 * a), int(2 * b)
+    return cells.child[node] + 2 * i + j, 2 * a - i, 2 * b - j
+
+
+@kernel
+def next_top(cells: LobeCells, found: Array, total: float, place: float, top: int, level: int,
+             path: Path) -> tuple[int, int]:
+    """Go on to the top cell that holds a place; return it and the level that the way down goes on from."""
+    while top < 0 or (place >= path.edge[0, 0] + found[top] and top < len(found) - 1):
+        path.edge[0, 0] = path.edge[0, 0] + found[top] if top >= 0 else 0.0
+        top, level = top + 1, 0
+        path.node[0], path.chance[0], path.edge[0, 4] = cells.top[top], found[top] / total, -1.0
+    while level > 0 and place >= path.edge[level - 1, path.node[level] - cells.child[path.node[level - 1]] + 1]:
+        level -= 1
+    return top, level
+
+
+@kernel
+def go_down(cells: LobeCells, x: Any, n: Any, level: int, place: float, total: float, path: Path) -> int:
+    """Go on to the child that holds a place; return its level."""
+    if path.edge[level, 4] < 0:
+        first, whole = cells.child[path.node[level]], 0.0
+        for c in range(4):
+            path.share[level, c] = _of_node(cells, first + c, x, n)
+            whole += path.share[level, c]
+        for c in range(4):
+            path.share[level, c] = path.share[level, c] / whole if whole > 0 else 0.0
+            path.edge[level, c + 1] = path.edge[level, c] + total * path.chance[level] * path.share[level, c]
+    c = 0
+    while c < 3 and place >= path.edge[level, c + 1]:
+        c += 1
+    while c > 0 and path.share[level, c] <= 0:
+        c -= 1  # rounding at the end: the last that may be picked
+    path.node[level + 1], path.edge[level + 1, 4] = cells.child[path.node[level]] + c, -1.0
+    path.chance[level + 1], path.edge[level + 1, 0] = path.chance[level] * path.share[level, c], path.edge[level, c]
+    return level + 1

@@ -30,9 +30,9 @@ from refgi.radiometry import DIRECTIONAL, incident_light, radiant_intensity
 from refgi.rays import MISS, far_offset, ray_offset
 from refgi.sampling import hash_bits
 from refgi.scene import LightTable
-from refgi.truth.cell_walk import CHUNK, Found, Path, column, fill_tops, found_at, found_in, go_down, next_top
+from refgi.truth.cell_walk import CHUNK, Found, Path, column, fill_tops, first_rank, found_at, found_in, go_down, next_top, node_of
 from refgi.truth.light_square import ray_through
-from refgi.truth.lobe_cells import DEEPEST, LobeCells
+from refgi.truth.lobe_cells import LobeCells
 from refgi.truth.next_event import aim_at_light, toward_light
 from refgi.truth.paths import Paths, Shadows, dot, hit_point, row
 from refgi.truth.surfaces import (
@@ -86,7 +86,7 @@ def rays_beside(beside: Beside, k: int, found: Found, r: int, way: tuple[tuple[f
     image = 0.0
     if found.mirror >= 0:
         image = beside.counts.mirrors * found.mirror_chance * image_density(beside, k, found.mirror, r, w)
-    far = even_density(beside.cells, k, found.leaf, found.chance, beside.counts.cells)
+    far = even_density(beside.cells, k, found.cell, found.chance, beside.counts.cells)
     return near_density(beside.counts.directions, cosine, image, sender) + far * length * length
 
 
@@ -100,7 +100,7 @@ def even_density(cells: LobeCells, k: int, leaf: int, chance: float, picks: int)
 @kernel
 def image_of(cells: LobeCells, k: int, mirror: int, x: tuple[float, float, float]) -> Any:
     """Return unit vector from x to the image of light k in a cell's mirror, and exponent + 1 of its lobe; 0: none."""
-    m, squares = cells.mirror, cells.squares
+    m, squares = cells.tree.mirror, cells.squares
     n = (m[mirror, 3], m[mirror, 4], m[mirror, 5])
     if squares.kind[k] == DIRECTIONAL:
         d = row(squares.frame[k], 2)
@@ -141,9 +141,10 @@ def pick_cells(beside: Beside, span: tuple[int, int], sampling: tuple[int, float
 @kernel
 def _pick_chunk(beside: Beside, first: int, part: tuple[int, int], sampling: tuple[int, float, bool],
                 picks: Picks) -> None:
-    depth, cells, receivers = DEEPEST + 2, beside.cells, beside.receivers
-    path = Path(np.empty(depth, np.int64), np.empty(depth), np.empty((depth, 4)), np.empty((depth, 5)))
-    found = np.empty(len(cells.top), np.float32)
+    cells, tree, receivers = beside.cells, beside.cells.tree, beside.receivers
+    last = tree.deepest - tree.top
+    path = Path(np.empty(last + 1, np.int64), np.empty(last + 1), np.empty((last + 1, 4)), np.empty((last + 1, 5)))
+    found = np.empty(tree.columns.shape[1], np.float32)
     seed, grain, mirrors = sampling
     count = beside.counts.mirrors if mirrors else beside.counts.cells
     for i in range(part[0], part[1]):
@@ -159,27 +160,29 @@ def _pick_chunk(beside: Beside, first: int, part: tuple[int, int], sampling: tup
                 _send(cells, k, found_in(cells, k, u, v, x, n, total), (u, v, grain), beside.counts, ray, picks)
             elif total > 0:
                 place = (place - even) / (1 - even) * total
-                top, level = next_top(cells, found, total, place, top, level, path)
-                while cells.child[path.node[level]] >= 0 and path.chance[level] > 0 and not (
-                        mirrors and cells.mirror[path.node[level], 7] > 0):
-                    level = go_down(cells, x, n, level, place, total, path)
+                top, level = next_top(tree, found, total, place, top, level, path)
+                while level < last and path.chance[level] > 0 and not (
+                        mirrors and tree.mirror[node_of(tree, level, path), 7] > 0):
+                    level = go_down(tree, x, n, level, place, total, path)
                 if path.chance[level] > 0 and mirrors:
-                    _send_to_image(beside, cells.light[top], path.node[level], first + i, (u, v), ray, picks)
+                    _send_to_image(beside, level, path, first + i, (u, v), ray, picks)
                 elif path.chance[level] > 0:
-                    _send_into(cells, cells.light[top], path, level, (u, v, grain), beside.counts, ray, picks)
+                    _send_into(cells, path, level, (u, v, grain), beside.counts, ray, picks)
 
 
 @kernel
-def _send_into(cells: LobeCells, k: int, path: Path, level: int, place: tuple[float, float, float], counts: Counts,
-               ray: int, picks: Picks) -> None:
-    """Write the ray of b through a place of the leaf at the end of a path."""
-    leaf, mirror, chance = path.node[level], -1, 0.0
+def _send_into(cells: LobeCells, path: Path, level: int, place: tuple[float, float, float], counts: Counts, ray: int,
+               picks: Picks) -> None:
+    """Write the ray of b through a place of the cell at the end of a path."""
+    tree, mirror, chance = cells.tree, -1, 0.0
     for above in range(level + 1):
-        if mirror < 0 and cells.mirror[path.node[above], 7] > 0:
-            mirror, chance = path.node[above], path.chance[above]
-    side = 2.0 ** -cells.corner[leaf, 2]
-    a, b = (cells.corner[leaf, 0] + place[0]) * side, (cells.corner[leaf, 1] + place[1]) * side
-    _send(cells, k, Found(leaf, path.chance[level], mirror, chance), (a, b, place[2]), counts, ray, picks)
+        if mirror < 0 and tree.mirror[node_of(tree, above, path), 7] > 0:
+            mirror, chance = node_of(tree, above, path), path.chance[above]
+    rank = first_rank(tree, level, path)
+    cell = np.int64(cells.node[rank])
+    side = 2.0 ** -cells.corner[cell, 2]
+    a, b = (cells.corner[cell, 0] + place[0]) * side, (cells.corner[cell, 1] + place[1]) * side
+    _send(cells, cells.light[rank], Found(cell, path.chance[level], mirror, chance), (a, b, place[2]), counts, ray, picks)
 
 
 @kernel
@@ -191,17 +194,18 @@ def _send(cells: LobeCells, k: int, found: Found, place: tuple[float, float, flo
     for c in range(3):
         picks.paths.origin[ray, c], picks.paths.direction[ray, c] = o[c] + beyond * d[c], d[c]
     picks.paths.reach[ray], picks.light[ray] = np.inf, k
-    picks.density[ray] = even_density(cells, k, found.leaf, found.chance, counts.cells)
+    picks.density[ray] = even_density(cells, k, found.cell, found.chance, counts.cells)
     picks.mirror[ray], picks.mirror_chance[ray] = found.mirror, found.mirror_chance
 
 
 @kernel
-def _send_to_image(beside: Beside, k: int, mirror: int, r: int, place: tuple[float, float], ray: int,
+def _send_to_image(beside: Beside, level: int, path: Path, r: int, place: tuple[float, float], ray: int,
                    picks: Picks) -> None:
-    """Write the direction of c around the image of light k in a cell's mirror."""
-    receivers, paths = beside.receivers, picks.paths
-    u, sharpness = image_of(beside.cells, k, mirror, point_of(receivers.position, r))
-    if sharpness == 0 or beside.cells.mirror[mirror, 7] == 0:
+    """Write the direction of c around the image of a light in the mirror at the end of a path."""
+    receivers, paths, cells = beside.receivers, picks.paths, beside.cells
+    mirror, k = node_of(cells.tree, level, path), cells.light[first_rank(cells.tree, level, path)]
+    u, sharpness = image_of(cells, k, mirror, point_of(receivers.position, r))
+    if sharpness == 0 or cells.tree.mirror[mirror, 7] == 0:
         return
     x, y, z = lobe_direction(place[0], place[1], sharpness - 1)
     w = around(u, x, y, z)

@@ -1,6 +1,6 @@
 """How a receiver finds its way in the cells of `refgi.truth.lobe_cells`, and with what probability.
 
-A receiver looks at all top cells, and goes down from those that its picks fall into, child by child, by what each may
+A receiver looks at all top groups of the tree, and goes down from those that its picks fall into, child by child, by what each may
 send it (`_expected`). Places of picks are evenly spaced with one random shift, in the order of the cells.
 """
 
@@ -13,6 +13,7 @@ from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.truth.light_square import place_of
 from refgi.truth.lobe_cells import LobeCells
+from refgi.truth.lobe_tree import LobeTree
 
 Array = npt.NDArray[Any]
 
@@ -21,9 +22,9 @@ LEAST = np.float32(1e-30)  # m^2, against 0 / 0
 
 
 class Path(NamedTuple):
-    """The way down to a pick, level by level."""
+    """The way down to a pick, level by level from the top one."""
 
-    node: Array
+    node: Array  # (levels,) int64: place within its level
     chance: Array
     share: Array  # (levels, 4) of each child
     edge: Array  # (levels, 5): where each child begins and ends among places; the last below 0 until they are known
@@ -32,9 +33,9 @@ class Path(NamedTuple):
 class Found(NamedTuple):
     """The cells that hold a place of a light's square."""
 
-    leaf: int
-    chance: float  # of the leaf, when one cell is picked
-    mirror: int  # the first cell on the way down that mirrors the light; -1: none
+    cell: int
+    chance: float  # of the cell, when one is picked
+    mirror: int  # the first group on the way down that mirrors the light; -1: none
     mirror_chance: float
 
 
@@ -64,10 +65,16 @@ def _expected(cell: Any, x: Any, n: Any) -> Any:
 
 
 @kernel
-def _of_node(cells: LobeCells, node: int, x: Any, n: Any) -> Any:
-    r = cells.row
+def _of_node(tree: LobeTree, node: int, x: Any, n: Any) -> Any:
+    r = tree.row
     return _expected((r[node, 0], r[node, 1], r[node, 2], r[node, 3], r[node, 4], r[node, 5], r[node, 6], r[node, 7],
                       r[node, 8], r[node, 9], r[node, 10], r[node, 11], r[node, 12], r[node, 13]), x, n)
+
+
+@kernel
+def _first_of(tree: LobeTree, level: int) -> int:
+    """Return the first node of a level: (4^level - 4^top) / 3 lie above it."""
+    return ((1 << 2 * level) - (1 << 2 * tree.top)) // 3
 
 
 @kernel
@@ -79,7 +86,7 @@ def column(rows: Array, i: int) -> tuple[Any, Any, Any]:
 @kernel
 def fill_tops(cells: LobeCells, x: Any, n: Any, found: Array) -> float:
     """Fill what each top cell sends, in SIMD lanes; return the sum, in their order."""
-    c = cells.columns
+    c = cells.tree.columns
     for t in range(len(found)):
         found[t] = _expected((c[0, t], c[1, t], c[2, t], c[3, t], c[4, t], c[5, t], c[6, t], c[7, t], c[8, t], c[9, t],
                               c[10, t], c[11, t], c[12, t], c[13, t]), x, n)
@@ -93,7 +100,7 @@ def fill_tops(cells: LobeCells, x: Any, n: Any, found: Array) -> float:
 def fill_totals(cells: LobeCells, receivers: RayReceivers, totals: Array) -> None:
     """Fill what all cells send each receiver, (r,) float64: the same in every pass."""
     for chunk in prange((len(totals) + CHUNK - 1) // CHUNK):
-        found = np.empty(len(cells.top), np.float32)
+        found = np.empty(cells.tree.columns.shape[1], np.float32)
         for r in range(chunk * CHUNK, min(len(totals), chunk * CHUNK + CHUNK)):
             totals[r] = fill_tops(cells, column(receivers.position, r), column(receivers.normal, r), found)
 
@@ -108,49 +115,50 @@ def found_at(cells: LobeCells, k: int, y: tuple[float, float, float], x: Any, n:
 @kernel
 def found_in(cells: LobeCells, k: int, a: float, b: float, x: Any, n: Any, total: float) -> Found:
     """Return the cells that hold a place of light k's square, for a receiver at x with normal n."""
-    node, mirror, mirror_chance = np.int64(k), -1, 0.0
-    while not cells.is_top[node]:
-        node, a, b = _child_at(cells, node, a, b)
-    chance = _of_node(cells, node, x, n) / total if total > 0 else 0.0
-    while True:
-        if mirror < 0 and cells.mirror[node, 7] > 0:
+    cell, tree = np.int64(k), cells.tree
+    while cells.child[cell] >= 0:
+        i, j = int(2 * a), int(2 * b)
+        cell, a, b = np.int64(cells.child[cell] + 2 * i + j), 2 * a - i, 2 * b - j
+    rank, mirror, mirror_chance = np.int64(cells.rank[cell]), -1, 0.0
+    if rank < 0 or total <= 0:
+        return Found(cell, 0.0, -1, 0.0)
+    last = ((rank + 1) * (1 << 2 * tree.deepest) - 1) // tree.lobes  # its group in the last level
+    node = last >> 2 * (tree.deepest - tree.top)
+    chance = _of_node(tree, node, x, n) / total
+    for level in range(tree.top, tree.deepest + 1):
+        if mirror < 0 and tree.mirror[node, 7] > 0:
             mirror, mirror_chance = node, chance
-        if cells.child[node] < 0 or chance <= 0:
-            return Found(node, chance, mirror, mirror_chance)
-        first, whole = cells.child[node], 0.0
-        node, a, b = _child_at(cells, node, a, b)
+        if level == tree.deepest or chance <= 0:
+            break
+        place = last >> 2 * (tree.deepest - level - 1)
+        first, whole = _first_of(tree, level + 1) + (place & ~3), 0.0
+        node = first + (place & 3)
         for sibling in range(4):
-            whole += _of_node(cells, first + sibling, x, n)
-        chance = chance * (_of_node(cells, node, x, n) / whole) if whole > 0 else 0.0
+            whole += _of_node(tree, first + sibling, x, n)
+        chance = chance * (_of_node(tree, node, x, n) / whole) if whole > 0 else 0.0
+    return Found(cell, chance, mirror, mirror_chance)
 
 
 @kernel
-def _child_at(cells: LobeCells, node: int, a: float, b: float) -> tuple[int, float, float]:
-    """Return the child of a cell that holds a place of it, and where in the child, all in [0, 1)."""
-    i, j = int(2 * a), int(2 * b)
-    return cells.child[node] + 2 * i + j, 2 * a - i, 2 * b - j
-
-
-@kernel
-def next_top(cells: LobeCells, found: Array, total: float, place: float, top: int, level: int,
+def next_top(tree: LobeTree, found: Array, total: float, place: float, top: int, level: int,
              path: Path) -> tuple[int, int]:
-    """Go on to the top cell that holds a place; return it and the level that the way down goes on from."""
+    """Go on to the top group that holds a place; return it and the level that the way down goes on from."""
     while top < 0 or (place >= path.edge[0, 0] + found[top] and top < len(found) - 1):
         path.edge[0, 0] = path.edge[0, 0] + found[top] if top >= 0 else 0.0
         top, level = top + 1, 0
-        path.node[0], path.chance[0], path.edge[0, 4] = cells.top[top], found[top] / total, -1.0
-    while level > 0 and place >= path.edge[level - 1, path.node[level] - cells.child[path.node[level - 1]] + 1]:
+        path.node[0], path.chance[0], path.edge[0, 4] = top, found[top] / total, -1.0
+    while level > 0 and place >= path.edge[level - 1, (path.node[level] & 3) + 1]:
         level -= 1
     return top, level
 
 
 @kernel
-def go_down(cells: LobeCells, x: Any, n: Any, level: int, place: float, total: float, path: Path) -> int:
+def go_down(tree: LobeTree, x: Any, n: Any, level: int, place: float, total: float, path: Path) -> int:
     """Go on to the child that holds a place; return its level."""
     if path.edge[level, 4] < 0:
-        first, whole = cells.child[path.node[level]], 0.0
+        first, whole = _first_of(tree, tree.top + level + 1) + 4 * path.node[level], 0.0
         for c in range(4):
-            path.share[level, c] = _of_node(cells, first + c, x, n)
+            path.share[level, c] = _of_node(tree, first + c, x, n)
             whole += path.share[level, c]
         for c in range(4):
             path.share[level, c] = path.share[level, c] / whole if whole > 0 else 0.0
@@ -160,6 +168,18 @@ def go_down(cells: LobeCells, x: Any, n: Any, level: int, place: float, total: f
         c += 1
     while c > 0 and path.share[level, c] <= 0:
         c -= 1  # rounding at the end: the last that may be picked
-    path.node[level + 1], path.edge[level + 1, 4] = cells.child[path.node[level]] + c, -1.0
+    path.node[level + 1], path.edge[level + 1, 4] = 4 * path.node[level] + c, -1.0
     path.chance[level + 1], path.edge[level + 1, 0] = path.chance[level] * path.share[level, c], path.edge[level, c]
     return level + 1
+
+
+@kernel
+def node_of(tree: LobeTree, level: int, path: Path) -> int:
+    """Return the number among all groups of the one at a level of a path."""
+    return _first_of(tree, tree.top + level) + path.node[level]
+
+
+@kernel
+def first_rank(tree: LobeTree, level: int, path: Path) -> int:
+    """Return the first lobe of the group at a level of a path."""
+    return (path.node[level] * tree.lobes) >> 2 * (tree.top + level)

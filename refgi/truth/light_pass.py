@@ -17,7 +17,7 @@ from refgi.pairs.shadow_rays import RayReceivers
 from refgi.truth.camera_visibility import visible_vertices
 from refgi.truth.light_grid import Density, cell_centres, density_of, footprint, rays_through, stratified_sets
 from refgi.truth.light_side import pick, tiles
-from refgi.truth.light_vertices import PointSets, join, trace_light_vertices, with_areas
+from refgi.truth.light_vertices import PointSets, closest_of, join, light_vertices, with_areas
 from refgi.truth.lobe_light_side import pick_for_lobes
 from refgi.truth.lobe_receivers import subset_of
 from refgi.truth.paths import Shadows
@@ -62,8 +62,8 @@ def trace_vertices(task: Task, squares: list[Array], densities: tuple[Any, ...])
     parts = []
     for k, (light, square, density) in enumerate(zip(task.scene.lights, squares, densities, strict=True)):
         rays = rays_through(light, task.scene.geometry, square.reshape(-1, 2), per_set, density)
-        part = trace_light_vertices(task.tracer, task.surfaces, task.lights, k, rays, settings.shared_bound,
-                                    lobes=task.lobes is not None)
+        part = light_vertices(task.surfaces, task.lights, k, rays, closest_of(task.tracer, rays), settings.shared_bound,
+                              lobes=task.lobes is not None)
         if task.lobes is not None:
             part = with_areas(part, light, footprint(light, task.scene.geometry, settings.light_grid)[0])
         parts.append(part if task.view is None else visible_vertices(task.tracer, task.view, part))

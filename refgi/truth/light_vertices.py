@@ -49,14 +49,8 @@ class PointSets(NamedTuple):
     starts: Array  # (sets, 2) int64, in blocks: first one, one past the last
 
 
-def trace_light_vertices(tracer: Tracer, surfaces: Surfaces, lights: LightTable, k: int, rays: LightRays,
-                         bound: float, *, lobes: bool) -> LightVertices:
-    """Trace one light's rays to light vertices.
-
-    `surfaces`: the scene's triangles and materials. `bound`: largest geometry term in units of 1 / footprint; inf for
-    no bound. Result: diffuse parts, then `lobes` if the scene has any, each in the order of the rays; power 0 where a
-    ray finds nothing that reflects.
-    """
+def closest_of(tracer: Tracer, rays: LightRays) -> tuple[Array, Array]:
+    """Return what each ray of a light finds: triangle (n,) int32, and distance from the lamp (n,) float32, m."""
     # a lamp may lie in a surface: start just beyond it
     beyond = tracer.offsets(rays.origins)
     origins = (rays.origins + beyond[:, None] * rays.directions).astype(np.float32)
@@ -65,12 +59,24 @@ def trace_light_vertices(tracer: Tracer, surfaces: Surfaces, lights: LightTable,
     triangle_id, distance = np.empty(count, np.int32), np.empty(count, np.float32)
     tracer.fill_closest(origins, directions, np.full(count, np.inf, np.float32), triangle_id, distance)
     distance += beyond.astype(np.float32)
+    return triangle_id, distance
+
+
+def light_vertices(surfaces: Surfaces, lights: LightTable, k: int, rays: LightRays, hits: tuple[Array, Array],
+                   bound: float, *, lobes: bool) -> LightVertices:
+    """Make light vertices of what one light's rays found.
+
+    `surfaces`: the scene's triangles and materials. `hits`: of `closest_of`. `bound`: largest geometry term in units of
+    1 / footprint; inf for no bound. Result: diffuse parts, then `lobes` if the scene has any, each in the order of the
+    rays; power 0 where a ray finds nothing that reflects.
+    """
+    count = len(hits[0])
     kinds = 2 if lobes and surfaces.specular.any() else 1
     points = _allocate(kinds * count)
     points.ray[:] = np.tile(np.arange(k * count, (k + 1) * count), kinds)
     points.lobe[count:] = True
-    _fill_vertices(surfaces, lights, k, (rays.origins, rays.directions, triangle_id, distance, rays.weight),
-          (rays.measure, bound), points)
+    _fill_vertices(surfaces, lights, k, (rays.origins, rays.directions, *hits, rays.weight), (rays.measure, bound),
+                   points)
     return points
 
 

@@ -58,7 +58,7 @@ def _expected(cell: Any, x: Any, n: Any) -> Any:
     cosine = cosine if cosine < one else one
     cosine = cosine if (cosine > zero) & (above > zero) else zero
     gap = one + (ax * dx + ay * dy + az * dz) * inverse
-    width = spread + size / square
+    width = spread + (size / square if size < square else one)
     fall = one / (one + quarter * (gap if gap > zero else zero) / width)
     fall *= fall
     return flux * cosine * (fall * fall) / (width * (square if square > size else size))

@@ -30,6 +30,7 @@ SPLIT = 0.5  # half-angle of what a cell sends apart, in widths of its lobe, abo
 FINE = 0.02  # rad: a flat cell is small enough at that, however sharp its lobe
 EDGE = 0.7  # rad: normals of neighbouring cells that differ by more belong to two faces
 HALF_DIAGONAL = 0.75  # of a cell, in square roots of its measure
+EDGE_LEVELS = 4  # how often cells that hold an edge are halved on its account
 GRAZING = 0.05  # cosine below which a cell's footprint grows no more
 
 
@@ -97,7 +98,8 @@ def _grown(source: _Source, k: int) -> list[_Level]:
         if level < base:
             lobe, split = Lobe.dark(len(corner)), np.ones(len(corner), np.bool_)
         else:
-            lobe, excess = _sampled(source, k, corner)
+            lobe, excess, edge = _sampled(source, k, corner)
+            excess = np.where(edge & (level < base + EDGE_LEVELS), np.maximum(excess, 2), excess)
             wanted = np.flatnonzero((lobe.power > 0) & (excess > 1)) if level < DEEPEST else np.zeros(0, np.int64)
             best = wanted[np.argsort(-lobe.power[wanted] * excess[wanted], kind="stable")][: max(0, left) // 4]
             split = np.zeros(len(corner), np.bool_)
@@ -112,7 +114,7 @@ def _grown(source: _Source, k: int) -> list[_Level]:
     return levels
 
 
-def _sampled(source: _Source, k: int, corner: Array) -> tuple[Lobe, Array]:
+def _sampled(source: _Source, k: int, corner: Array) -> tuple[Lobe, Array, Array]:
     """Trace a ray through the middle of each cell; return what it finds, and by how much that calls for smaller ones."""
     light, m = source.scene.lights[k], len(corner)
     rays = rays_through(light, source.scene.geometry, (corner[:, :2] + 0.5) / 2.0 ** corner[:, 2:], 1)
@@ -132,7 +134,19 @@ def _sampled(source: _Source, k: int, corner: Array) -> tuple[Lobe, Array]:
     lobe = Lobe(position, radius, axis, angle + 2 * bend, width, points.power[m:] * share, facing, np.minimum(bend, 1),
                 1e-6 * radius, normal, bend, radius * np.sin(_apart(facing, normal)), _heights(light, position, normal),
                 np.full(m, k, np.float64))
-    return lobe, excess
+    return lobe, excess, _on_edge(position, facing, points.power[m:] > 0)
+
+
+def _on_edge(position: Array, facing: Array, found: Array) -> Array:
+    """Return which cells are of four that do not lie on one face, (m,) bool."""
+    if len(found) % 4:
+        return np.zeros(len(found), np.bool_)
+    place, normal, lit = position.reshape(-1, 4, 3), facing.reshape(-1, 4, 3), found.reshape(-1, 4)
+    apart = place[:, :, None] - place[:, None]
+    off = np.abs((apart * normal[:, :, None]).sum(axis=3)) > 0.5 * np.linalg.norm(apart, axis=3)
+    off |= (_apart(normal[:, :, None], normal[:, None]) > EDGE) & lit[:, :, None] & lit[:, None]
+    mixed = (off & lit[:, :, None] & lit[:, None]).any(axis=(1, 2)) | (lit.any(axis=1) & ~lit.all(axis=1))
+    return np.repeat(mixed, 4)
 
 
 def _bend(surfaces: Surfaces, triangle: Array, radius: Array) -> Array:

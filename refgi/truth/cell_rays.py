@@ -30,7 +30,7 @@ from refgi.radiometry import DIRECTIONAL, incident_light, radiant_intensity
 from refgi.rays import MISS, far_offset, ray_offset
 from refgi.sampling import hash_bits
 from refgi.scene import LightTable
-from refgi.truth.cell_walk import CHUNK, Found, Path, column, fill_tops, first_rank, found_at, found_in, go_down, next_top, node_of
+from refgi.truth.cell_walk import CHUNK, Found, Path, column, fill_tops, found_at, found_in, go_down, next_top
 from refgi.truth.light_square import ray_through
 from refgi.truth.lobe_cells import LobeCells
 from refgi.truth.next_event import aim_at_light, toward_light
@@ -41,6 +41,7 @@ from refgi.truth.surfaces import (
 
 Array = npt.NDArray[Any]
 
+DEEPEST_GROUP = 128  # levels of the tree that a way down may have
 EVEN = 1 / 16  # e: share of the rays of b that are even over the lights' directions
 
 
@@ -142,8 +143,7 @@ def pick_cells(beside: Beside, span: tuple[int, int], sampling: tuple[int, float
 def _pick_chunk(beside: Beside, first: int, part: tuple[int, int], sampling: tuple[int, float, bool],
                 picks: Picks) -> None:
     cells, tree, receivers = beside.cells, beside.cells.tree, beside.receivers
-    last = tree.deepest - tree.top
-    path = Path(np.empty(last + 1, np.int64), np.empty(last + 1), np.empty((last + 1, 4)), np.empty((last + 1, 5)))
+    path = Path(np.empty(DEEPEST_GROUP, np.int64), *(np.empty(DEEPEST_GROUP), np.empty(DEEPEST_GROUP), np.empty(DEEPEST_GROUP)))
     found = np.empty(tree.columns.shape[1], np.float32)
     seed, grain, mirrors = sampling
     count = beside.counts.mirrors if mirrors else beside.counts.cells
@@ -161,11 +161,11 @@ def _pick_chunk(beside: Beside, first: int, part: tuple[int, int], sampling: tup
             elif total > 0:
                 place = (place - even) / (1 - even) * total
                 top, level = next_top(tree, found, total, place, top, level, path)
-                while level < last and path.chance[level] > 0 and not (
-                        mirrors and tree.mirror[node_of(tree, level, path), 7] > 0):
-                    level = go_down(tree, x, n, level, place, total, path)
+                while tree.child[path.node[level]] >= 0 and path.chance[level] > 0 and not (
+                        mirrors and tree.mirror[path.node[level], 7] > 0):
+                    level = go_down(tree, x, n, level, place, path)
                 if path.chance[level] > 0 and mirrors:
-                    _send_to_image(beside, level, path, first + i, (u, v), ray, picks)
+                    _send_to_image(beside, path.node[level], first + i, (u, v), ray, picks)
                 elif path.chance[level] > 0:
                     _send_into(cells, path, level, (u, v, grain), beside.counts, ray, picks)
 
@@ -176,9 +176,9 @@ def _send_into(cells: LobeCells, path: Path, level: int, place: tuple[float, flo
     """Write the ray of b through a place of the cell at the end of a path."""
     tree, mirror, chance = cells.tree, -1, 0.0
     for above in range(level + 1):
-        if mirror < 0 and tree.mirror[node_of(tree, above, path), 7] > 0:
-            mirror, chance = node_of(tree, above, path), path.chance[above]
-    rank = first_rank(tree, level, path)
+        if mirror < 0 and tree.mirror[path.node[above], 7] > 0:
+            mirror, chance = path.node[above], path.chance[above]
+    rank = tree.lobe[path.node[level]]
     cell = np.int64(cells.node[rank])
     side = 2.0 ** -cells.corner[cell, 2]
     a, b = (cells.corner[cell, 0] + place[0]) * side, (cells.corner[cell, 1] + place[1]) * side
@@ -199,11 +199,10 @@ def _send(cells: LobeCells, k: int, found: Found, place: tuple[float, float, flo
 
 
 @kernel
-def _send_to_image(beside: Beside, level: int, path: Path, r: int, place: tuple[float, float], ray: int,
-                   picks: Picks) -> None:
-    """Write the direction of c around the image of a light in the mirror at the end of a path."""
+def _send_to_image(beside: Beside, mirror: int, r: int, place: tuple[float, float], ray: int, picks: Picks) -> None:
+    """Write the direction of c around the image of a light in a mirror."""
     receivers, paths, cells = beside.receivers, picks.paths, beside.cells
-    mirror, k = node_of(cells.tree, level, path), cells.light[first_rank(cells.tree, level, path)]
+    k = cells.light[cells.tree.lobe[mirror]]
     u, sharpness = image_of(cells, k, mirror, point_of(receivers.position, r))
     if sharpness == 0 or cells.tree.mirror[mirror, 7] == 0:
         return

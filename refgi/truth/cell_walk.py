@@ -22,12 +22,12 @@ LEAST = np.float32(1e-30)  # m^2, against 0 / 0
 
 
 class Path(NamedTuple):
-    """The way down to a pick, level by level from the top one."""
+    """The way down to a pick, level by level from a top group."""
 
-    node: Array  # (levels,) int64: place within its level
+    node: Array  # (levels,) int64
     chance: Array
-    share: Array  # (levels, 4) of each child
-    edge: Array  # (levels, 5): where each child begins and ends among places; the last below 0 until they are known
+    low: Array  # where the group's places begin
+    high: Array
 
 
 class Found(NamedTuple):
@@ -72,12 +72,6 @@ def _of_node(tree: LobeTree, node: int, x: Any, n: Any) -> Any:
 
 
 @kernel
-def _first_of(tree: LobeTree, level: int) -> int:
-    """Return the first node of a level: (4^level - 4^top) / 3 lie above it."""
-    return ((1 << 2 * level) - (1 << 2 * tree.top)) // 3
-
-
-@kernel
 def column(rows: Array, i: int) -> tuple[Any, Any, Any]:
     """Return column i of (3, n)."""
     return rows[0, i], rows[1, i], rows[2, i]
@@ -119,67 +113,46 @@ def found_in(cells: LobeCells, k: int, a: float, b: float, x: Any, n: Any, total
     while cells.child[cell] >= 0:
         i, j = int(2 * a), int(2 * b)
         cell, a, b = np.int64(cells.child[cell] + 2 * i + j), 2 * a - i, 2 * b - j
-    rank, mirror, mirror_chance = np.int64(cells.rank[cell]), -1, 0.0
+    rank, mirror, chance, mirror_chance = cells.rank[cell], np.int64(-1), 1.0, 1.0
     if rank < 0 or total <= 0:
-        return Found(cell, 0.0, -1, 0.0)
-    last = ((rank + 1) * (1 << 2 * tree.deepest) - 1) // tree.lobes  # its group in the last level
-    node = last >> 2 * (tree.deepest - tree.top)
-    chance = _of_node(tree, node, x, n) / total
-    for level in range(tree.top, tree.deepest + 1):
-        if mirror < 0 and tree.mirror[node, 7] > 0:
-            mirror, mirror_chance = node, chance
-        if level == tree.deepest or chance <= 0:
-            break
-        place = last >> 2 * (tree.deepest - level - 1)
-        first, whole = _first_of(tree, level + 1) + (place & ~3), 0.0
-        node = first + (place & 3)
-        for sibling in range(4):
-            whole += _of_node(tree, first + sibling, x, n)
-        chance = chance * (_of_node(tree, node, x, n) / whole) if whole > 0 else 0.0
-    return Found(cell, chance, mirror, mirror_chance)
+        return Found(cell, 0.0, mirror, 0.0)
+    node = np.int64(tree.single[rank])
+    while True:  # upwards: a product of shares
+        if tree.mirror[node, 7] > 0:
+            mirror, mirror_chance = node, 1.0
+        above, own = np.int64(tree.parent[node]), _of_node(tree, node, x, n)
+        if own <= 0:
+            return Found(cell, 0.0, mirror, 0.0)
+        whole = total if above < 0 else own + np.float64(_of_node(tree, 2 * np.int64(tree.child[above]) + 1 - node, x, n))
+        chance, mirror_chance = chance * own / whole, mirror_chance * own / whole
+        if above < 0:
+            return Found(cell, chance, mirror, mirror_chance if mirror >= 0 else 0.0)
+        node = above
 
 
 @kernel
 def next_top(tree: LobeTree, found: Array, total: float, place: float, top: int, level: int,
              path: Path) -> tuple[int, int]:
     """Go on to the top group that holds a place; return it and the level that the way down goes on from."""
-    while top < 0 or (place >= path.edge[0, 0] + found[top] and top < len(found) - 1):
-        path.edge[0, 0] = path.edge[0, 0] + found[top] if top >= 0 else 0.0
+    while top < 0 or (place >= path.high[0] and top < len(found) - 1):
+        path.low[0] = path.high[0] if top >= 0 else 0.0
         top, level = top + 1, 0
-        path.node[0], path.chance[0], path.edge[0, 4] = top, found[top] / total, -1.0
-    while level > 0 and place >= path.edge[level - 1, (path.node[level] & 3) + 1]:
+        path.node[0], path.chance[0], path.high[0] = tree.top[top], found[top] / total, path.low[0] + found[top]
+    while level > 0 and place >= path.high[level]:
         level -= 1
     return top, level
 
 
 @kernel
-def go_down(tree: LobeTree, x: Any, n: Any, level: int, place: float, total: float, path: Path) -> int:
+def go_down(tree: LobeTree, x: Any, n: Any, level: int, place: float, path: Path) -> int:
     """Go on to the child that holds a place; return its level."""
-    if path.edge[level, 4] < 0:
-        first, whole = _first_of(tree, tree.top + level + 1) + 4 * path.node[level], 0.0
-        for c in range(4):
-            path.share[level, c] = _of_node(tree, first + c, x, n)
-            whole += path.share[level, c]
-        for c in range(4):
-            path.share[level, c] = path.share[level, c] / whole if whole > 0 else 0.0
-            path.edge[level, c + 1] = path.edge[level, c] + total * path.chance[level] * path.share[level, c]
-    c = 0
-    while c < 3 and place >= path.edge[level, c + 1]:
-        c += 1
-    while c > 0 and path.share[level, c] <= 0:
-        c -= 1  # rounding at the end: the last that may be picked
-    path.node[level + 1], path.edge[level + 1, 4] = 4 * path.node[level] + c, -1.0
-    path.chance[level + 1], path.edge[level + 1, 0] = path.chance[level] * path.share[level, c], path.edge[level, c]
+    first = np.int64(tree.child[path.node[level]])
+    one, two = np.float64(_of_node(tree, first, x, n)), np.float64(_of_node(tree, first + 1, x, n))
+    share = one / (one + two) if one + two > 0 else -1.0
+    middle = path.low[level] + share * (path.high[level] - path.low[level])
+    second = share < 1 and (place >= middle or share <= 0)
+    path.node[level + 1] = first + 1 if second else first
+    path.chance[level + 1] = path.chance[level] * (0.0 if share < 0 else 1 - share if second else share)
+    path.low[level + 1] = middle if second else path.low[level]
+    path.high[level + 1] = path.high[level] if second else middle
     return level + 1
-
-
-@kernel
-def node_of(tree: LobeTree, level: int, path: Path) -> int:
-    """Return the number among all groups of the one at a level of a path."""
-    return _first_of(tree, tree.top + level) + path.node[level]
-
-
-@kernel
-def first_rank(tree: LobeTree, level: int, path: Path) -> int:
-    """Return the first lobe of the group at a level of a path."""
-    return (path.node[level] * tree.lobes) >> 2 * (tree.top + level)

@@ -29,6 +29,7 @@ DEEPEST = 20  # level of the smallest cell: halved so often
 SPLIT = 0.5  # half-angle of what a cell sends apart, in widths of its lobe, above which it is split
 FINE = 0.02  # rad: a flat cell is small enough at that, however sharp its lobe
 EDGE = 0.7  # rad: normals of neighbouring cells that differ by more belong to two faces
+PLACES = np.array([[0.5, 0.5], [0.01, 0.01], [0.01, 0.99], [0.99, 0.01], [0.99, 0.99]])  # in a cell: its rays
 HALF_DIAGONAL = 0.75  # of a cell, in square roots of its measure
 EDGE_LEVELS = 4  # how often cells that hold an edge are halved on its account
 GRAZING = 0.05  # cosine below which a cell's footprint grows no more
@@ -100,8 +101,9 @@ def _grown(source: _Source, k: int) -> list[_Level]:
         else:
             lobe, excess, edge = _sampled(source, k, corner)
             excess = np.where(edge & (level < base + EDGE_LEVELS), np.maximum(excess, 2), excess)
-            wanted = np.flatnonzero((lobe.power > 0) & (excess > 1)) if level < DEEPEST else np.zeros(0, np.int64)
-            best = wanted[np.argsort(-lobe.power[wanted] * excess[wanted], kind="stable")][: max(0, left) // 4]
+            wanted = np.flatnonzero(excess > 1) if level < DEEPEST else np.zeros(0, np.int64)
+            worth = np.maximum(lobe.power, lobe.power.mean() * edge) * excess
+            best = wanted[np.argsort(-worth[wanted], kind="stable")][: max(0, left) // 4]
             split = np.zeros(len(corner), np.bool_)
             split[best] = True
             left -= 4 * len(best)
@@ -115,38 +117,42 @@ def _grown(source: _Source, k: int) -> list[_Level]:
 
 
 def _sampled(source: _Source, k: int, corner: Array) -> tuple[Lobe, Array, Array]:
-    """Trace a ray through the middle of each cell; return what it finds, and by how much that calls for smaller ones."""
+    """Trace rays through the middle and near the corners of each cell.
+
+    Returns what its middle finds, by how much that calls for smaller cells, and (m,) bool whether an edge crosses it.
+    """
     light, m = source.scene.lights[k], len(corner)
-    rays = rays_through(light, source.scene.geometry, (corner[:, :2] + 0.5) / 2.0 ** corner[:, 2:], 1)
+    square = ((corner[:, None, :2] + PLACES) / 2.0 ** corner[:, None, 2:]).transpose(1, 0, 2).reshape(-1, 2)
+    rays = rays_through(light, source.scene.geometry, square, 1)
     triangle, distance = closest_of(source.tracer, rays)
     points = light_vertices(source.surfaces, source.lights, k, rays, (triangle, distance), np.inf, lobes=True)
-    position, axis, facing, normal = (field[:, m:].T.astype(np.float64) for field in
+    position, axis, facing, normal = (field[:, 5 * m :].T.reshape(5, m, 3).astype(np.float64) for field in
                                       (points.position, points.axis, points.facing, points.normal))
+    power = points.power[5 * m :].reshape(5, m)
     share = 0.25 ** corner[:, 2]
     angle = HALF_DIAGONAL * np.sqrt(rays.measure * share)  # m for a directional light
-    width = 1 / (points.exponent[m:].astype(np.float64) + 1)
-    cosine = np.maximum(-(facing * rays.directions).sum(axis=1), GRAZING)
+    width = 1 / (points.exponent[5 * m : 6 * m].astype(np.float64) + 1)
+    cosine = np.maximum(-(facing[0] * rays.directions[:m]).sum(axis=1), GRAZING)
     parallel = isinstance(light, DirectionalLight)
-    radius = angle / cosine if parallel else angle * np.maximum(distance, 0) / cosine
-    bend = np.maximum(_bend(source.surfaces, triangle, radius), _bend_between(normal, points.power[m:] > 0))
+    radius = angle / cosine if parallel else angle * np.maximum(distance[:m], 0) / cosine
+    edge = _on_edge(position, facing, power > 0)
+    turn = _apart(normal[0], normal[1:])
+    bend = np.maximum(_bend(source.surfaces, triangle[:m], radius),
+                      np.where((power[1:] > 0) & (turn < EDGE), turn, 0).max(axis=0))
     angle = np.zeros(m) if parallel else angle
     excess = np.maximum(2 * bend, np.where(angle > FINE, angle, 0)) / (SPLIT * np.sqrt(width))
-    lobe = Lobe(position, radius, axis, angle + 2 * bend, width, points.power[m:] * share, facing, np.minimum(bend, 1),
-                1e-6 * radius, normal, bend, radius * np.sin(_apart(facing, normal)), _heights(light, position, normal),
-                np.full(m, k, np.float64))
-    return lobe, excess, _on_edge(position, facing, points.power[m:] > 0)
+    lobe = Lobe(position[0], radius, axis[0], angle + 2 * bend, width, power[0] * share, facing[0],
+                np.minimum(bend, 1), 1e-6 * radius, normal[0], bend, radius * np.sin(_apart(facing[0], normal[0])),
+                _heights(light, position[0], normal[0]), np.full(m, k, np.float64))
+    return lobe, excess, edge
 
 
 def _on_edge(position: Array, facing: Array, found: Array) -> Array:
-    """Return which cells are of four that do not lie on one face, (m,) bool."""
-    if len(found) % 4:
-        return np.zeros(len(found), np.bool_)
-    place, normal, lit = position.reshape(-1, 4, 3), facing.reshape(-1, 4, 3), found.reshape(-1, 4)
-    apart = place[:, :, None] - place[:, None]
-    off = np.abs((apart * normal[:, :, None]).sum(axis=3)) > 0.5 * np.linalg.norm(apart, axis=3)
-    off |= (_apart(normal[:, :, None], normal[:, None]) > EDGE) & lit[:, :, None] & lit[:, None]
-    mixed = (off & lit[:, :, None] & lit[:, None]).any(axis=(1, 2)) | (lit.any(axis=1) & ~lit.all(axis=1))
-    return np.repeat(mixed, 4)
+    """Return which cells do not lie on one face: their corners (1 to 4) off the plane of their middle (0), or dark."""
+    apart = position[1:] - position[0]
+    off = np.abs((apart * facing[0]).sum(axis=2)) > 0.5 * np.linalg.norm(apart, axis=2)
+    off |= _apart(facing[0], facing[1:]) > EDGE
+    return np.asarray(((found[0] & off) | (found[1:] != found[0])).any(axis=0))
 
 
 def _bend(surfaces: Surfaces, triangle: Array, radius: Array) -> Array:
@@ -159,16 +165,6 @@ def _bend(surfaces: Surfaces, triangle: Array, radius: Array) -> Array:
     sides = np.maximum(np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2), 1e-30)
     turn = 2 * np.arcsin(np.minimum(0.5 * np.linalg.norm(n - np.roll(n, 1, axis=1), axis=2), 1))
     return np.minimum((turn / sides).max(axis=1) * radius, np.pi / 2)
-
-
-def _bend_between(normal: Array, found: Array) -> Array:
-    """Return half the largest angle between normals of four neighbours, those beyond an edge left out."""
-    if len(normal) % 4:
-        return np.zeros(len(normal))
-    four, lit = normal.reshape(-1, 4, 3), found.reshape(-1, 4)
-    angle = _apart(four[:, :, None], four[:, None])
-    angle = np.where(lit[:, :, None] & lit[:, None] & (angle < EDGE), angle, 0)
-    return 0.5 * angle.max(axis=2).ravel()
 
 
 def _apart(one: Array, other: Array) -> Array:

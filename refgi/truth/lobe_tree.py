@@ -1,9 +1,10 @@
-"""A tree of groups of four over lobes of senders: each group a ball of places and cones of axes and normals.
+"""A binary tree of groups over lobes of senders: each group a ball of places and cones of axes and normals.
 
-Lobes are sorted like a kd-tree, by the coordinate of place or axis in which they are furthest apart, into halves of
-halves: group j of level l holds the lobes of ranks j n / 4^l to (j + 1) n / 4^l, its children are 4j to 4j + 3.
+Groups are split in the middle of the coordinate in which they are furthest apart: place, axis, face normal or light. So
+faces part early, and what differs little stays together.
 """
 
+import heapq
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy.typing as npt
 
 Array = npt.NDArray[Any]
 
-TOP_LEVEL = 5  # 1024 groups: what a receiver looks at before it goes into one
+TOPS = 1024  # groups that a receiver looks at before it goes into one
+HALVED = 40  # level from which groups are split by number: lobes of one place and axis
 FLAT = 0.5  # blur of a mirror's image of the light, in widths of its lobes, below which it counts as plane
 ROWS = 14
 
@@ -42,92 +44,123 @@ class Lobe(NamedTuple):
 
 
 class LobeTree(NamedTuple):
-    """The groups of all levels from the top one down, level by level; the last level's have one lobe or none."""
+    """The groups; node 0 is all."""
 
-    lobes: int
-    top: int  # level of the first groups
-    deepest: int
+    child: Array  # (n,) int32: first of two; -1: one lobe
+    parent: Array  # (n,) int32; -1 for top groups and those above
+    lobe: Array  # (n,) int32: rank of its first lobe
+    single: Array  # (m,) int32: the node of each lobe, by rank
     row: Array  # (n, ROWS) float32: position, radius, axis, w^2 + spread^2, power, face normal, thickness, sine of tilt
-    columns: Array  # (ROWS, t) float32: of the top level alone, for SIMD lanes
+    top: Array  # (t,) int32: groups that hold every lobe once, each small enough to be told from the others
+    columns: Array  # (ROWS, t) float32: of those, for SIMD lanes
     mirror: Array  # (n, 8) float64: a point and the normal of the plane that mirrors the light, exponent + 1 of what is
     #                sent by that, 1 where that may be used
 
 
+class _Groups(NamedTuple):
+    """Groups of one level."""
+
+    start: Array  # (g,) int64: first lobe in the order
+    size: Array  # (g,)
+
+
 def tree_of(lobes: Lobe) -> tuple[Array, LobeTree]:
-    """Return the order (m,) of lobes, and their tree."""
-    count = len(lobes.power)
-    deepest = 0
-    while 4**deepest < count:
-        deepest += 1
-    order = _sorted(lobes, 2 * deepest)
-    top = min(TOP_LEVEL, deepest)
-    levels = [_spaced(Lobe(*(field[order] for field in lobes)), 4**deepest)]
-    while len(levels[0].power) > 4**top:
-        levels.insert(0, _groups(levels[0]))
-    whole = Lobe(*(np.concatenate(fields) for fields in zip(*levels, strict=True)))
+    """Return the order (m,) of lobes, and their tree; of at least one lobe."""
+    order, levels = _split(lobes)
+    ordered = Lobe(*(field[order] for field in lobes))
+    starts = np.cumsum([0] + [len(level.size) for level in levels])
+    whole = Lobe.dark(int(starts[-1]))
+    child, parent = np.full(len(whole.power), -1, np.int32), np.full(len(whole.power), -1, np.int32)
+    single = np.zeros(len(order), np.int32)
+    for level in range(len(levels) - 1, -1, -1):
+        groups, nodes = levels[level], np.arange(starts[level], starts[level + 1])
+        one = groups.size == 1
+        _put(whole, nodes[one], Lobe(*(field[groups.start[one]] for field in ordered)))
+        single[groups.start[one]] = nodes[one]
+        if not one.all():
+            below = starts[level + 1] + 2 * np.arange((~one).sum())
+            child[nodes[~one]], parent[below], parent[below + 1] = below, nodes[~one], nodes[~one]
+            _put(whole, nodes[~one], _pairs(Lobe(*(field[below[0] : below[-1] + 2] for field in whole))))
     spread, tilt = np.minimum(whole.spread, 2) ** 2 + whole.width, np.sin(np.minimum(whole.tilt, 0.5 * np.pi))
     row = np.column_stack([whole.position, whole.radius, whole.axis, spread, whole.power, whole.facing, whole.thick,
                            tilt]).astype(np.float32)
-    single = np.arange(len(spread)) >= len(spread) - 4**deepest
-    return order, LobeTree(count, top, deepest, row, np.ascontiguousarray(row[: 4**top].T), _mirrors(whole, single))
+    first = np.concatenate([level.start for level in levels]).astype(np.int32)
+    top = _tops(child, whole)
+    top = top[np.argsort(first[top])]
+    parent[top] = -1
+    return order, LobeTree(child, parent, first, single, row, top, np.ascontiguousarray(row[top].T),
+                           _mirrors(whole, child < 0))
 
 
-def _sorted(lobes: Lobe, halvings: int) -> Array:
-    """Return the order of the lobes: halved again and again by the coordinate in which they are furthest apart."""
+def _split(lobes: Lobe) -> tuple[Array, list[_Groups]]:
+    """Return the order of the lobes, and the groups of every level: two for each of the last that holds several."""
     count = len(lobes.power)
-    order = np.arange(count)
-    if not count:
-        return order
     extent = max(float(np.ptp(lobes.position, axis=0).max()), 1e-30)
-    place = np.column_stack([lobes.position / extent, lobes.axis])
-    for level in range(halvings):
-        starts = np.arange(2**level + 1) * count // 2**level
-        sizes = np.diff(starts)
-        some = starts[:-1][sizes > 0]
-        sorted_place = place[order]
-        far = np.maximum.reduceat(sorted_place, some) - np.minimum.reduceat(sorted_place, some)
-        segment = np.repeat(np.arange(len(some)), sizes[sizes > 0])
-        order = order[np.lexsort((sorted_place[np.arange(count), far.argmax(axis=1)[segment]], segment))]
-    return order
+    place = np.column_stack([lobes.position / extent, lobes.axis, lobes.facing, 4 * lobes.light])
+    order, levels = np.arange(count), [_Groups(np.zeros(1, np.int64), np.array([count]))]
+    while (levels[-1].size > 1).any():
+        several = levels[-1].size > 1
+        start, size = levels[-1].start[several], levels[-1].size[several]
+        member = np.repeat(start - np.cumsum(size) + size, size) + np.arange(size.sum())
+        group, cuts = np.repeat(np.arange(len(size)), size), np.cumsum(size) - size
+        found = place[order[member]]
+        low, high = np.minimum.reduceat(found, cuts), np.maximum.reduceat(found, cuts)
+        axis = (high - low).argmax(axis=1)
+        each = np.arange(len(size))
+        upper = found[np.arange(len(found)), axis[group]] > (0.5 * (low + high))[each, axis][group]
+        left = size - np.add.reduceat(upper.astype(np.int64), cuts)
+        alike = (left == 0) | (left == size) | (len(levels) >= HALVED)
+        upper = np.where(alike[group], np.arange(len(group)) - cuts[group] >= (size // 2)[group], upper)
+        left = np.where(alike, size // 2, left)
+        order[member] = order[member][np.lexsort((upper, group))]
+        levels.append(_Groups(np.stack([start, start + left], axis=1).ravel(), np.stack([left, size - left], axis=1).ravel()))
+    return order, levels
 
 
-def _spaced(lobes: Lobe, places: int) -> Lobe:
-    """Put lobes where a last level of so many groups has them."""
-    count, found = len(lobes.power), Lobe.dark(places)
-    at = (np.arange(1, count + 1) * places - 1) // max(1, count)
-    for field, filled in zip(lobes, found, strict=True):
-        filled[at] = field
-    found.width[found.power == 0] = 1
-    return found
+def _put(lobes: Lobe, at: Array, found: Lobe) -> None:
+    for field, value in zip(lobes, found, strict=True):
+        field[at] = value
 
 
-def _groups(lobes: Lobe) -> Lobe:
-    """Describe each four by a ball and cones around theirs."""
-    four = Lobe(*(field.reshape(-1, 4, *field.shape[1:]) for field in lobes))
-    total, lit = four.power.sum(axis=1), four.power > 0
-    share = four.power / np.where(total > 0, total, 1)[:, None]
+def _tops(child: Array, lobes: Lobe) -> Array:
+    """Open the group whose power is the most spread out, until there are enough."""
+    extent = max(float(np.ptp(lobes.position[child < 0], axis=0).max()), 1e-30)
+    loose = lobes.power * (np.minimum(lobes.spread, 2) ** 2 + (lobes.radius / extent) ** 2)
+    heap, done = [(-loose[0], 0)], []
+    while heap and len(heap) + len(done) < TOPS:
+        _, node = heapq.heappop(heap)
+        if child[node] < 0:
+            done.append(node)
+            continue
+        for c in (int(child[node]), int(child[node]) + 1):
+            heapq.heappush(heap, (-loose[c], c))
+    return np.array([*done, *(node for _, node in heap)], np.int32)
+
+
+def _pairs(lobes: Lobe) -> Lobe:
+    """Describe each two by a ball and cones around theirs."""
+    two = Lobe(*(field.reshape(-1, 2, *field.shape[1:]) for field in lobes))
+    total = two.power.sum(axis=1)
+    share = two.power / total[:, None]
     position, axis, facing, normal = ((share[..., None] * field).sum(axis=1) for field in
-                                      (four.position, four.axis, four.facing, four.normal))
+                                      (two.position, two.axis, two.facing, two.normal))
     for mean in (axis, facing, normal):
         mean /= np.maximum(np.linalg.norm(mean, axis=1), 1e-30)[:, None]
-    apart = four.position - position[:, None]
-
-    def most(values: Array) -> Array:
-        return np.asarray(np.where(lit, values, 0).max(axis=1))
+    apart = two.position - position[:, None]
 
     def cone(vectors: Array, mean: Array, spread: Array) -> Array:
-        return most(2 * np.arcsin(np.minimum(0.5 * np.linalg.norm(vectors - mean[:, None], axis=2), 1)) + spread)
+        angle = 2 * np.arcsin(np.minimum(0.5 * np.linalg.norm(vectors - mean[:, None], axis=2), 1))
+        return np.asarray((angle + spread).max(axis=1))
 
     def slab(vectors: Array, mean: Array, thick: Array) -> Array:
         lean = np.minimum(1, np.linalg.norm(vectors - mean[:, None], axis=2))
-        return most(np.abs((apart * mean[:, None]).sum(axis=2)) + thick + four.radius * lean)
+        return np.asarray((np.abs((apart * mean[:, None]).sum(axis=2)) + thick + two.radius * lean).max(axis=1))
 
-    first = np.where(lit, four.light, np.inf).min(axis=1)
-    return Lobe(position, most(np.linalg.norm(apart, axis=2) + four.radius), axis, cone(four.axis, axis, four.spread),
-                np.where(total > 0, (share * four.width).sum(axis=1), 1), total,
-                facing, cone(four.facing, facing, four.tilt), slab(four.facing, facing, four.thick),
-                normal, cone(four.normal, normal, four.bend), slab(four.normal, normal, four.offset),
-                np.where(lit, four.height, np.inf).min(axis=1), np.where(first == most(four.light), first, -1))
+    return Lobe(position, (np.linalg.norm(apart, axis=2) + two.radius).max(axis=1), axis, cone(two.axis, axis, two.spread),
+                (share * two.width).sum(axis=1), total, facing, cone(two.facing, facing, two.tilt),
+                slab(two.facing, facing, two.thick), normal, cone(two.normal, normal, two.bend),
+                slab(two.normal, normal, two.offset), two.height.min(axis=1),
+                np.where(two.light[:, 0] == two.light[:, 1], two.light[:, 0], -1))
 
 
 def _mirrors(lobes: Lobe, single: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.truth.camera_visibility import hidden_from_camera
-from refgi.truth.cell_rays import Beside, Picks, connect, pick_cells
+from refgi.truth.cell_rays import Beside, connect, pick_cells, picks_for
 from refgi.truth.cell_walk import fill_totals
 from refgi.truth.lobe_cells import lobe_cells
 from refgi.truth.paths import pass_through, paths_for
@@ -38,7 +38,7 @@ def add_cells(task: Task, words: Array, sums: Array) -> None:
     for count, mirrors in ((counts.cells, False), (counts.mirrors, True)):
         for first, last in spans(task, max(1, count)) if count else []:
             beside, rays = beside_of(task, first), (last - first) * count
-            picks = Picks(paths_for(rays), np.empty(rays, np.int32), np.empty(rays), np.empty(rays, np.int32), np.empty(rays))
+            picks = picks_for(rays)
             sampling, shadows = (int(words[int(mirrors)]), task.tracer.grain, mirrors), shadow_batch(rays)
             pick_cells(beside, (first, last), sampling, picks)
             while True:

@@ -30,11 +30,11 @@ from refgi.radiometry import DIRECTIONAL, incident_light, radiant_intensity
 from refgi.rays import MISS, far_offset, ray_offset
 from refgi.sampling import hash_bits
 from refgi.scene import LightTable
-from refgi.truth.cell_walk import CHUNK, Found, Path, column, fill_tops, found_at, found_in, go_down, next_top
+from refgi.truth.cell_walk import CHUNK, Found, Path, column, fill_tops, found_at, found_in, go_down, next_top, on_face
 from refgi.truth.light_square import ray_through
 from refgi.truth.lobe_cells import LobeCells
 from refgi.truth.next_event import aim_at_light, toward_light
-from refgi.truth.paths import Paths, Shadows, dot, hit_point, row
+from refgi.truth.paths import Paths, Shadows, dot, hit_point, paths_for, row
 from refgi.truth.surfaces import (
     Surfaces, around, face_normal, height_above, lift, lobe_pattern, shading_normal,
 )
@@ -68,9 +68,16 @@ class Picks(NamedTuple):
 
     paths: Paths
     light: Array  # (n,) int32
+    cell: Array  # (n,) int32: of b
     density: Array  # (n,) float64: n_b
     mirror: Array  # (n,) int32
     mirror_chance: Array  # (n,) float64
+
+
+def picks_for(count: int) -> Picks:
+    """Allocate a batch."""
+    light, cell, mirror = (np.empty(count, np.int32) for _ in range(3))
+    return Picks(paths_for(count), light, cell, np.empty(count), mirror, np.empty(count))
 
 
 @kernel
@@ -85,7 +92,7 @@ def rays_beside(beside: Beside, k: int, found: Found, r: int, way: tuple[tuple[f
     """Return (n_a + n_b + n_c) r^2 at a point of cells `found`; `way`: unit vector to it, its cosine, its length."""
     w, cosine, length = way
     image = 0.0
-    if found.mirror >= 0:
+    if found.mirror >= 0 and beside.counts.mirrors > 0:
         image = beside.counts.mirrors * found.mirror_chance * image_density(beside, k, found.mirror, r, w)
     far = even_density(beside.cells, k, found.cell, found.chance, beside.counts.cells)
     return near_density(beside.counts.directions, cosine, image, sender) + far * length * length
@@ -194,6 +201,7 @@ def _send(cells: LobeCells, k: int, found: Found, place: tuple[float, float, flo
     for c in range(3):
         picks.paths.origin[ray, c], picks.paths.direction[ray, c] = o[c] + beyond * d[c], d[c]
     picks.paths.reach[ray], picks.light[ray] = np.inf, k
+    picks.cell[ray] = found.cell
     picks.density[ray] = even_density(cells, k, found.cell, found.chance, counts.cells)
     picks.mirror[ray], picks.mirror_chance[ray] = found.mirror, found.mirror_chance
 
@@ -269,9 +277,13 @@ def _connect_to_receiver(beside: Beside, surfaces: Surfaces, lights: LightTable,
     toward, power = toward_light(lights, k, y), (lights.intensity[k, 0], lights.intensity[k, 1], lights.intensity[k, 2])
     if lights.kind[k] != DIRECTIONAL:
         power = radiant_intensity(lights, k, -toward[0], -toward[1], -toward[2])
-    image = 0.0
-    if picks.mirror[ray] >= 0:
-        image = beside.counts.mirrors * picks.mirror_chance[ray] * image_density(beside, k, picks.mirror[ray], r, w)
+    mirror, chance, image = np.int64(picks.mirror[ray]), picks.mirror_chance[ray], 0.0
+    if beside.counts.mirrors > 0 and not on_face(beside.cells, picks.cell[ray], y, g):
+        found = found_at(beside.cells, k, y, g, column(receivers.position, r), column(receivers.normal, r),
+                         beside.totals[r])
+        mirror, chance = found.mirror, found.mirror_chance
+    if mirror >= 0:
+        image = beside.counts.mirrors * chance * image_density(beside, k, mirror, r, w)
     total = near_density(beside.counts.directions, dot(n, w), image, (-dot(g, w), dot(toward, toward), dot(g, back)))
     total += picks.density[ray] * length * length
     if _fill_lobe(surfaces, triangle, (y, g, back, w), dot(n, w), power, total, shadows, ray):
@@ -296,7 +308,7 @@ def _connect_to_light(beside: Beside, surfaces: Surfaces, lights: LightTable, gr
     lx, ly, lz, far, red, green, blue = incident_light(lights, k, y[0], y[1], y[2])
     if dot(g, back) <= 0 or max(red, green, blue) <= 0:
         return
-    found = found_at(beside.cells, k, y, column(receivers.position, r), column(receivers.normal, r), beside.totals[r])
+    found = found_at(beside.cells, k, y, g, column(receivers.position, r), column(receivers.normal, r), beside.totals[r])
     if found.mirror != picks.mirror[ray]:
         return
     w, square = (-back[0], -back[1], -back[2]), dot(toward, toward)

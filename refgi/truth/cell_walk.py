@@ -18,6 +18,8 @@ from refgi.truth.lobe_tree import LobeTree
 Array = npt.NDArray[Any]
 
 CHUNK = 64  # receivers that one parallel iteration owns
+ROUND = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)], np.float64)  # neighbours
+SAME_FACE, OFF_FACE = 0.9, 0.04  # cosine of normals, and square of the sine off the plane, of points of one face
 LEAST = np.float32(1e-30)  # m^2, against 0 / 0
 
 
@@ -100,31 +102,73 @@ def fill_totals(cells: LobeCells, receivers: RayReceivers, totals: Array) -> Non
 
 
 @kernel
-def found_at(cells: LobeCells, k: int, y: tuple[float, float, float], x: Any, n: Any, total: float) -> Found:
-    """Return the cells that hold a point y that light k reaches, for a receiver; `total` of `fill_tops`."""
+def found_at(cells: LobeCells, k: int, y: tuple[float, float, float], g: tuple[float, float, float], x: Any, n: Any,
+             total: float) -> Found:
+    """Return the cells that hold a point y of face normal g that light k reaches, for a receiver at x with normal n.
+
+    `total`: of `fill_tops`. Where an edge crosses the cell and its ray found another face, the mirror is that of the
+    first neighbour on y's face.
+    """
     a, b = place_of(cells.squares, k, y)
-    return found_in(cells, k, a, b, x, n, total) if a >= 0 else Found(np.int64(k), 0.0, -1, 0.0)
+    if a < 0:
+        return Found(np.int64(k), 0.0, np.int64(-1), 0.0)
+    cell = cell_at(cells, k, a, b)
+    own = _found_up(cells, cell, x, n, total)
+    if on_face(cells, cell, y, g):
+        return own
+    side = 2.0 ** -cells.corner[cell, 2]
+    for i in range(8):
+        da, db = a + side * ROUND[i, 0], b + side * ROUND[i, 1]
+        if 0 <= da < 1 and 0 <= db < 1:
+            other = cell_at(cells, k, da, db)
+            if on_face(cells, other, y, g):
+                found = _found_up(cells, other, x, n, total)
+                return Found(cell, own.chance, found.mirror, found.mirror_chance)
+    return Found(cell, own.chance, np.int64(-1), 0.0)
 
 
 @kernel
 def found_in(cells: LobeCells, k: int, a: float, b: float, x: Any, n: Any, total: float) -> Found:
     """Return the cells that hold a place of light k's square, for a receiver at x with normal n."""
-    cell, tree = np.int64(k), cells.tree
+    return _found_up(cells, cell_at(cells, k, a, b), x, n, total)
+
+
+@kernel
+def cell_at(cells: LobeCells, k: int, a: float, b: float) -> int:
+    """Return the cell of light k that holds a place of its square."""
+    cell = np.int64(k)
     while cells.child[cell] >= 0:
         i, j = int(2 * a), int(2 * b)
         cell, a, b = np.int64(cells.child[cell] + 2 * i + j), 2 * a - i, 2 * b - j
-    rank, mirror, chance, mirror_chance = cells.rank[cell], np.int64(-1), 1.0, 1.0
+    return cell
+
+
+@kernel
+def on_face(cells: LobeCells, cell: int, y: tuple[float, float, float], g: tuple[float, float, float]) -> bool:
+    """Return whether a cell's lobe lies on about the same face as a point y with face normal g."""
+    if cells.rank[cell] < 0:
+        return False
+    r, node = cells.tree.row, cells.tree.single[cells.rank[cell]]
+    d = (y[0] - r[node, 0], y[1] - r[node, 1], y[2] - r[node, 2])
+    off = r[node, 9] * d[0] + r[node, 10] * d[1] + r[node, 11] * d[2]
+    alike = r[node, 9] * g[0] + r[node, 10] * g[1] + r[node, 11] * g[2]
+    return alike > SAME_FACE and off * off <= OFF_FACE * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+
+
+@kernel
+def _found_up(cells: LobeCells, cell: int, x: Any, n: Any, total: float) -> Found:
+    """Return a cell's chance, the product of its groups' shares on the way up, and its mirror's."""
+    rank, mirror, chance, mirror_chance, tree = cells.rank[cell], np.int64(-1), 1.0, 1.0, cells.tree
     if rank < 0 or total <= 0:
         return Found(cell, 0.0, mirror, 0.0)
     node = np.int64(tree.single[rank])
-    while True:  # upwards: a product of shares
+    while True:
         if tree.mirror[node, 7] > 0:
             mirror, mirror_chance = node, 1.0
-        above, own = np.int64(tree.parent[node]), _of_node(tree, node, x, n)
-        if own <= 0:
-            return Found(cell, 0.0, mirror, 0.0)
-        whole = total if above < 0 else own + np.float64(_of_node(tree, 2 * np.int64(tree.child[above]) + 1 - node, x, n))
-        chance, mirror_chance = chance * own / whole, mirror_chance * own / whole
+        above, own = np.int64(tree.parent[node]), np.float64(_of_node(tree, node, x, n))
+        whole = total if above < 0 else own + _of_node(tree, 2 * np.int64(tree.child[above]) + 1 - node, x, n)
+        share = own / whole if own > 0 else 0.0
+        chance, mirror_chance = chance * share, mirror_chance * share
         if above < 0:
             return Found(cell, chance, mirror, mirror_chance if mirror >= 0 else 0.0)
         node = above

@@ -161,7 +161,7 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         if has_lobe:
             lobe = lobe_pattern(surfaces, material, n, light, w)
             if beside is not None:
-                lobe *= _share_beside(beside, k, y, paths, ray, (
+                lobe *= _share_beside(beside, k, (y, g), paths, ray, (
                     dot(g, w), 1.0 if directional else dot(toward, toward), dot(g, light)))
         most = 0.0
         for c in range(3):
@@ -173,12 +173,12 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
 
 
 @kernel
-def _share_beside(beside: Beside, k: int, y: tuple[float, float, float], paths: Paths, ray: int,
+def _share_beside(beside: Beside, k: int, hit: Any, paths: Paths, ray: int,
                   sender: tuple[float, float, float]) -> float:
-    """Return the share of directions, n_a / (n_a + n_b + n_c), in the lobe that one of them found."""
+    """Return the share of directions, n_a / (n_a + n_b + n_c), in the lobe at a point and face normal that one hit."""
     r = beside.first + ray // beside.counts.directions
     w, cosine = row(paths.direction, ray), np.float64(paths.cosine[ray])
-    found = found_at(beside.cells, k, y, column(beside.receivers.position, r), column(beside.receivers.normal, r),
+    found = found_at(beside.cells, k, *hit, column(beside.receivers.position, r), column(beside.receivers.normal, r),
                      beside.totals[r])
     length = np.float64(paths.travelled[ray]) + paths.distance[ray]
     near = near_density(beside.counts.directions, cosine, 0.0, sender)

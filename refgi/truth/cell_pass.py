@@ -9,7 +9,7 @@ from refgi.truth.camera_visibility import hidden_from_camera
 from refgi.truth.cell_rays import Beside, connect, pick_cells, picks_for
 from refgi.truth.cell_walk import fill_totals
 from refgi.truth.lobe_cells import lobe_cells
-from refgi.truth.paths import pass_through, paths_for
+from refgi.truth.paths import pass_through
 from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
 
 Array = npt.NDArray[Any]
@@ -32,25 +32,21 @@ def beside_of(task: Task, first: int) -> Beside | None:
     return Beside(task.cells, task.receivers, task.cell_totals, task.counts, first)
 
 
-def add_cells(task: Task, words: Array, sums: Array) -> None:
+def add_cells(task: Task, seed: int, sums: Array) -> None:
     """Add what lobes of senders send, by rays into picked cells and by directions to images in them, W/m^2."""
-    counts = task.counts
-    for count, mirrors in ((counts.cells, False), (counts.mirrors, True)):
-        for first, last in spans(task, max(1, count)) if count else []:
-            beside, rays = beside_of(task, first), (last - first) * count
-            picks = picks_for(rays)
-            sampling, shadows = (int(words[int(mirrors)]), task.tracer.grain, mirrors), shadow_batch(rays)
-            pick_cells(beside, (first, last), sampling, picks)
-            while True:
-                paths = picks.paths
-                task.tracer.fill_closest(paths.origin, paths.direction, paths.reach, paths.triangle_id, paths.distance)
-                connect(beside, task.surfaces, task.lights, sampling, picks, shadows)
-                hidden = hidden_from_camera(task, paths)
-                if hidden is not None:
-                    shadows.reach[hidden] = 0
-                add_unblocked(task, shadows, first, count, sums, task.settings.visibility or mirrors)
-                if task.settings.visibility or not mirrors:
-                    break
-                pass_through(task.surfaces, task.tracer.grain, paths)
-                if not (paths.reach > 0).any():
-                    break
+    each, visibility = task.counts.cells + task.counts.mirrors, task.settings.visibility
+    for first, last in spans(task, each):
+        beside, picks, shadows = beside_of(task, first), picks_for((last - first) * each), shadow_batch((last - first) * each)
+        paths, from_lights = picks.paths, np.arange(len(shadows.reach)) % each < task.counts.cells
+        pick_cells(beside, (first, last), seed, task.tracer.grain, picks)
+        while (paths.reach > 0).any():
+            task.tracer.fill_closest(paths.origin, paths.direction, paths.reach, paths.triangle_id, paths.distance)
+            connect(beside, task.surfaces, task.lights, task.tracer.grain, visibility, picks, shadows)
+            hidden = hidden_from_camera(task, paths)
+            if hidden is not None:
+                shadows.reach[hidden] = 0
+            add_unblocked(task, shadows, first, each, sums, True)
+            if visibility:
+                break
+            paths.reach[from_lights] = 0  # what light reaches is what it meets first
+            pass_through(task.surfaces, task.tracer.grain, paths)

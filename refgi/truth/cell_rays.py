@@ -36,7 +36,13 @@ from refgi.truth.lobe_cells import LobeCells
 from refgi.truth.next_event import aim_at_light, toward_light
 from refgi.truth.paths import Paths, Shadows, dot, hit_point, paths_for, row
 from refgi.truth.surfaces import (
-    Surfaces, around, face_normal, height_above, lift, lobe_pattern, shading_normal,
+    Surfaces,
+    around,
+    face_normal,
+    height_above,
+    lift,
+    lobe_pattern,
+    shading_normal,
 )
 
 Array = npt.NDArray[Any]
@@ -136,45 +142,66 @@ def image_density(beside: Beside, k: int, mirror: int, r: int, w: tuple[float, f
 
 
 @kernel(parallel=True)
-def pick_cells(beside: Beside, span: tuple[int, int], sampling: tuple[int, float, bool], picks: Picks) -> None:
-    """Fill the rays of a span's receivers (first, one past the last).
+def pick_cells(beside: Beside, span: tuple[int, int], seed: int, grain: float, picks: Picks) -> None:
+    """Fill the rays of a span's receivers (first, one past the last): of each those of b, then those of c.
 
-    `sampling`: seed of a hash with the receiver's pixel; the tracer's grain, m; whether they are those of c.
+    `seed`: of a hash with the receiver's pixel. `grain`: the tracer's, m.
     """
     count = span[1] - span[0]
     for chunk in prange((count + CHUNK - 1) // CHUNK):
-        _pick_chunk(beside, span[0], (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)), sampling, picks)
+        _pick_chunk(beside, span[0], (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)), seed, grain, picks)
 
 
 @kernel
-def _pick_chunk(beside: Beside, first: int, part: tuple[int, int], sampling: tuple[int, float, bool],
-                picks: Picks) -> None:
-    cells, tree, receivers = beside.cells, beside.cells.tree, beside.receivers
-    path = Path(np.empty(DEEPEST_GROUP, np.int64), *(np.empty(DEEPEST_GROUP), np.empty(DEEPEST_GROUP), np.empty(DEEPEST_GROUP)))
+def _pick_chunk(beside: Beside, first: int, part: tuple[int, int], seed: int, grain: float, picks: Picks) -> None:
+    tree, receivers, counts = beside.cells.tree, beside.receivers, beside.counts
+    path = Path(np.empty(DEEPEST_GROUP, np.int64), np.empty(DEEPEST_GROUP), np.empty(DEEPEST_GROUP),
+                np.empty(DEEPEST_GROUP))
     found = np.empty(tree.columns.shape[1], np.float32)
-    seed, grain, mirrors = sampling
-    count = beside.counts.mirrors if mirrors else beside.counts.cells
     for i in range(part[0], part[1]):
         x, n = column(receivers.position, first + i), column(receivers.normal, first + i)
         word = hash_bits(np.uint32(receivers.pixel[first + i]) ^ np.uint32(seed))
-        total, shift = fill_tops(cells, x, n, found), _uniform(word ^ np.uint32(0x1B56C4E9))
-        top, level, even = -1, 0, 0.0 if mirrors else EVEN
-        for s in range(count):
-            ray, place, (u, v) = i * count + s, (s + shift) / count, _place(word, s)
-            picks.paths.reach[ray] = 0
-            if place < even:
-                k = min(len(cells.squares.kind) - 1, int(place / even * len(cells.squares.kind)))
-                _send(cells, k, found_in(cells, k, u, v, x, n, total), (u, v, grain), beside.counts, ray, picks)
-            elif total > 0:
-                place = (place - even) / (1 - even) * total
-                top, level = next_top(tree, found, total, place, top, level, path)
-                while tree.child[path.node[level]] >= 0 and path.chance[level] > 0 and not (
-                        mirrors and tree.mirror[path.node[level], 7] > 0):
-                    level = go_down(tree, x, n, level, place, path)
-                if path.chance[level] > 0 and mirrors:
-                    _send_to_image(beside, path.node[level], first + i, (u, v), ray, picks)
-                elif path.chance[level] > 0:
-                    _send_into(cells, path, level, (u, v, grain), beside.counts, ray, picks)
+        total = fill_tops(beside.cells, x, n, found)
+        ray = i * (counts.cells + counts.mirrors)
+        _pick_rays(beside, (x, n, total), word, grain, found, path, ray, picks)
+        _pick_images(beside, (x, n, total), first + i, word, found, path, ray + counts.cells, picks)
+
+
+@kernel
+def _pick_rays(beside: Beside, receiver: tuple[Any, Any, float], word: Any, grain: float, found: Array, path: Path,
+               start: int, picks: Picks) -> None:
+    (x, n, total), cells, count = receiver, beside.cells, beside.counts.cells
+    lights, shift = len(cells.squares.kind), _uniform(word ^ np.uint32(0x1B56C4E9))
+    top, level = -1, 0
+    for s in range(count):
+        place, (u, v) = (s + shift) / count, _place(word, s)
+        picks.paths.reach[start + s] = 0
+        if place < EVEN:
+            k = min(lights - 1, int(place / EVEN * lights))
+            _send(cells, k, found_in(cells, k, u, v, x, n, total), (u, v, grain), beside.counts, start + s, picks)
+        elif total > 0:
+            place = (place - EVEN) / (1 - EVEN) * total
+            top, level = next_top(cells.tree, found, total, place, top, level, path)
+            while cells.tree.child[path.node[level]] >= 0 and path.chance[level] > 0:
+                level = go_down(cells.tree, x, n, level, place, path)
+            if path.chance[level] > 0:
+                _send_into(cells, path, level, (u, v, grain), beside.counts, start + s, picks)
+
+
+@kernel
+def _pick_images(beside: Beside, receiver: tuple[Any, Any, float], r: int, word: Any, found: Array, path: Path,
+                 start: int, picks: Picks) -> None:
+    (x, n, total), tree, count = receiver, beside.cells.tree, beside.counts.mirrors
+    shift, top, level = _uniform(word ^ np.uint32(0x7FEB352D)), -1, 0
+    for s in range(count):
+        picks.paths.reach[start + s] = 0
+        if total > 0:
+            place = (s + shift) / count * total
+            top, level = next_top(tree, found, total, place, top, level, path)
+            while tree.mirror[path.node[level], 7] == 0 and tree.child[path.node[level]] >= 0 and path.chance[level] > 0:
+                level = go_down(tree, x, n, level, place, path)
+            if tree.mirror[path.node[level], 7] > 0 and path.chance[level] > 0:
+                _send_to_image(beside, path.node[level], r, _place(~word, s), start + s, picks)
 
 
 @kernel
@@ -212,7 +239,7 @@ def _send_to_image(beside: Beside, mirror: int, r: int, place: tuple[float, floa
     receivers, paths, cells = beside.receivers, picks.paths, beside.cells
     k = cells.light[cells.tree.lobe[mirror]]
     u, sharpness = image_of(cells, k, mirror, point_of(receivers.position, r))
-    if sharpness == 0 or cells.tree.mirror[mirror, 7] == 0:
+    if sharpness == 0:
         return
     x, y, z = lobe_direction(place[0], place[1], sharpness - 1)
     w = around(u, x, y, z)
@@ -241,30 +268,37 @@ def point_of(rows: Array, i: int) -> tuple[float, float, float]:
 
 
 @kernel(parallel=True)
-def connect(beside: Beside, surfaces: Surfaces, lights: LightTable, sampling: tuple[int, float, bool], picks: Picks,
+def connect(beside: Beside, surfaces: Surfaces, lights: LightTable, grain: float, visibility: bool, picks: Picks,
             shadows: Shadows) -> None:
     """Write the shadow ray that is left of each pick, and what the lobe at the point that it found sends.
 
-    From there to the receiver for b, to the light for c (`sampling` as for `pick_cells`). `shadows`: origins,
+    From there to the receiver for b, one of no length without `visibility`; to the light for c. `shadows`: origins,
     directions, reach and contribution are filled; the reach is 0 where nothing arrives.
     """
     count = len(picks.light)
     for chunk in prange((count + CHUNK - 1) // CHUNK):
-        for ray in range(chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)):
-            if sampling[2]:
-                _connect_to_light(beside, surfaces, lights, sampling[1], picks, shadows, ray)
-            else:
-                _connect_to_receiver(beside, surfaces, lights, sampling[1], picks, shadows, ray)
+        _connect_span(beside, surfaces, lights, grain, visibility, picks, shadows, chunk * CHUNK,
+                      min(count, chunk * CHUNK + CHUNK))
 
 
 @kernel
-def _connect_to_receiver(beside: Beside, surfaces: Surfaces, lights: LightTable, grain: float, picks: Picks,
-                         shadows: Shadows, ray: int) -> None:
-    shadows.reach[ray] = 0
+def _connect_span(beside: Beside, surfaces: Surfaces, lights: LightTable, grain: float, visibility: bool, picks: Picks,
+                  shadows: Shadows, low: int, high: int) -> None:
+    each = beside.counts.cells + beside.counts.mirrors
+    for ray in range(low, high):
+        shadows.reach[ray] = 0
+        triangle, r = picks.paths.triangle_id[ray], beside.first + ray // each
+        if picks.paths.reach[ray] > 0 and triangle != MISS and _has_lobe(surfaces, triangle):
+            if ray % each < beside.counts.cells:
+                _connect_to_receiver(beside, r, surfaces, lights, grain, visibility, picks, shadows, ray)
+            else:
+                _connect_to_light(beside, r, surfaces, lights, grain, picks, shadows, ray)
+
+
+@kernel
+def _connect_to_receiver(beside: Beside, r: int, surfaces: Surfaces, lights: LightTable, grain: float,
+                         visibility: bool, picks: Picks, shadows: Shadows, ray: int) -> None:
     triangle, k, receivers = picks.paths.triangle_id[ray], picks.light[ray], beside.receivers
-    if picks.paths.reach[ray] == 0 or triangle == MISS or not _has_lobe(surfaces, triangle):
-        return
-    r = beside.first + ray // beside.counts.cells
     back, y = hit_point(picks.paths, ray)
     g = face_normal(surfaces, triangle, -back[0], -back[1], -back[2])
     height = height_above(surfaces, triangle, y, g)
@@ -274,7 +308,7 @@ def _connect_to_receiver(beside: Beside, surfaces: Surfaces, lights: LightTable,
     if length == 0 or dot(g, way) >= 0 or dot(point_of(receivers.facing, r), way) <= 0 or dot(n, way) <= 0:
         return
     w = (way[0] / length, way[1] / length, way[2] / length)
-    toward, power = toward_light(lights, k, y), (lights.intensity[k, 0], lights.intensity[k, 1], lights.intensity[k, 2])
+    toward, power = toward_light(lights, k, y), row(lights.intensity, k)
     if lights.kind[k] != DIRECTIONAL:
         power = radiant_intensity(lights, k, -toward[0], -toward[1], -toward[2])
     mirror, chance, image = np.int64(picks.mirror[ray]), picks.mirror_chance[ray], 0.0
@@ -282,7 +316,7 @@ def _connect_to_receiver(beside: Beside, surfaces: Surfaces, lights: LightTable,
         found = found_at(beside.cells, k, y, g, column(receivers.position, r), column(receivers.normal, r),
                          beside.totals[r])
         mirror, chance = found.mirror, found.mirror_chance
-    if mirror >= 0:
+    if mirror >= 0 and beside.counts.mirrors > 0:
         image = beside.counts.mirrors * chance * image_density(beside, k, mirror, r, w)
     total = near_density(beside.counts.directions, dot(n, w), image, (-dot(g, w), dot(toward, toward), dot(g, back)))
     total += picks.density[ray] * length * length
@@ -290,25 +324,22 @@ def _connect_to_receiver(beside: Beside, surfaces: Surfaces, lights: LightTable,
         offset = ray_offset(y[0], y[1], y[2], grain) + far_offset(way[0], way[1], way[2])
         for c in range(3):
             shadows.origin[ray, c] = receivers.origin[c, r]
-            shadows.direction[ray, c] = y[c] + offset * g[c] - receivers.origin[c, r]
+            shadows.direction[ray, c] = y[c] + offset * g[c] - receivers.origin[c, r] if visibility else 0.0
         shadows.reach[ray] = 1
 
 
 @kernel
-def _connect_to_light(beside: Beside, surfaces: Surfaces, lights: LightTable, grain: float, picks: Picks,
+def _connect_to_light(beside: Beside, r: int, surfaces: Surfaces, lights: LightTable, grain: float, picks: Picks,
                       shadows: Shadows, ray: int) -> None:
-    shadows.reach[ray] = 0
     triangle, k, receivers = picks.paths.triangle_id[ray], picks.light[ray], beside.receivers
-    if picks.paths.reach[ray] == 0 or triangle == MISS or not _has_lobe(surfaces, triangle):
-        return
-    r = beside.first + ray // beside.counts.mirrors
     back, y = hit_point(picks.paths, ray)
     toward = toward_light(lights, k, y)
     g = face_normal(surfaces, triangle, -toward[0], -toward[1], -toward[2])
     lx, ly, lz, far, red, green, blue = incident_light(lights, k, y[0], y[1], y[2])
     if dot(g, back) <= 0 or max(red, green, blue) <= 0:
         return
-    found = found_at(beside.cells, k, y, g, column(receivers.position, r), column(receivers.normal, r), beside.totals[r])
+    found = found_at(beside.cells, k, y, g, column(receivers.position, r), column(receivers.normal, r),
+                     beside.totals[r])
     if found.mirror != picks.mirror[ray]:
         return
     w, square = (-back[0], -back[1], -back[2]), dot(toward, toward)

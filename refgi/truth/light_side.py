@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.rays import far_offset, ray_offset

@@ -104,7 +104,7 @@ def one_pass(task: Task, number: int) -> Array:
         if task.settings.picks_per_pass:
             add_light_side(task, words[:3], sums)
         if task.cells is not None:
-            add_cells(task, words[:2], sums)
+            add_cells(task, int(words[2]), sums)
         if task.settings.directions_per_pass:
             _hemisphere(task, words, sums)
         if task.caustics is not None:

@@ -7,7 +7,6 @@ import numpy.typing as npt
 
 from refgi.truth.camera_visibility import hidden_from_camera
 from refgi.truth.cell_rays import Beside, connect, pick_cells, picks_for
-from refgi.truth.cell_walk import fill_totals
 from refgi.truth.lobe_cells import lobe_cells
 from refgi.truth.paths import pass_through
 from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
@@ -16,20 +15,15 @@ Array = npt.NDArray[Any]
 
 
 def with_cells(task: Task) -> Task:
-    """Return a task of irradiance with cells of its senders' lobes, and what they send each receiver in all."""
+    """Return a task of irradiance with cells of its senders' lobes."""
     if task.lobes is not None or not task.picks or not task.scene.lights or not task.surfaces.specular.any():
         return task
-    cells = lobe_cells(task.scene, task.tracer, task.surfaces, task.lights)
-    totals = np.empty(len(task.receivers.pixel))
-    fill_totals(cells, task.receivers, totals)
-    return task._replace(cells=cells, cell_totals=totals)
+    return task._replace(cells=lobe_cells(task.scene, task.tracer, task.surfaces, task.lights))
 
 
 def beside_of(task: Task, first: int) -> Beside | None:
     """Return what densities of lobes depend on, for rays of the receivers from `first` on; None without cells."""
-    if task.cells is None or task.cell_totals is None:
-        return None
-    return Beside(task.cells, task.receivers, task.cell_totals, task.counts, first)
+    return None if task.cells is None else Beside(task.cells, task.receivers, task.counts, first)
 
 
 def add_cells(task: Task, seed: int, sums: Array) -> None:

@@ -30,9 +30,12 @@ from refgi.radiometry import DIRECTIONAL, incident_light, radiant_intensity
 from refgi.rays import MISS, far_offset, ray_offset
 from refgi.sampling import hash_bits
 from refgi.scene import LightTable
-from refgi.truth.cell_walk import CHUNK, Found, Path, column, fill_tops, found_at, found_in, go_down, next_top, on_face
+from refgi.truth.cell_walk import (
+    CHUNK, Found, Path, cell_at, column, fill_tops, found_at, found_up, go_down, next_top, on_face, plane_chance,
+)
 from refgi.truth.light_square import ray_through
 from refgi.truth.lobe_cells import LobeCells
+from refgi.truth.lobe_tree import LobeTree
 from refgi.truth.next_event import aim_at_light, toward_light
 from refgi.truth.paths import Paths, Shadows, dot, hit_point, paths_for, row
 from refgi.truth.surfaces import (
@@ -64,9 +67,16 @@ class Beside(NamedTuple):
 
     cells: LobeCells
     receivers: RayReceivers
-    totals: Array  # (r,) float64: of `refgi.truth.cell_walk.fill_totals`
     counts: Counts
     first: int  # receiver of the first ray
+
+
+class Tops(NamedTuple):
+    """What the top groups send one receiver."""
+
+    receiver: Array  # (1,) int64: which; -1: none yet
+    found: Array  # (t,) float32
+    sums: Array  # (t + 1,) float64: of those before
 
 
 class Picks(NamedTuple):
@@ -157,20 +167,20 @@ def _pick_chunk(beside: Beside, first: int, part: tuple[int, int], seed: int, gr
     tree, receivers, counts = beside.cells.tree, beside.receivers, beside.counts
     path = Path(np.empty(DEEPEST_GROUP, np.int64), np.empty(DEEPEST_GROUP), np.empty(DEEPEST_GROUP),
                 np.empty(DEEPEST_GROUP))
-    found = np.empty(tree.columns.shape[1], np.float32)
+    found, sums = np.empty(len(tree.top), np.float32), np.empty(len(tree.top) + 1)
     for i in range(part[0], part[1]):
         x, n = column(receivers.position, first + i), column(receivers.normal, first + i)
         word = hash_bits(np.uint32(receivers.pixel[first + i]) ^ np.uint32(seed))
-        total = fill_tops(beside.cells, x, n, found)
+        fill_tops(tree, x, n, found, sums)
         ray = i * (counts.cells + counts.mirrors)
-        _pick_rays(beside, (x, n, total), word, grain, found, path, ray, picks)
-        _pick_images(beside, (x, n, total), first + i, word, found, path, ray + counts.cells, picks)
+        _pick_rays(beside, (x, n), word, grain, sums, path, ray, picks)
+        _pick_images(beside, (x, n), first + i, word, sums, path, ray + counts.cells, picks)
 
 
 @kernel
-def _pick_rays(beside: Beside, receiver: tuple[Any, Any, float], word: Any, grain: float, found: Array, path: Path,
-               start: int, picks: Picks) -> None:
-    (x, n, total), cells, count = receiver, beside.cells, beside.counts.cells
+def _pick_rays(beside: Beside, receiver: tuple[Any, Any], word: Any, grain: float, sums: Array, path: Path, start: int,
+               picks: Picks) -> None:
+    (x, n), cells, count, total = receiver, beside.cells, beside.counts.cells, sums[len(sums) - 1]
     lights, shift = len(cells.squares.kind), _uniform(word ^ np.uint32(0x1B56C4E9))
     top, level = -1, 0
     for s in range(count):
@@ -178,38 +188,44 @@ def _pick_rays(beside: Beside, receiver: tuple[Any, Any, float], word: Any, grai
         picks.paths.reach[start + s] = 0
         if place < EVEN:
             k = min(lights - 1, int(place / EVEN * lights))
-            _send(cells, k, found_in(cells, k, u, v, x, n, total), (u, v, grain), beside.counts, start + s, picks)
+            found = found_up(cells, cell_at(cells, k, u, v), x, n, sums)
+            _send(cells, k, found, (u, v, grain), beside.counts, start + s, picks)
         elif total > 0:
             place = (place - EVEN) / (1 - EVEN) * total
-            top, level = next_top(cells.tree, found, total, place, top, level, path)
+            top, level = next_top(cells.tree, sums, place, top, level, path)
             while cells.tree.child[path.node[level]] >= 0 and path.chance[level] > 0:
                 level = go_down(cells.tree, x, n, level, place, path)
             if path.chance[level] > 0:
-                _send_into(cells, path, level, (u, v, grain), beside.counts, start + s, picks)
+                _send_into(cells, path, level, top, sums, (u, v, grain), beside.counts, start + s, picks)
 
 
 @kernel
-def _pick_images(beside: Beside, receiver: tuple[Any, Any, float], r: int, word: Any, found: Array, path: Path,
-                 start: int, picks: Picks) -> None:
-    (x, n, total), tree, count = receiver, beside.cells.tree, beside.counts.mirrors
+def _pick_images(beside: Beside, receiver: tuple[Any, Any], r: int, word: Any, sums: Array, path: Path, start: int,
+                 picks: Picks) -> None:
+    (x, n), tree, count, total = receiver, beside.cells.tree, beside.counts.mirrors, sums[len(sums) - 1]
     shift, top, level = _uniform(word ^ np.uint32(0x7FEB352D)), -1, 0
     for s in range(count):
         picks.paths.reach[start + s] = 0
         if total > 0:
             place = (s + shift) / count * total
-            top, level = next_top(tree, found, total, place, top, level, path)
-            while tree.mirror[path.node[level], 7] == 0 and tree.child[path.node[level]] >= 0 and path.chance[level] > 0:
-                level = go_down(tree, x, n, level, place, path)
-            if tree.mirror[path.node[level], 7] > 0 and path.chance[level] > 0:
-                _send_to_image(beside, path.node[level], r, _place(~word, s), start + s, picks)
+            top, level = next_top(tree, sums, place, top, level, path)
+            mirror = np.int64(tree.plane[top, 0])
+            if mirror < 0:
+                while tree.mirror[path.node[level], 7] == 0 and tree.child[path.node[level]] >= 0:
+                    level = go_down(tree, x, n, level, place, path)
+                mirror = path.node[level] if tree.mirror[path.node[level], 7] > 0 and path.chance[level] > 0 else mirror
+            if mirror >= 0:
+                _send_to_image(beside, mirror, r, _place(~word, s), start + s, picks)
 
 
 @kernel
-def _send_into(cells: LobeCells, path: Path, level: int, place: tuple[float, float, float], counts: Counts, ray: int,
-               picks: Picks) -> None:
+def _send_into(cells: LobeCells, path: Path, level: int, top: int, sums: Array, place: tuple[float, float, float],
+               counts: Counts, ray: int, picks: Picks) -> None:
     """Write the ray of b through a place of the cell at the end of a path."""
-    tree, mirror, chance = cells.tree, -1, 0.0
-    for above in range(level + 1):
+    tree, mirror, chance = cells.tree, np.int64(cells.tree.plane[top, 0]), 0.0
+    if mirror >= 0:
+        chance = plane_chance(tree, top, sums)
+    for above in range(level + 1 if mirror < 0 else 0):
         if mirror < 0 and tree.mirror[path.node[above], 7] > 0:
             mirror, chance = path.node[above], path.chance[above]
     rank = tree.lobe[path.node[level]]
@@ -284,20 +300,37 @@ def connect(beside: Beside, surfaces: Surfaces, lights: LightTable, grain: float
 @kernel
 def _connect_span(beside: Beside, surfaces: Surfaces, lights: LightTable, grain: float, visibility: bool, picks: Picks,
                   shadows: Shadows, low: int, high: int) -> None:
-    each = beside.counts.cells + beside.counts.mirrors
+    each, tops = beside.counts.cells + beside.counts.mirrors, tops_for(beside.cells.tree)
     for ray in range(low, high):
         shadows.reach[ray] = 0
         triangle, r = picks.paths.triangle_id[ray], beside.first + ray // each
         if picks.paths.reach[ray] > 0 and triangle != MISS and _has_lobe(surfaces, triangle):
             if ray % each < beside.counts.cells:
-                _connect_to_receiver(beside, r, surfaces, lights, grain, visibility, picks, shadows, ray)
+                _connect_to_receiver(beside, r, surfaces, lights, grain, visibility, picks, tops, shadows, ray)
             else:
-                _connect_to_light(beside, r, surfaces, lights, grain, picks, shadows, ray)
+                _connect_to_light(beside, r, surfaces, lights, grain, picks, tops, shadows, ray)
+
+
+@kernel
+def tops_for(tree: LobeTree) -> Tops:
+    """Allocate what a receiver knows of the top groups."""
+    return Tops(np.full(1, -1, np.int64), np.empty(len(tree.top), np.float32), np.empty(len(tree.top) + 1))
+
+
+@kernel
+def found_for(beside: Beside, k: int, y: tuple[float, float, float], g: tuple[float, float, float], r: int,
+              tops: Tops) -> Found:
+    """Return the cells that hold a point for receiver r, whose top groups are computed once."""
+    x, n = column(beside.receivers.position, r), column(beside.receivers.normal, r)
+    if tops.receiver[0] != r:
+        fill_tops(beside.cells.tree, x, n, tops.found, tops.sums)
+        tops.receiver[0] = r
+    return found_at(beside.cells, k, y, g, x, n, tops.sums)
 
 
 @kernel
 def _connect_to_receiver(beside: Beside, r: int, surfaces: Surfaces, lights: LightTable, grain: float,
-                         visibility: bool, picks: Picks, shadows: Shadows, ray: int) -> None:
+                         visibility: bool, picks: Picks, tops: Tops, shadows: Shadows, ray: int) -> None:
     triangle, k, receivers = picks.paths.triangle_id[ray], picks.light[ray], beside.receivers
     back, y = hit_point(picks.paths, ray)
     g = face_normal(surfaces, triangle, -back[0], -back[1], -back[2])
@@ -313,8 +346,7 @@ def _connect_to_receiver(beside: Beside, r: int, surfaces: Surfaces, lights: Lig
         power = radiant_intensity(lights, k, -toward[0], -toward[1], -toward[2])
     mirror, chance, image = np.int64(picks.mirror[ray]), picks.mirror_chance[ray], 0.0
     if beside.counts.mirrors > 0 and not on_face(beside.cells, picks.cell[ray], y, g):
-        found = found_at(beside.cells, k, y, g, column(receivers.position, r), column(receivers.normal, r),
-                         beside.totals[r])
+        found = found_for(beside, k, y, g, r, tops)
         mirror, chance = found.mirror, found.mirror_chance
     if mirror >= 0 and beside.counts.mirrors > 0:
         image = beside.counts.mirrors * chance * image_density(beside, k, mirror, r, w)
@@ -330,7 +362,7 @@ def _connect_to_receiver(beside: Beside, r: int, surfaces: Surfaces, lights: Lig
 
 @kernel
 def _connect_to_light(beside: Beside, r: int, surfaces: Surfaces, lights: LightTable, grain: float, picks: Picks,
-                      shadows: Shadows, ray: int) -> None:
+                      tops: Tops, shadows: Shadows, ray: int) -> None:
     triangle, k, receivers = picks.paths.triangle_id[ray], picks.light[ray], beside.receivers
     back, y = hit_point(picks.paths, ray)
     toward = toward_light(lights, k, y)
@@ -338,8 +370,7 @@ def _connect_to_light(beside: Beside, r: int, surfaces: Surfaces, lights: LightT
     lx, ly, lz, far, red, green, blue = incident_light(lights, k, y[0], y[1], y[2])
     if dot(g, back) <= 0 or max(red, green, blue) <= 0:
         return
-    found = found_at(beside.cells, k, y, g, column(receivers.position, r), column(receivers.normal, r),
-                     beside.totals[r])
+    found = found_for(beside, k, y, g, r, tops)
     if found.mirror != picks.mirror[ray]:
         return
     w, square = (-back[0], -back[1], -back[2]), dot(toward, toward)

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel, prange
-from refgi.pairs.shadow_rays import RayReceivers
+from refgi.jit import kernel
 from refgi.truth.light_square import place_of
 from refgi.truth.lobe_cells import LobeCells
 from refgi.truth.lobe_tree import LobeTree
@@ -80,40 +79,31 @@ def column(rows: Array, i: int) -> tuple[Any, Any, Any]:
 
 
 @kernel
-def fill_tops(cells: LobeCells, x: Any, n: Any, found: Array) -> float:
-    """Fill what each top cell sends, in SIMD lanes; return the sum, in their order."""
-    c = cells.tree.columns
+def fill_tops(tree: LobeTree, x: Any, n: Any, found: Array, sums: Array) -> float:
+    """Fill what each top group sends (t,), in SIMD lanes, and the sums (t + 1,) of those before; return the last."""
+    c = tree.columns
     for t in range(len(found)):
         found[t] = _expected((c[0, t], c[1, t], c[2, t], c[3, t], c[4, t], c[5, t], c[6, t], c[7, t], c[8, t], c[9, t],
                               c[10, t], c[11, t], c[12, t], c[13, t]), x, n)
-    total = 0.0
+    sums[0] = 0.0
     for t in range(len(found)):
-        total += found[t]
-    return total
-
-
-@kernel(parallel=True)
-def fill_totals(cells: LobeCells, receivers: RayReceivers, totals: Array) -> None:
-    """Fill what all cells send each receiver, (r,) float64: the same in every pass."""
-    for chunk in prange((len(totals) + CHUNK - 1) // CHUNK):
-        found = np.empty(cells.tree.columns.shape[1], np.float32)
-        for r in range(chunk * CHUNK, min(len(totals), chunk * CHUNK + CHUNK)):
-            totals[r] = fill_tops(cells, column(receivers.position, r), column(receivers.normal, r), found)
+        sums[t + 1] = sums[t] + found[t]
+    return sums[len(found)]
 
 
 @kernel
 def found_at(cells: LobeCells, k: int, y: tuple[float, float, float], g: tuple[float, float, float], x: Any, n: Any,
-             total: float) -> Found:
+             sums: Array) -> Found:
     """Return the cells that hold a point y of face normal g that light k reaches, for a receiver at x with normal n.
 
-    `total`: of `fill_tops`. Where an edge crosses the cell and its ray found another face, the mirror is that of the
+    `sums`: of `fill_tops`. Where an edge crosses the cell and its ray found another face, the mirror is that of the
     first neighbour on y's face.
     """
     a, b = place_of(cells.squares, k, y)
     if a < 0:
         return Found(np.int64(k), 0.0, np.int64(-1), 0.0)
     cell = cell_at(cells, k, a, b)
-    own = _found_up(cells, cell, x, n, total)
+    own = found_up(cells, cell, x, n, sums)
     if on_face(cells, cell, y, g):
         return own
     side = 2.0 ** -cells.corner[cell, 2]
@@ -122,15 +112,9 @@ def found_at(cells: LobeCells, k: int, y: tuple[float, float, float], g: tuple[f
         if 0 <= da < 1 and 0 <= db < 1:
             other = cell_at(cells, k, da, db)
             if on_face(cells, other, y, g):
-                found = _found_up(cells, other, x, n, total)
+                found = found_up(cells, other, x, n, sums)
                 return Found(cell, own.chance, found.mirror, found.mirror_chance)
     return Found(cell, own.chance, np.int64(-1), 0.0)
-
-
-@kernel
-def found_in(cells: LobeCells, k: int, a: float, b: float, x: Any, n: Any, total: float) -> Found:
-    """Return the cells that hold a place of light k's square, for a receiver at x with normal n."""
-    return _found_up(cells, cell_at(cells, k, a, b), x, n, total)
 
 
 @kernel
@@ -156,32 +140,52 @@ def on_face(cells: LobeCells, cell: int, y: tuple[float, float, float], g: tuple
 
 
 @kernel
-def _found_up(cells: LobeCells, cell: int, x: Any, n: Any, total: float) -> Found:
+def found_up(cells: LobeCells, cell: int, x: Any, n: Any, sums: Array) -> Found:
     """Return a cell's chance, the product of its groups' shares on the way up, and its mirror's."""
     rank, mirror, chance, mirror_chance, tree = cells.rank[cell], np.int64(-1), 1.0, 1.0, cells.tree
+    total = sums[len(sums) - 1]
     if rank < 0 or total <= 0:
         return Found(cell, 0.0, mirror, 0.0)
     node = np.int64(tree.single[rank])
-    while True:
+    while tree.top_of[node] < 0:
         if tree.mirror[node, 7] > 0:
             mirror, mirror_chance = node, 1.0
         above, own = np.int64(tree.parent[node]), np.float64(_of_node(tree, node, x, n))
-        whole = total if above < 0 else own + _of_node(tree, 2 * np.int64(tree.child[above]) + 1 - node, x, n)
+        whole = own + _of_node(tree, 2 * np.int64(tree.child[above]) + 1 - node, x, n)
         share = own / whole if own > 0 else 0.0
-        chance, mirror_chance = chance * share, mirror_chance * share
-        if above < 0:
-            return Found(cell, chance, mirror, mirror_chance if mirror >= 0 else 0.0)
-        node = above
+        chance, mirror_chance, node = chance * share, mirror_chance * share, above
+    top = tree.top_of[node]
+    share = (sums[top + 1] - sums[top]) / total
+    if tree.plane[top, 0] >= 0:
+        return Found(cell, chance * share, np.int64(tree.plane[top, 0]), plane_chance(tree, top, sums))
+    return Found(cell, chance * share, mirror, mirror_chance * share if mirror >= 0 else 0.0)
 
 
 @kernel
-def next_top(tree: LobeTree, found: Array, total: float, place: float, top: int, level: int,
-             path: Path) -> tuple[int, int]:
+def plane_chance(tree: LobeTree, top: int, sums: Array) -> float:
+    """Return the chance of the plane around a top group."""
+    return (sums[tree.plane[top, 2]] - sums[tree.plane[top, 1]]) / sums[len(sums) - 1]
+
+
+@kernel
+def top_at(sums: Array, place: float) -> int:
+    """Return the top group that holds a place in [0, total): the last one that begins before and sends anything."""
+    low, high = 0, len(sums) - 1  # sums[low] <= place < sums[high]
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if sums[middle] <= place else (low, middle)
+    while low > 0 and sums[low + 1] <= sums[low]:
+        low -= 1
+    return low
+
+
+@kernel
+def next_top(tree: LobeTree, sums: Array, place: float, top: int, level: int, path: Path) -> tuple[int, int]:
     """Go on to the top group that holds a place; return it and the level that the way down goes on from."""
-    while top < 0 or (place >= path.high[0] and top < len(found) - 1):
-        path.low[0] = path.high[0] if top >= 0 else 0.0
-        top, level = top + 1, 0
-        path.node[0], path.chance[0], path.high[0] = tree.top[top], found[top] / total, path.low[0] + found[top]
+    if top < 0 or place >= path.high[0]:
+        top, level = top_at(sums, place), 0
+        path.node[0], path.low[0], path.high[0] = tree.top[top], sums[top], sums[top + 1]
+        path.chance[0] = (sums[top + 1] - sums[top]) / sums[len(sums) - 1]
     while level > 0 and place >= path.high[level]:
         level -= 1
     return top, level

@@ -20,8 +20,7 @@ from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.scene import LightTable
-from refgi.truth.cell_rays import Beside, near_density, rays_beside
-from refgi.truth.cell_walk import column, found_at
+from refgi.truth.cell_rays import Beside, Tops, found_for, near_density, rays_beside, tops_for
 from refgi.truth.next_event import aim_at_light, toward_light
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point, row
 from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_pattern, shading_normal
@@ -123,6 +122,8 @@ def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, 
 def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, float, float], paths: Paths,
             shadows: Shadows, beside: Beside | None, span: tuple[int, int]) -> None:
     bound, measure, grain = limits
+    if beside is not None:
+        tops = tops_for(beside.cells.tree)
     directional = lights.kind[k] == DIRECTIONAL
     for ray in range(span[0], span[1]):
         triangle = paths.triangle_id[ray]
@@ -161,7 +162,7 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         if has_lobe:
             lobe = lobe_pattern(surfaces, material, n, light, w)
             if beside is not None:
-                lobe *= _share_beside(beside, k, (y, g), paths, ray, (
+                lobe *= _share_beside(beside, tops, k, (y, g), paths, ray, (
                     dot(g, w), 1.0 if directional else dot(toward, toward), dot(g, light)))
         most = 0.0
         for c in range(3):
@@ -173,13 +174,12 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
 
 
 @kernel
-def _share_beside(beside: Beside, k: int, hit: Any, paths: Paths, ray: int,
+def _share_beside(beside: Beside, tops: Tops, k: int, hit: Any, paths: Paths, ray: int,
                   sender: tuple[float, float, float]) -> float:
     """Return the share of directions, n_a / (n_a + n_b + n_c), in the lobe at a point and face normal that one hit."""
     r = beside.first + ray // beside.counts.directions
     w, cosine = row(paths.direction, ray), np.float64(paths.cosine[ray])
-    found = found_at(beside.cells, k, *hit, column(beside.receivers.position, r), column(beside.receivers.normal, r),
-                     beside.totals[r])
+    found = found_for(beside, k, hit[0], hit[1], r, tops)
     length = np.float64(paths.travelled[ray]) + paths.distance[ray]
     near = near_density(beside.counts.directions, cosine, 0.0, sender)
     return near / rays_beside(beside, k, found, r, (w, cosine, length), sender) if near > 0 else 0.0

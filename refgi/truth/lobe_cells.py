@@ -31,7 +31,7 @@ FINE = 0.02  # rad: a flat cell is small enough at that, however sharp its lobe
 EDGE = 0.7  # rad: normals of neighbouring cells that differ by more belong to two faces
 PLACES = np.array([[0.5, 0.5], [0.01, 0.01], [0.01, 0.99], [0.99, 0.01], [0.99, 0.99]])  # in a cell: its rays
 HALF_DIAGONAL = 0.75  # of a cell, in square roots of its measure
-EDGE_LEVELS = 4  # how often cells that hold an edge are halved on its account
+EDGE_LEVELS = 2  # how often cells that hold an edge are halved on its account
 GRAZING = 0.05  # cosine below which a cell's footprint grows no more
 
 

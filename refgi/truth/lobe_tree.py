@@ -47,12 +47,15 @@ class LobeTree(NamedTuple):
     """The groups; node 0 is all."""
 
     child: Array  # (n,) int32: first of two; -1: one lobe
-    parent: Array  # (n,) int32; -1 for top groups and those above
+    parent: Array  # (n,) int32; -1 for top groups
     lobe: Array  # (n,) int32: rank of its first lobe
     single: Array  # (m,) int32: the node of each lobe, by rank
     row: Array  # (n, ROWS) float32: position, radius, axis, w^2 + spread^2, power, face normal, thickness, sine of tilt
     top: Array  # (t,) int32: groups that hold every lobe once, each small enough to be told from the others
-    columns: Array  # (ROWS, t) float32: of those, for SIMD lanes
+    columns: Array  # (ROWS, t) float32: `row` of those, for SIMD lanes
+    top_of: Array  # (n,) int32: which of them a node is; -1
+    plane: Array  # (t, 3) int32: the largest group around each that mirrors the light, and its first top group and one
+    #               past its last; -1 where it is smaller than the top group
     mirror: Array  # (n, 8) float64: a point and the normal of the plane that mirrors the light, exponent + 1 of what is
     #                sent by that, 1 where that may be used
 
@@ -87,9 +90,24 @@ def tree_of(lobes: Lobe) -> tuple[Array, LobeTree]:
     first = np.concatenate([level.start for level in levels]).astype(np.int32)
     top = _tops(child, whole)
     top = top[np.argsort(first[top])]
+    mirror, top_of = _mirrors(whole, child < 0), np.full(len(child), -1, np.int32)
+    top_of[top] = np.arange(len(top))
+    tree = LobeTree(child, parent, first, single, row, top, np.ascontiguousarray(row[top].T), top_of,
+                    _planes(parent, top, mirror[:, 7] > 0), mirror)
     parent[top] = -1
-    return order, LobeTree(child, parent, first, single, row, top, np.ascontiguousarray(row[top].T),
-                           _mirrors(whole, child < 0))
+    return order, tree
+
+
+def _planes(parent: Array, top: Array, flat: Array) -> Array:
+    """Return `LobeTree.plane`: the highest flat group above or at each top group, and the top groups in it."""
+    plane, node = np.full(len(top), -1, np.int32), top.astype(np.int64)
+    while (node >= 0).any():
+        plane = np.where((node >= 0) & flat[node], node, plane)
+        node = np.where(node >= 0, parent[node], -1)
+    change = np.flatnonzero(np.diff(plane)) + 1
+    starts = np.concatenate([[0], change, [len(top)]])
+    run = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    return np.stack([plane, starts[run], starts[run + 1]], axis=1).astype(np.int32)
 
 
 def _split(lobes: Lobe) -> tuple[Array, list[_Groups]]:

@@ -37,7 +37,6 @@ class Task(NamedTuple):
     view: Projection | None = None  # only surfaces visible in it emit; None: all do
     densities: tuple[Density | None, ...] = ()  # of each light's rays; none: even ones
     cells: LobeCells | None = None  # of senders' lobes; None: no lobe comes by them
-    cell_totals: Array | None = None  # (r,) float64: what they send each receiver
     lobes: Lobes | None = None  # of the receivers, where their lobes and not their irradiance are asked for
 
     @property

@@ -285,6 +285,8 @@ def lobe_fraction(cos_theta: Any, exponent: Any) -> Any:
     if exponent >= SHARP:
         inside = 0.5 * math.erfc(math.sqrt(-(a - 0.25) * math.log1p(-c * c))) if c < 1.0 else 0.0
         return real(1.0 - inside if cos_theta >= 0 else inside)
+    if cos_theta >= 0 and a * c * c > 50.0:  # x^a < 2e-22: nothing beside 1
+        return real(1.0)
     x = (1.0 - c) * (1.0 + c)
     if x < (a + 1.0) / (a + 2.5):
         # x^a (1-x)^(1/2) / (a B(a, 1/2)), the power through log1p because x may be just below 1

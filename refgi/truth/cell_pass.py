@@ -21,17 +21,19 @@ def with_cells(task: Task) -> Task:
     return task._replace(cells=lobe_cells(task.scene, task.tracer, task.surfaces, task.lights))
 
 
-def beside_of(task: Task, first: int) -> Beside | None:
-    """Return what densities of lobes depend on, for rays of the receivers from `first` on; None without cells."""
-    return None if task.cells is None else Beside(task.cells, task.receivers, task.counts, first)
+def beside_of(task: Task, first: int) -> Beside:
+    """Return what densities of lobes depend on, for rays of the receivers from `first` on."""
+    assert task.cells is not None
+    return Beside(task.cells, task.receivers, task.counts, first)
 
 
 def add_cells(task: Task, seed: int, sums: Array) -> None:
     """Add what lobes of senders send, by rays into picked cells and by directions to images in them, W/m^2."""
     each, visibility = task.counts.cells + task.counts.mirrors, task.settings.visibility
     for first, last in spans(task, each):
-        beside, picks, shadows = beside_of(task, first), picks_for((last - first) * each), shadow_batch((last - first) * each)
-        paths, from_lights = picks.paths, np.arange(len(shadows.reach)) % each < task.counts.cells
+        beside, count = beside_of(task, first), (last - first) * each
+        picks, shadows = picks_for(count), shadow_batch(count)
+        paths, from_lights = picks.paths, np.arange(count) % each < task.counts.cells
         pick_cells(beside, (first, last), seed, task.tracer.grain, picks)
         while (paths.reach > 0).any():
             task.tracer.fill_closest(paths.origin, paths.direction, paths.reach, paths.triangle_id, paths.distance)

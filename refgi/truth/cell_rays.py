@@ -12,9 +12,9 @@ cell and W its measure, N directions (a), k_b and k_c picks put
 
     n_a = N <n_x.w> / pi F,   n_b = k_b ((1 - e) p_b / W + e / (lights W_light)),   n_c = k_c p_c D(w) F,
 
-F = <g.-w> d^2 / (r^2 <g.l>), rays on a unit of the light's measure, and each adds the lobe's term over n_a + n_b + n_c (the
-balance heuristic of multiple importance sampling). So no contribution is larger than what the best of them would give:
-near a flat mirror n_c follows the lobe itself, however sharp it is.
+F = <g.-w> d^2 / (r^2 <g.l>), rays on a unit of the light's measure, and each adds the lobe's term over n_a + n_b + n_c
+(the balance heuristic of multiple importance sampling). So no contribution is larger than what the best of them would
+give: near a flat mirror n_c follows the lobe itself, however sharp it is.
 """
 
 import math
@@ -31,7 +31,18 @@ from refgi.rays import MISS, far_offset, ray_offset
 from refgi.sampling import hash_bits
 from refgi.scene import LightTable
 from refgi.truth.cell_walk import (
-    CHUNK, Found, Path, cell_at, column, fill_tops, found_at, found_up, go_down, next_top, on_face, plane_chance,
+    CHUNK,
+    Found,
+    Path,
+    cell_at,
+    column,
+    fill_tops,
+    found_at,
+    found_up,
+    go_down,
+    next_top,
+    on_face,
+    plane_chance,
 )
 from refgi.truth.light_square import ray_through
 from refgi.truth.lobe_cells import LobeCells
@@ -97,14 +108,14 @@ def picks_for(count: int) -> Picks:
 
 
 @kernel
-def near_density(directions: float, cos_x: float, image: float, sender: tuple[float, float, float]) -> float:
+def near_density(directions: float, cos_x: float, image: float, sender: tuple[float, float, float]) -> Any:
     """Return (n_a + n_c) r^2; `image`: k_c p_c D. `sender`: <g.-w>, d^2 (1 for a directional light), <g.l>."""
     return (directions * cos_x / np.pi + image) * sender[0] * sender[1] / max(sender[2], 1e-30)
 
 
 @kernel
 def rays_beside(beside: Beside, k: int, found: Found, r: int, way: tuple[tuple[float, float, float], float, float],
-                sender: tuple[float, float, float]) -> float:
+                sender: tuple[float, float, float]) -> Any:
     """Return (n_a + n_b + n_c) r^2 at a point of cells `found`; `way`: unit vector to it, its cosine, its length."""
     w, cosine, length = way
     image = 0.0
@@ -115,14 +126,14 @@ def rays_beside(beside: Beside, k: int, found: Found, r: int, way: tuple[tuple[f
 
 
 @kernel
-def even_density(cells: LobeCells, k: int, leaf: int, chance: float, picks: int) -> float:
+def even_density(cells: LobeCells, k: int, leaf: int, chance: float, picks: int) -> Any:
     """Return n_b in a leaf that is picked with a probability of `chance`."""
     share = (1 - EVEN) * chance * 4.0 ** cells.corner[leaf, 2] + EVEN / len(cells.squares.kind)
     return picks * share / cells.squares.measure[k]
 
 
 @kernel
-def image_of(cells: LobeCells, k: int, mirror: int, x: tuple[float, float, float]) -> Any:
+def image_of(cells: LobeCells, k: int, mirror: Any, x: tuple[float, float, float]) -> Any:
     """Return unit vector from x to the image of light k in a cell's mirror, and exponent + 1 of its lobe; 0: none."""
     m, squares = cells.tree.mirror, cells.squares
     n = (m[mirror, 3], m[mirror, 4], m[mirror, 5])
@@ -142,7 +153,7 @@ def image_of(cells: LobeCells, k: int, mirror: int, x: tuple[float, float, float
 
 
 @kernel
-def image_density(beside: Beside, k: int, mirror: int, r: int, w: tuple[float, float, float]) -> float:
+def image_density(beside: Beside, k: int, mirror: Any, r: int, w: tuple[float, float, float]) -> Any:
     """Return D(w), 1/sr."""
     u, sharpness = image_of(beside.cells, k, mirror, point_of(beside.receivers.position, r))
     if sharpness == 0:
@@ -232,7 +243,8 @@ def _send_into(cells: LobeCells, path: Path, level: int, top: int, sums: Array, 
     cell = np.int64(cells.node[rank])
     side = 2.0 ** -cells.corner[cell, 2]
     a, b = (cells.corner[cell, 0] + place[0]) * side, (cells.corner[cell, 1] + place[1]) * side
-    _send(cells, cells.light[rank], Found(cell, path.chance[level], mirror, chance), (a, b, place[2]), counts, ray, picks)
+    found = Found(cell, path.chance[level], mirror, chance)
+    _send(cells, cells.light[rank], found, (a, b, place[2]), counts, ray, picks)
 
 
 @kernel
@@ -250,7 +262,7 @@ def _send(cells: LobeCells, k: int, found: Found, place: tuple[float, float, flo
 
 
 @kernel
-def _send_to_image(beside: Beside, mirror: int, r: int, place: tuple[float, float], ray: int, picks: Picks) -> None:
+def _send_to_image(beside: Beside, mirror: Any, r: int, place: tuple[float, float], ray: int, picks: Picks) -> None:
     """Write the direction of c around the image of a light in a mirror."""
     receivers, paths, cells = beside.receivers, picks.paths, beside.cells
     k = cells.light[cells.tree.lobe[mirror]]

@@ -1,7 +1,7 @@
 """How a receiver finds its way in the cells of `refgi.truth.lobe_cells`, and with what probability.
 
-A receiver looks at all top groups of the tree, and goes down from those that its picks fall into, child by child, by what each may
-send it (`_expected`). Places of picks are evenly spaced with one random shift, in the order of the cells.
+A receiver looks at all top groups of the tree, and goes down from those that its picks fall into, child by child, by
+what each may send it (`_expected`). Places of picks are evenly spaced with one random shift, in the order of the cells.
 """
 
 from typing import Any, NamedTuple
@@ -34,10 +34,10 @@ class Path(NamedTuple):
 class Found(NamedTuple):
     """The cells that hold a place of a light's square."""
 
-    cell: int
-    chance: float  # of the cell, when one is picked
-    mirror: int  # the first group on the way down that mirrors the light; -1: none
-    mirror_chance: float
+    cell: Any  # int64
+    chance: Any  # of the cell, when one is picked
+    mirror: Any  # int64: the first group on the way down that mirrors the light; -1: none
+    mirror_chance: Any
 
 
 @kernel
@@ -66,7 +66,7 @@ def _expected(cell: Any, x: Any, n: Any) -> Any:
 
 
 @kernel
-def _of_node(tree: LobeTree, node: int, x: Any, n: Any) -> Any:
+def _of_node(tree: LobeTree, node: Any, x: Any, n: Any) -> Any:
     r = tree.row
     return _expected((r[node, 0], r[node, 1], r[node, 2], r[node, 3], r[node, 4], r[node, 5], r[node, 6], r[node, 7],
                       r[node, 8], r[node, 9], r[node, 10], r[node, 11], r[node, 12], r[node, 13]), x, n)
@@ -79,7 +79,7 @@ def column(rows: Array, i: int) -> tuple[Any, Any, Any]:
 
 
 @kernel
-def fill_tops(tree: LobeTree, x: Any, n: Any, found: Array, sums: Array) -> float:
+def fill_tops(tree: LobeTree, x: Any, n: Any, found: Array, sums: Array) -> Any:
     """Fill what each top group sends (t,), in SIMD lanes, and the sums (t + 1,) of those before; return the last."""
     c = tree.columns
     for t in range(len(found)):
@@ -118,7 +118,7 @@ def found_at(cells: LobeCells, k: int, y: tuple[float, float, float], g: tuple[f
 
 
 @kernel
-def cell_at(cells: LobeCells, k: int, a: float, b: float) -> int:
+def cell_at(cells: LobeCells, k: int, a: float, b: float) -> Any:
     """Return the cell of light k that holds a place of its square."""
     cell = np.int64(k)
     while cells.child[cell] >= 0:
@@ -128,7 +128,7 @@ def cell_at(cells: LobeCells, k: int, a: float, b: float) -> int:
 
 
 @kernel
-def on_face(cells: LobeCells, cell: int, y: tuple[float, float, float], g: tuple[float, float, float]) -> bool:
+def on_face(cells: LobeCells, cell: int, y: tuple[float, float, float], g: tuple[float, float, float]) -> Any:
     """Return whether a cell's lobe lies on about the same face as a point y with face normal g."""
     if cells.rank[cell] < 0:
         return False
@@ -162,7 +162,7 @@ def found_up(cells: LobeCells, cell: int, x: Any, n: Any, sums: Array) -> Found:
 
 
 @kernel
-def plane_chance(tree: LobeTree, top: int, sums: Array) -> float:
+def plane_chance(tree: LobeTree, top: int, sums: Array) -> Any:
     """Return the chance of the plane around a top group."""
     return (sums[tree.plane[top, 2]] - sums[tree.plane[top, 1]]) / sums[len(sums) - 1]
 

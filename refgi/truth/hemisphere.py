@@ -110,8 +110,8 @@ def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, 
     """Next-event estimation: write the shadow ray from each hit point to one light, and its contribution.
 
     `limits`: bound on G in units of 1 / footprint (0: none), measure of one light direction (sr or m^2), and the
-    tracer's grain: how far rays start above faces (m). `beside`: None where lobes come by directions alone. `shadows`: origins, directions, reach and contribution are
-    filled; the reach is 0 where nothing contributes.
+    tracer's grain: how far rays start above faces (m). `beside`: None where lobes come by directions alone. `shadows`:
+    origins, directions, reach and contribution are filled; the reach is 0 where nothing contributes.
     """
     count = len(paths.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):

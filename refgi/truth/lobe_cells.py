@@ -94,7 +94,8 @@ def _grown(source: _Source, k: int) -> list[_Level]:
     """Return a light's cells, size by size."""
     lights = len(source.scene.lights)
     base, left = max(1, int(np.log2(FIRST_CELLS / lights) / 2)), MOST_CELLS // lights
-    levels, corner = [], np.zeros((1, 3), np.int64)
+    levels: list[_Level] = []
+    corner: Array = np.zeros((1, 3), np.int64)
     for level in range(DEEPEST + 1):
         if level < base:
             lobe, split = Lobe.dark(len(corner)), np.ones(len(corner), np.bool_)
@@ -164,16 +165,16 @@ def _bend(surfaces: Surfaces, triangle: Array, radius: Array) -> Array:
     n = n / np.maximum(np.linalg.norm(n, axis=2), 1e-30)[..., None]
     sides = np.maximum(np.linalg.norm(v - np.roll(v, 1, axis=1), axis=2), 1e-30)
     turn = 2 * np.arcsin(np.minimum(0.5 * np.linalg.norm(n - np.roll(n, 1, axis=1), axis=2), 1))
-    return np.minimum((turn / sides).max(axis=1) * radius, np.pi / 2)
+    return np.asarray(np.minimum((turn / sides).max(axis=1) * radius, np.pi / 2))
 
 
 def _apart(one: Array, other: Array) -> Array:
     """Return the angle between unit vectors."""
-    return 2 * np.arcsin(np.minimum(0.5 * np.linalg.norm(one - other, axis=-1), 1))
+    return np.asarray(2 * np.arcsin(np.minimum(0.5 * np.linalg.norm(one - other, axis=-1), 1)))
 
 
 def _heights(light: Light, position: Array, normal: Array) -> Array:
     """Return how far a light lies above the plane that mirrors it, m; its cosine for a directional one, times inf."""
     if isinstance(light, DirectionalLight):
         return np.where(normal @ np.asarray(light.direction, np.float64) < 0, np.inf, -np.inf)
-    return ((np.asarray(light.position, np.float64) - position) * normal).sum(axis=1)
+    return np.asarray(((np.asarray(light.position, np.float64) - position) * normal).sum(axis=1))

@@ -18,8 +18,9 @@ from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS
 from refgi.scene import LightTable
-from refgi.truth.hemisphere import aim_at_light, shifted, toward_light
+from refgi.truth.hemisphere import shifted
 from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, comes_by_photons, density_on_axis
+from refgi.truth.next_event import aim_at_light, toward_light
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point, row
 from refgi.truth.surfaces import around, face_cross, lift, lobe_pattern, shading_normal
 from refgi.truth.textured import diffuse_at

@@ -131,7 +131,7 @@ def _split(lobes: Lobe) -> tuple[Array, list[_Groups]]:
         upper = np.where(alike[group], np.arange(len(group)) - cuts[group] >= (size // 2)[group], upper)
         left = np.where(alike, size // 2, left)
         order[member] = order[member][np.lexsort((upper, group))]
-        levels.append(_Groups(np.stack([start, start + left], axis=1).ravel(), np.stack([left, size - left], axis=1).ravel()))
+        levels.append(_Groups(*(np.stack(two, axis=1).ravel() for two in ((start, start + left), (left, size - left)))))
     return order, levels
 
 
@@ -144,7 +144,8 @@ def _tops(child: Array, lobes: Lobe) -> Array:
     """Open the group whose power is the most spread out, until there are enough."""
     extent = max(float(np.ptp(lobes.position[child < 0], axis=0).max()), 1e-30)
     loose = lobes.power * (np.minimum(lobes.spread, 2) ** 2 + (lobes.radius / extent) ** 2)
-    heap, done = [(-loose[0], 0)], []
+    heap: list[tuple[Any, int]] = [(-loose[0], 0)]
+    done: list[int] = []
     while heap and len(heap) + len(done) < TOPS:
         _, node = heapq.heappop(heap)
         if child[node] < 0:
@@ -174,10 +175,10 @@ def _pairs(lobes: Lobe) -> Lobe:
         lean = np.minimum(1, np.linalg.norm(vectors - mean[:, None], axis=2))
         return np.asarray((np.abs((apart * mean[:, None]).sum(axis=2)) + thick + two.radius * lean).max(axis=1))
 
-    return Lobe(position, (np.linalg.norm(apart, axis=2) + two.radius).max(axis=1), axis, cone(two.axis, axis, two.spread),
-                (share * two.width).sum(axis=1), total, facing, cone(two.facing, facing, two.tilt),
-                slab(two.facing, facing, two.thick), normal, cone(two.normal, normal, two.bend),
-                slab(two.normal, normal, two.offset), two.height.min(axis=1),
+    return Lobe(position, (np.linalg.norm(apart, axis=2) + two.radius).max(axis=1), axis,
+                cone(two.axis, axis, two.spread), (share * two.width).sum(axis=1), total, facing,
+                cone(two.facing, facing, two.tilt), slab(two.facing, facing, two.thick), normal,
+                cone(two.normal, normal, two.bend), slab(two.normal, normal, two.offset), two.height.min(axis=1),
                 np.where(two.light[:, 0] == two.light[:, 1], two.light[:, 0], -1))
 
 

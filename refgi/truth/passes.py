@@ -124,8 +124,8 @@ def _hemisphere(task: Task, words: Array, sums: Array) -> None:
         for bounce in range(task.settings.bounces):
             if bounce:
                 scatter(task.surfaces, task.tracer.grain, int(words[3 + bounce]), task.receivers, first, count, paths)
-            bound, beside = (task.settings.shared_bound, beside_of(task, first)) if bounce == 0 else (0.0, None)
-            follow(task, paths, first, count, bound, sums, beside)
+            beside = beside_of(task, first) if bounce == 0 and task.cells is not None else None
+            follow(task, paths, first, count, task.settings.shared_bound if bounce == 0 else 0.0, sums, beside)
 
 
 def follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums: Array,

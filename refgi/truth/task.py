@@ -41,7 +41,7 @@ class Task(NamedTuple):
 
     @property
     def counts(self) -> Counts:
-        """Samples of each receiver in a pass that meet senders' lobes; the light estimator alone knows no directions."""
+        """Samples of each receiver in a pass that meet senders' lobes; the light estimator knows no directions."""
         mirrors = self.picks // 2 if self.directions else 0
         return Counts(self.directions, self.picks - mirrors, mirrors)
 

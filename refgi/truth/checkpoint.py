@@ -50,7 +50,7 @@ class Checkpoint:
         If the file is damaged, belongs to another computation or cannot be written, before anything is computed.
     """
 
-    def __init__(self, path: Path, computation: bytes, values: int, blocks: int) -> None:
+    def __init__(self, path: Path, computation: bytes, values: int, blocks: int = 0) -> None:
         self._path, self._computation, self._warned = path, computation, False
         with _clear_errors(path, "a file in a folder that is there"):
             expect(path.parent.is_dir(), f"checkpoint {path}", "a file in a folder that is there", str(path.parent))

@@ -16,14 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.truth.tails import BINS, TRUSTED, count_tails, tail_index
+from refgi.truth.tails import BINS, TRUSTED, count_tails, doubt_of, share_in_doubt, tail_index
 
 Array = npt.NDArray[Any]
 
 BLOCK_SIDE = 8  # pixels
-HELP = ("more samples, estimator=combined, or caustics=true where lobes are sharp may help; else compare runs of "
-        "several seeds")
-DOUBTED = 0.2  # share of a picture's light in blocks of heavy tails: diffuse scenes come to 0.08 at most
 
 
 class Moments(NamedTuple):
@@ -33,7 +30,7 @@ class Moments(NamedTuple):
     mean: Array  # (3, n) float64
     squares: Array  # (3, n) float64, sums of squared deviations from the mean
     lost: Array  # (n,) int64: passes whose value was not a finite number
-    scale: Array  # () float64, the unit of the tails: the picture's mean in the first pass with light, W/m^2; 0 before
+    scale: Array  # () float64, the unit of the tails: median of the first pass with light, W/m^2; 0 before
     tails: Array  # (blocks, BINS) int32: how many values of receivers lie how far above the passes before
 
     @property
@@ -76,12 +73,7 @@ def picture_tail(moments: Moments) -> float:
 def is_doubted(moments: Moments, receivers: int) -> bool:
     """Return whether the error of a mean is not to be trusted, by its tails."""
     light = moments.mean[:, receivers:-1].mean(axis=0) * moments.tails.sum(axis=1)
-    return bool(doubt_of(picture_tail(moments), _share_in_doubt(tail_index(moments.tails), light)))
-
-
-def _share_in_doubt(index: Array, light: Array) -> float:
-    total = float(light.sum())
-    return float((light * (index > TRUSTED)).sum()) / total if total > 0 else 0.0
+    return bool(doubt_of(picture_tail(moments), share_in_doubt(tail_index(moments.tails), light)))
 
 
 def blocks_of(pixel: Array, shape: tuple[int, ...]) -> tuple[Array, tuple[int, int]]:
@@ -185,7 +177,7 @@ class TruthResult(NamedTuple):
     @property
     def blocks_in_doubt(self) -> float:
         """Share of the picture's light that lies in blocks of 8 x 8 pixels whose tail index is above 0.7."""
-        return _share_in_doubt(self.block_tail_index, self.block_mean.mean(axis=0) * self.block_pixels)
+        return share_in_doubt(self.block_tail_index, self.block_mean.mean(axis=0) * self.block_pixels)
 
     @property
     def doubt(self) -> str:
@@ -228,23 +220,11 @@ class TruthResult(NamedTuple):
         return float(np.sqrt((variance.mean(axis=0) * weight).sum() / total) / scale)
 
 
-def doubt_of(index: float, share: float) -> str:
-    """Return why an error is not to be trusted, and what helps; empty where nothing speaks against it.
-
-    `index`: tail index of the picture; NaN where not known. `share`: of the light that lies in blocks in doubt.
-    """
-    if not (index > TRUSTED or share > DOUBTED):
-        return ""
-    heavy = (f"the largest contributions have tail index k = {index:.2f} > {TRUSTED}" if index > TRUSTED else
-             f"{share:.0%} of the light lies in blocks whose largest contributions have a tail index above {TRUSTED}")
-    return f"the error is not to be trusted: {heavy}; {HELP}"
-
-
 def result_of(moments: Moments, pixel: Array, shape: tuple[int, ...], blocks: tuple[Array, tuple[int, int]],
               per_pass: int) -> TruthResult:
     """Return moments as pictures.
 
-    `moments`: of receivers, blocks and picture, with tails. `pixel` (r,): flat index of each receiver into the picture. `shape`:
+    `moments`: of receivers, blocks and picture. `pixel` (r,): flat index of each receiver into the picture. `shape`:
     rows and columns of the picture. `blocks`: block of each receiver; rows and columns of blocks. `per_pass`: samples
     of each receiver in a pass.
     """
@@ -260,3 +240,22 @@ def result_of(moments: Moments, pixel: Array, shape: tuple[int, ...], blocks: tu
     return TruthResult(mean, variance, samples, moments.mean[:, -1].copy(), variance_of_mean[:, -1].copy(), passes,
                        block_mean, block_variance, counts, int(moments.lost[:r].sum()), picture_tail(moments),
                        tail_index(moments.tails).reshape(grid))
+
+
+def doubt_of_both(irradiance: TruthResult, lobes: TruthResult | None) -> str:
+    """Return why the error of a truth is not to be trusted, that of receivers' lobes included.
+
+    Parameters
+    ----------
+    irradiance : TruthResult
+        What arrives.
+    lobes : TruthResult or None
+        What lobes make of it, where a glossy surface is seen.
+
+    Returns
+    -------
+    str
+        Empty where nothing speaks against either.
+    """
+    of_lobes = "" if lobes is None or not lobes.doubt else f"lobes of receivers: {lobes.doubt}"
+    return "; ".join(said for said in (irradiance.doubt, of_lobes) if said)

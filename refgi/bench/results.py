@@ -18,8 +18,8 @@ from refgi.image import write_text
 FORMAT = "bench 1"
 LIMITED = ("unoccluded", "seen", "seen_unoccluded")  # truths of which nothing blocks light, whose senders are in view
 COLUMNS = ("scene", "method", "settings", "seconds", "fastest", "slowest", "rmse", "low", "high", "bias", "spread",
-           "noise", *(f"rmse_{name}" for name in LIMITED), "pairs", "rays", "bytes", "peak_bytes", "flip", "ssim",
-           "against_truth_in_equal_time", "on_the_front", "refgi_format")
+           "noise", "in_doubt", *(f"rmse_{name}" for name in LIMITED), "pairs", "rays", "bytes", "peak_bytes", "flip",
+           "ssim", "against_truth_in_equal_time", "on_the_front", "refgi_format")
 
 
 class _Strict(pydantic.BaseModel):

@@ -65,6 +65,19 @@ def test_compare(tmp_path, evidence):
     evidence(f"results.json: k = {stated['tail_index']:.2f}, {stated['statement']}")
 
 
+def test_what_would_be_noise_is_not_called_so(monkeypatch):
+    rough = [part for key in ("samples=1", "picks=1", "estimator=light") for part in ("--set", f"truth.{key}")]
+
+    def noises():
+        done = refgi("compare", "cornell_box", "--size", "24x18", "--methods", "vpl", *rough, "--json")
+        figures = json.loads(done.stdout)["methods"]["vpl"]["against"]["truth"]["figures"]
+        return {name for name, one in figures.items() if one["is_noise"]}
+
+    assert "rmse" in noises()
+    monkeypatch.setattr(TruthResult, "doubt", property(lambda _: SAID))
+    assert noises() == set()
+
+
 def test_nothing_is_within_a_noise_that_is_not_trusted():
     mean = np.full((3, 8, 8), 2.0)
     trusted, not_trusted = (measure(mean + 0.01, mean, 0.01 * mean, trusted=one).figures for one in (True, False))

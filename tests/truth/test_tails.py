@@ -17,17 +17,21 @@ SIZE = 48
 
 
 def exact(values):
-    """Return the tail index of PSIS by raw values: Zhang and Stephens 2009, prior of Vehtari et al. 2024."""
+    """Return the tail index of PSIS by raw values (Vehtari et al. 2024)."""
     x = np.sort(values)
     count = math.ceil(min(len(x) / 5, 3 * math.sqrt(len(x))))
-    tail = x[-count:] - x[-count - 1]
+    return shape(x[-count:] - x[-count - 1])
+
+
+def shape(excess):
+    """Return the shape of a generalised Pareto distribution: Zhang and Stephens 2009, with the prior of PSIS."""
+    count = len(excess)
     size = 30 + int(math.sqrt(count))
-    quarter = tail[int(count / 4 + 0.5) - 1]
-    theta = 1 / tail[-1] + (1 - np.sqrt(size / (np.arange(size) + 0.5))) / (3 * quarter)
-    k = np.log1p(-np.outer(theta, tail)).mean(axis=1)
+    theta = 1 / excess[-1] + (1 - np.sqrt(size / (np.arange(size) + 0.5))) / (3 * excess[int(count / 4 + 0.5) - 1])
+    k = np.log1p(-np.outer(theta, excess)).mean(axis=1)
     likelihood = count * (np.log(-theta / k) - k - 1)
     weight = np.exp(likelihood - likelihood.max())
-    k = np.log1p(-(theta * weight).sum() / weight.sum() * tail).mean()
+    k = np.log1p(-(theta * weight).sum() / weight.sum() * excess).mean()
     return (count * k + 5) / (count + 10)
 
 
@@ -78,16 +82,24 @@ def test_each_value_counts_in_its_bin():
 
 def test_counts_are_of_deviations_over_the_first_light_block_by_block():
     moments, block = no_passes(5, 2), np.array([1, 0, 1])
-    passes = np.array([[0.0, 0, 0], [3, 0, np.nan], [1.5, 4.5, 3], [3, 7.5, 1]])
-    for values in passes:
+    for values in ([6, 0, 0], [np.nan, 0, 3], [3, 9, 0], [12, 9, 6]):
         add_pass(moments, np.broadcast_to(np.append(values, [0, 0]), (3, 5)), block)
-    assert moments.scale == 3  # median of the lit values of the first pass with light
-    found = [{bin_of: int(row[bin_of]) for bin_of in np.flatnonzero(row)} for row in moments.tails]
-    octave = 16 * 8 + 1  # bin of 1
-    # of the unit: pixel 1: 0, 1.5 (4.5 above 0), 2 (7.5 above 1.5); pixel 0: 1 (3 from 0), 0 (1.5 as the mean), 0.5 (3
-    # above 1.5); pixel 2: 1 (3 from 0, its first), then below the mean
-    assert found[0] == {0: 1, octave + 4: 1, octave + 8: 1}
-    assert found[1] == {0: 2, octave - 8: 1, octave: 2}
+    assert moments.scale == 6  # median of the lit values of the first pass with light
+    found = [{place: int(row[place]) for place in np.flatnonzero(row)} for row in moments.tails]
+    one = 16 * 8 + 1  # bin of 1
+    assert found[0] == {0: 1, one + 4: 1, one: 1}  # of the unit: 0, 1.5 (9 above 0) and 1 (9 above 3)
+    # 0.5 (3 from 6, its second) and 1.25 (12 above 4.5); 0.5 (3 from 0), less, and 0.83 (6 above 1)
+    assert found[1] == {0: 1, one - 8: 2, one + 2: 1, one - 8 + 5: 1}
+
+
+@pytest.mark.parametrize("alpha", [0.6, 1.4, 4.0])
+def test_the_fit_is_that_of_as_many_values_in_the_middle_of_their_bins(alpha):
+    tails = counted(np.random.default_rng(11).pareto(alpha, 900) + 1)
+    edges = np.array([2.0**octave * (1 + part / 8) for octave in range(-16, 24) for part in range(8)] + [2.0**24])
+    above = np.cumsum(tails[0, ::-1])[::-1]
+    first = np.flatnonzero(above >= 3 * math.sqrt(900))[-1]
+    middles = 0.5 * (edges[first - 1 : -1] + edges[first:]) - edges[first - 1]
+    assert tail_index(tails)[0] == pytest.approx(shape(np.repeat(middles, tails[0, first:])), abs=1e-9)
 
 
 @pytest.mark.parametrize("burst", [0, 1, 5])
@@ -194,6 +206,8 @@ def result(index, blocks, mean=1.0):
 
 
 def test_what_is_said():
+    uneven = result(0.3, [0.9, 0.1])._replace(block_pixels=np.array([[4, 64]]))
+    assert uneven.blocks_in_doubt == pytest.approx(4 / 68)
     fine = result(0.31, [0.1, 0.8, 0.2, 0.3, math.nan])
     assert fine.blocks_in_doubt == pytest.approx(0.2)
     assert (fine.is_trusted, fine.doubt) == (True, "")

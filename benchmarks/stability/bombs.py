@@ -190,6 +190,6 @@ BOMBS: dict[str, dict[str, Make]] = {
                     "passes": _bytes(lambda: GRID.decode().replace("[2, 8]", str(list(range(2, MANY)))))},
     "path": TOML | {"keys": _bytes(lambda: "[[camera]]\nat = 0.5\neye = [0.0, 1.0, 3.0]\n" * 5_000),
                     "lights": _bytes(lambda: PATH.decode() + "[[lights]]\nlight = 9\nkeys = [{at = 0.0}]\n" * 5_000)},
-    "checkpoint": {"4 TB": _checkpoint(1 << 42), "sound length": _checkpoint(25 + 64 + 8 * (1 + 7 * VALUES)),
+    "checkpoint": {"4 TB": _checkpoint(1 << 42), "sound length": _checkpoint(25 + 64 + 8 * (2 + 7 * VALUES)),
                    "zeros": lambda path: _sparse(path, 1 << 40)},
 }

@@ -63,7 +63,7 @@ def changed_checkpoint(rng: np.random.Generator) -> Case:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "passes.truth"
         content = bytearray(_saved(rng, path))
-        moments = len(content) - 8 * 7 * VALUES  # means, squares, values left out
+        moments = len(content) - 8 * (7 * VALUES + 1)  # means, squares, values left out, unit of tails
         bit = int(rng.integers(0, 52)) + 64 * int(rng.integers(0, 6 * VALUES))  # of a mantissa: numbers stay finite
         content[moments + bit // 8] ^= 1 << bit % 8
         path.write_bytes(content)

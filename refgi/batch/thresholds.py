@@ -101,17 +101,22 @@ def broken(thresholds: Collection[Threshold], result: Result, *, whole: bool = T
     Returns
     -------
     list of Finding
-        One for each figure that is missed, or that is not there although its threshold speaks of it.
+        One for each figure that is missed, or that is not there although its threshold speaks of it, or that is judged
+        by a truth whose error is not to be trusted.
     """
     found = []
     for one in thresholds:
         values = list(_values(one, result))
         if not values and whole:
             found.append(Finding(one.key, one.figure, f"expected {one.sign} {one.bound:g}, nothing was measured"))
-        for place, value, picture in values:
+        for place, value, picture, in_doubt in values:
             if value is None or not COMPARISONS[one.sign](value, one.bound):
                 text = "is not known" if value is None else f"is {value:.4g}"
                 found.append(Finding(place, one.figure, f"{text}, expected {one.sign} {one.bound:g}",
+                                     () if picture is None else (picture,)))
+            elif in_doubt:
+                found.append(Finding(place, one.figure, f"is {value:.4g}, expected {one.sign} {one.bound:g}, but in "
+                                     "doubt: the truth's error is not to be trusted",
                                      () if picture is None else (picture,)))
     return found
 
@@ -145,17 +150,26 @@ def place_of(scene: str, method: str, label: str) -> str:
     return f"{scene}.{method} ({label})"
 
 
-def _values(one: Threshold, result: Result) -> Iterator[tuple[str, float | None, str | None]]:
-    """Yield place, value and picture of each figure that a threshold speaks of."""
+def _values(one: Threshold, result: Result) -> Iterator[tuple[str, float | None, str | None, bool]]:
+    """Yield place, value and picture of each figure that a threshold speaks of, and whether it is in doubt."""
+    runs = [(scene, run) for scene in result.scenes for run in _runs(scene) if run.method == one.method
+            and (scene.scene == one.scene or scene.scene.startswith(f"{one.scene}{FRAME}"))]
     if one.figure in OVER_TIME:
         for way in result.paths:
             if (way.scene, way.method) == (one.scene, one.method) and one.label in (None, way.label):
-                yield place_of(way.scene, way.method, way.label), getattr(way, one.figure), None
+                doubted = any(_in_doubt(run, one.figure) for _, run in runs if run.label == way.label)
+                yield place_of(way.scene, way.method, way.label), getattr(way, one.figure), None, doubted
         return
-    for scene in result.scenes:
-        if scene.scene == one.scene or scene.scene.startswith(f"{one.scene}{FRAME}"):
-            yield from ((place_of(scene.scene, run.method, run.label), figure_of(run, one.figure), run.picture)
-                        for run in _runs(scene) if run.method == one.method and one.label in (None, run.label))
+    for scene, run in runs:
+        if one.label in (None, run.label):
+            yield (place_of(scene.scene, run.method, run.label), figure_of(run, one.figure), run.picture,
+                   _in_doubt(run, one.figure))
+
+
+def _in_doubt(run: Run, figure: str) -> bool:
+    """Return whether a figure rests on a reference whose error is not to be trusted."""
+    judge = "unoccluded" if figure == "rmse_unoccluded" else "truth"
+    return figure != "seconds" and judge in run.errors and run.errors[judge].in_doubt
 
 
 def _runs(scene: SceneResult) -> tuple[Run, ...]:

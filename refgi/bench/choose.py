@@ -51,6 +51,7 @@ class Chosen(NamedTuple):
     found: Found
     skips: tuple[tuple[str, str], ...]  # stages that the best leaves out on this scene, and why
     truth: str  # how well it is known
+    doubt: str = ""  # why its error is not to be trusted: then nothing is known to meet a wish
 
 
 def choose(
@@ -79,7 +80,8 @@ def choose(
     Returns
     -------
     Chosen
-        The best, all that was tried, and what the best leaves out.
+        The best, all that was tried, and what the best leaves out; no best where the truth's error is not to be
+        trusted.
 
     Raises
     ------
@@ -99,7 +101,8 @@ def choose(
         found = for_error(tracks, wish.error, small, full)
     else:
         found = for_time(tracks, wish.seconds or 0.0, small, full)
-    return Chosen(found, full.skips(found.best.choice) if found.best else (), full.truth)
+    found = found._replace(best=None) if full.doubt else found
+    return Chosen(found, full.skips(found.best.choice) if found.best else (), full.truth, full.doubt)
 
 
 class Pictures:
@@ -130,7 +133,7 @@ class Pictures:
                "a view past all of it")
         self._size = f"{self.frame.width}x{self.frame.height}"
         self._reference = traced(self.frame, truth, lambda what, done: tell(f"{self._size}: {what}", done))
-        self.truth = self._reference.statement
+        self.truth, self.doubt = self._reference.statement, self._reference.doubt
         self._known: dict[Choice, _Run] = {}
 
     def seconds(self, choice: Choice) -> float:

@@ -33,6 +33,7 @@ from refgi.provenance import Record, estimate_record, method_record, plain
 from refgi.scene import Scene
 from refgi.settings import Settings, from_text, leaves
 from refgi.truth import TruthSettings, trace_truth
+from refgi.truth.result import doubt_of_both
 
 Array = npt.NDArray[Any]
 Tell = Callable[[str, float], None]
@@ -55,6 +56,7 @@ class Reference(NamedTuple):
     samples: Array  # (h, w)
     record: Record  # of its own
     lobes: Any = None  # `TruthResult` of receivers' lobes by indirect light, W/m^2/sr, where a glossy surface is seen
+    doubt: str = ""  # why its error is not to be trusted, that of its lobes included
 
     @property
     def lobe_planes(self) -> dict[str, Array]:
@@ -150,9 +152,11 @@ def traced(frame: Frame, settings: TruthSettings, tell: Tell) -> Reference:
         found = trace_truth(frame, settings)
         lobes, lobe_estimate = METHODS[TRUTH].compute_lobes(frame, settings)
     radiance = frame.radiance(np.asarray(found.mean, frame.dtype), lobes)
-    estimate = estimate_record(found)
-    return Reference(found.mean, found.variance_of_mean, radiance, estimate["estimate"]["statement"], found.samples,
-                      {**method_record(TRUTH, settings), **estimate}, lobe_estimate)
+    statement = found.error_statement if lobe_estimate is None or not lobe_estimate.doubt else (
+        f"{found.error_statement}; lobes: {lobe_estimate.doubt}")
+    return Reference(found.mean, found.variance_of_mean, radiance, statement, found.samples,
+                     {**method_record(TRUTH, settings), **estimate_record(found, lobe_estimate)}, lobe_estimate,
+                     doubt_of_both(found, lobe_estimate))
 
 
 def _write(writer: Writer, references: Mapping[str, Reference]) -> None:
@@ -272,7 +276,8 @@ def with_seed(settings: Settings, seed: int) -> Settings:
 def judged(choice: Choice, made: Made, references: Mapping[str, Reference], frame: Frame) -> Run:
     """Return all figures of a choice's pictures; `references` by name, the truth among them."""
     covered = frame.gbuffer.covered
-    errors = {name: figures_of(error_of(made.pictures, references[name].mean, references[name].variance, covered))
+    errors = {name: figures_of(error_of(made.pictures, references[name].mean, references[name].variance, covered),
+                               in_doubt=bool(references[name].doubt))
               for name in references_of(choice) if name in references}
     figures = measure(made.pictures[0], references[TRUTH].mean, references[TRUTH].variance, covered).figures
     seen = flip(frame.radiance(made.pictures[0], made.lobes), references[TRUTH].radiance, covered)

@@ -89,8 +89,8 @@ def _scene(scene: SceneResult, number: int, view: int | None, record: Record) ->
     runs = sorted(named(scene, number), key=lambda one: one[1].seconds)
     cold = {name: f"{one:.3g} s" for name, one in scene.cold.items()}
     return {"name": scene.scene, "number": number, "cold": cold, "size": f"{scene.width} x {scene.height}",
-            "truth": scene.truth, "plot": Markup(plot_of(scene, number)), "splits": splits_of(scene.splits),
-            "said": list(said_of(scene)), "failures": scene.failures, "view": view,
+            "truth": scene.truth, "doubts": scene.doubts, "plot": Markup(plot_of(scene, number)),
+            "splits": splits_of(scene.splits), "said": list(said_of(scene)), "failures": scene.failures, "view": view,
             "rows": [_row(name, run) for name, run in runs], "provenance": list(provenance_of(record)),
             "made": [_made(run) for _, run in runs]}
 

@@ -18,8 +18,8 @@ from refgi.image import write_text
 FORMAT = "bench 1"
 LIMITED = ("unoccluded", "seen", "seen_unoccluded")  # truths of which nothing blocks light, whose senders are in view
 COLUMNS = ("scene", "method", "settings", "seconds", "fastest", "slowest", "rmse", "low", "high", "bias", "spread",
-           "noise", *(f"rmse_{name}" for name in LIMITED), "pairs", "rays", "bytes", "peak_bytes", "flip", "ssim",
-           "against_truth_in_equal_time", "on_the_front", "refgi_format")
+           "noise", "in_doubt", *(f"rmse_{name}" for name in LIMITED), "pairs", "rays", "bytes", "peak_bytes", "flip",
+           "ssim", "against_truth_in_equal_time", "on_the_front", "refgi_format")
 
 
 class _Strict(pydantic.BaseModel):
@@ -28,6 +28,8 @@ class _Strict(pydantic.BaseModel):
 
 class Figures(_Strict):
     """Errors over the mean of the reference (`refgi.bench.error.Error`); None where not known."""
+
+    in_doubt: bool = False  # the reference's own error is not to be trusted
 
     rmse: float | None
     low: float | None
@@ -143,6 +145,13 @@ class SceneResult(_Strict):
     cold: dict[str, float] = {}  # s to the first frame of a new process, by method, kernels in the cache
     splits: tuple[Split, ...] = ()
 
+    @property
+    def doubts(self) -> list[str]:
+        """What is not known: a sentence for each reference whose error is not to be trusted."""
+        names = {name: None for run in (*self.runs, *self.line) for name, one in run.errors.items() if one.in_doubt}
+        return [f"the error of the {'truth' if name == 'truth' else f'truth ({name})'} is not to be trusted, nor are "
+                "figures against it" for name in names]
+
 
 class PathResult(_Strict):
     """One method with one choice of settings over all frames of a path (`refgi.batch.temporal`)."""
@@ -170,20 +179,22 @@ class Result(_Strict):
     paths: tuple[PathResult, ...] = ()  # of a batch along a path
 
 
-def figures_of(error: Error) -> Figures:
+def figures_of(error: Error, *, in_doubt: bool = False) -> Figures:
     """Return an error as data.
 
     Parameters
     ----------
     error : Error
         Figures, nan and infinity among them.
+    in_doubt : bool
+        Whether the error of the reference is not to be trusted.
 
     Returns
     -------
     Figures
         None in their place.
     """
-    return Figures(**{key: known(value) for key, value in error._asdict().items()})
+    return Figures(**{key: known(value) for key, value in error._asdict().items()}, in_doubt=in_doubt)
 
 
 def known(value: float) -> float | None:
@@ -282,6 +293,7 @@ def markdown(result: Result) -> str:
     lines = [f"<!-- refgi {result.refgi} -->", ""]
     for scene in result.scenes:
         lines += [f"## {scene.scene}, {scene.width} x {scene.height}", "", scene.truth, "",
+                  *(line for doubt in scene.doubts for line in (f"**{doubt}**", "")),
                   "| method | settings | ms | RMSE % | bias % | spread % | own limits % | over truth in equal time | "
                   "pairs, M | rays, M | stages, MiB | peak, MiB | front |",
                   "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|"]

@@ -94,7 +94,9 @@ def _batch(session: Session, /, plan_file: str, out: str, parents: bool, force: 
     whole = not (options["since"] or _open_jobs(request._replace(jobs=request.all_jobs, retry=False)))
     findings = [*broken(plan.thresholds, result, whole=whole), *(worse(
         result, baseline, options["tolerance"], folder_of(options["baseline"])) if baseline else [])]
-    return say_done(session, Done(len(request.jobs), begun, failures_of(result), findings, out), options["form"])
+    doubts = [f"{scene.scene}: {doubt}" for scene in result.scenes for doubt in scene.doubts]
+    return say_done(session, Done(len(request.jobs), begun, failures_of(result), findings, out, doubts),
+                    options["form"])
 
 
 command = _batch

@@ -25,6 +25,7 @@ class Done(NamedTuple):
     failures: dict[str, str]  # why jobs gave no picture, by what is said of them
     findings: "list[Finding]"
     out: str
+    doubts: list[str]  # truths whose error is not to be trusted
 
 
 def say_done(session: Session, done: Done, form: str) -> int:
@@ -51,10 +52,13 @@ def say_done(session: Session, done: Done, form: str) -> int:
         text = f"{name} gave no picture: {why}"
         lines += [annotation("refgi: no picture", text)] if github else []
         say(text)
+    for doubt in done.doubts:
+        lines += [annotation("refgi: in doubt", doubt)] if github else []
+        say(doubt)
     for finding in done.findings:
         lines += [annotation(f"refgi: {finding.place} {finding.figure}", str(finding))] if github else []
         say(str(finding))
-    content = {"jobs": done.jobs, "done_now": done.begun, "failures": done.failures,
+    content = {"jobs": done.jobs, "done_now": done.begun, "failures": done.failures, "doubts": done.doubts,
                "findings": [finding._asdict() for finding in done.findings], "out": done.out}
     lines += [] if github else [f"refgi report {done.out} shows times, errors and pictures"]
     session.result("\n".join(lines), content)

@@ -86,8 +86,8 @@ def _bench(
             write_page(result, path)
     lines = [f"{one.scene}: {said}" for one in made for said in said_of(one)]
     failures = [f"{one.scene}: {name} gave no picture: {why}" for one in made for name, why in one.failures.items()]
-    for failure in failures:
-        say(failure)
+    for said in (*failures, *(f"{one.scene}: {doubt}" for one in made for doubt in one.doubts)):
+        say(said)
     session.result("\n".join([markdown(result), *lines, "", f"open {out.rstrip('/')}/index.html"]),
                    result.model_dump(mode="json"))
     return FAILED if failures else DONE

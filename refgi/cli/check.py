@@ -42,7 +42,7 @@ def _check(
     Channels irradiance.R, .G, .B are compared with indirect irradiance (W/m^2), else R, G, B with radiance. The scene
     is rendered at the picture's size.
 
-    Exit codes: 0 within the tolerance or the noise, 1 not.
+    Exit codes: 0 within the tolerance or the noise, 1 not, or by a truth whose error is not to be trusted.
     """
     from refgi import stages
     from refgi.cli.memory import require_memory
@@ -52,6 +52,7 @@ def _check(
     from refgi.cli.warm import warm_up
     from refgi.errors import expect
     from refgi.methods import render
+    from refgi.truth.result import doubt_of_both
     from refgi.vectors.pictures import judge_picture
 
     got, kind = _read(Path(picture))
@@ -69,11 +70,14 @@ def _check(
         variance = variance * (made.frame.gbuffer.albedo / math.pi) ** 2  # L = albedo / pi E
     verdict = judge_picture(got, made.radiance if kind == "radiance" else made.irradiance, variance,
                             tolerance=tolerance)
-    lines = [f"{picture}: {kind} {'is' if verdict.close else 'is not'} that of {scene.name} by {method}", verdict.said,
-             *(f"likely: {one}" for one in verdict.causes)]
+    lobes = made.lobe_estimate if kind == "radiance" else None
+    doubt = "" if made.estimate is None else doubt_of_both(made.estimate, lobes)
+    what = "is not" if not verdict.close else "is not known to be" if doubt else "is"
+    lines = [f"{picture}: {kind} {what} that of {scene.name} by {method}", verdict.said,
+             *([f"{method}: {doubt}"] if doubt else []), *(f"likely: {one}" for one in verdict.causes)]
     session.result("\n".join(lines), {"picture": picture, "scene": scene.name, "method": method, "compared": kind,
-                                      **verdict._asdict()})
-    return DONE if verdict.close else FAILED
+                                      **verdict._asdict(), "trusted": not doubt})
+    return DONE if verdict.close and not doubt else FAILED
 
 
 command = _check

@@ -133,6 +133,7 @@ def _content(chosen: "Chosen", wish: "Wish", line: str | None) -> dict[str, Any]
     found = chosen.found
     return {"wish": wish._asdict(), "best": None if found.best is None else plain(found.best), "line": line,
             "skips": [{"stage": name, "reason": reason} for name, reason in chosen.skips], "truth": chosen.truth,
+            "trusted": not chosen.doubt,
             "judged": [plain(one) for one in found.judged], "small": [plain(one) for one in found.small]}
 
 
@@ -145,7 +146,7 @@ def _text(chosen: "Chosen", wish: "Wish", line: str | None) -> str:
 
     found = chosen.found
     asked = f"an error of {100 * wish.error:.3g} %" if wish.error else f"{number(1e3 * (wish.seconds or 0))} ms"
-    parts = [f"nothing meets {asked}"]
+    parts = [f"nothing is known to meet {asked}: {chosen.doubt}" if chosen.doubt else f"nothing meets {asked}"]
     if found.best is not None:
         parts = [f"{found.best.choice.method}, {found.best.choice.label}: {100 * found.best.error:.3g} % in "
                  f"{number(1e3 * found.best.seconds)} ms, wished for {asked}"]

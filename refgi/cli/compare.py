@@ -97,6 +97,9 @@ def _report(session: Session, comparison: "Comparison", out: str | None) -> None
         say("there is no indirect light in this scene: the truth is wholly black")
     if bad := count_non_finite(comparison.truth.irradiance, comparison.covered):
         say(f"{bad} pixels of the truth are NaN or infinite")
+    for reference in comparison.references.values():
+        for doubt in reference.doubts:
+            say(f"{comparison.scene.name}: {doubt}")
     for name, result in comparison.results.items():
         if bad := result.against["truth"].non_finite:
             say(f"{name}: {bad} pixels are NaN or infinite")

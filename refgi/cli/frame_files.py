@@ -50,7 +50,7 @@ class FrameFiles(NamedTuple):
         record = self.record_of(number)
         spread: tuple[Any, Any] = (None, None)
         if estimate is not None:
-            record |= estimate_record(estimate)
+            record |= estimate_record(estimate, lobe_estimate)
             spread = estimate.variance_of_mean, estimate.samples
         lobe_variance = None if lobe_estimate is None or step.lobes is None else lobe_estimate.variance_of_mean
         make(self.folder)

@@ -13,7 +13,7 @@ from refgi.scene.mesh import BYTES_OF_ALPHA, BYTES_OF_COLOUR
 
 # From peaks measured at 1024^2 and 2048^2, rounded up by a third; the truth keeps moments in float64.
 PIXEL_FLOATS = 32  # G-buffer, visibility, direct and indirect light, radiance, and their temporaries
-TRUTH_PIXEL_BYTES = 250  # receivers, moments, results
+TRUTH_PIXEL_BYTES = 280  # receivers, moments, tails, results
 COMPARED_PIXEL_BYTES = 90  # a method's or reference's pictures, maps and figures
 TEXEL_FLOATS = 36
 FACE_BYTES = 460  # vertices, faces, clusters, Embree's tree

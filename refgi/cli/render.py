@@ -97,7 +97,9 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     size = "x".join(map(str, content["size"]))
     text = f"{job.scene.name} by {job.method}: {size} in {seconds:.2f} s"
     text += f" -> {', '.join(content['files'])}" if files.files else ""
-    text += f"\n{record['estimate']['statement']}" if "estimate" in record else ""
+    stated = record.get("estimate", {})
+    text += f"\n{stated['statement']}" if stated else ""
+    text += f"\nlobes: {stated['lobes']['statement']}" if "lobes" in stated else ""
     if again is not None:
         other = differences(Path(again), planes)
         content["again"] = {"file": again, "same": not other, "differs": other}
@@ -119,7 +121,7 @@ def _record(job: "Job", picture: "Picture") -> "Record":
     if job.still is not None:
         record |= job.still.record
     if estimate is not None:
-        record |= estimate_record(estimate)
+        record |= estimate_record(estimate, picture.lobe_estimate)
     return record
 
 

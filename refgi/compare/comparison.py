@@ -133,7 +133,7 @@ class _Runner:
         result, shown, lobes = made
         radiance = self.frame.radiance(np.asarray(result.mean, self.frame.dtype), shown)
         return Reference(name, settings, result.mean, result.variance_of_mean, result.picture_variance, result.samples,
-                         radiance, seconds, runs, estimate_record(result), lobes)
+                         radiance, seconds, runs, estimate_record(result, lobes), lobes, result.doubt)
 
     def method(
         self, name: str, settings: Any, references: Mapping[str, Reference], *, accounts: bool,
@@ -151,10 +151,10 @@ class _Runner:
         radiance, covered = self.frame.radiance(irradiance, lobes), self.frame.gbuffer.covered
         judges = [TRUTH] if method.knows_visibility(settings) else [TRUTH, UNOCCLUDED]
         against = {j: measure(irradiance, references[j].irradiance, references[j].variance, covered,
-                              references[j].mean_variance) for j in judges}
+                              references[j].mean_variance, trusted=not references[j].doubt) for j in judges}
         shown = {j: references[j].lobes for j in judges if references[j].lobes is not None}
         lobes_against = {} if lobes is None else {
-            j: measure(lobes, one.mean, one.variance_of_mean, covered, _over_all(one, covered))
+            j: measure(lobes, one.mean, one.variance_of_mean, covered, _over_all(one, covered), trusted=not one.doubt)
             for j, one in shown.items()}
         seen = flip(radiance, references[TRUTH].radiance, covered)
         account = method.ledger if accounts else None

@@ -59,7 +59,7 @@ class Measurement:
 
 
 def measure(image: Array, reference: Array, variance: Array | None = None, covered: Array | None = None,
-            mean_variance: Array | None = None) -> Measurement:
+            mean_variance: Array | None = None, *, trusted: bool = True) -> Measurement:
     """Compute every figure, and beside it what the reference's noise alone would give.
 
     Parameters
@@ -73,6 +73,8 @@ def measure(image: Array, reference: Array, variance: Array | None = None, cover
     mean_variance : (3,) ndarray, optional
         Variance of the mean over covered pixels of each channel, which knows how pixels' errors go together; where
         absent they count as independent.
+    trusted : bool
+        Whether that variance can be trusted: without, no figure is called noise.
 
     Returns
     -------
@@ -92,7 +94,7 @@ def measure(image: Array, reference: Array, variance: Array | None = None, cover
         noise = {} if variance is None else noise_figures(image, reference, variance, mask, mean_variance)
         x, r = (row.reshape(3, 1, -1) for row in samples(image, reference, mask))  # gathered once for all but SSIM
         values = {name: f(image, reference, mask) if name == "ssim" else f(x, r, None) for name, f in METRICS.items()}
-        figures = {name: _figure(name, value, noise.get(name, math.nan)) for name, value in values.items()}
+        figures = {name: _figure(name, value, noise.get(name, math.nan), trusted) for name, value in values.items()}
     return Measurement(figures, int(mask.sum()), bad, bad_reference)
 
 
@@ -136,14 +138,14 @@ def noise_figures(image: Array, reference: Array, variance: Array, covered: Arra
     }
 
 
-def _figure(name: str, value: float, noise: float) -> Figure:
+def _figure(name: str, value: float, noise: float, trusted: bool) -> Figure:
     if name == "psnr":
         is_noise = value >= noise - 10 * math.log10(NOISE_MARGIN)
     elif name == "ssim":
         is_noise = 1 - value <= NOISE_MARGIN * (1 - noise)
     else:
         is_noise = abs(value) <= (BIAS_MARGIN if name == "bias" else NOISE_MARGIN) * noise
-    return Figure(value, noise, is_noise)  # every comparison with nan is false
+    return Figure(value, noise, trusted and is_noise)  # every comparison with nan is false
 
 
 @dataclasses.dataclass(frozen=True)
@@ -161,6 +163,14 @@ class Reference:
     runs: tuple[stages.Run, ...]
     estimate: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # what the record of its files adds of it
     lobes: Any = None  # `TruthResult` of receivers' lobes by indirect light, W/m^2/sr, where a glossy surface is seen
+    doubt: str = ""  # why the error of the irradiance is not to be trusted
+
+    @property
+    def doubts(self) -> list[str]:
+        """Why an error is not to be trusted, of the irradiance and of lobes; empty where nothing speaks against it."""
+        name = "truth" if self.name == TRUTH else f"truth ({self.name})"
+        of_lobes = "" if self.lobes is None else self.lobes.doubt
+        return [f"{what}: {said}" for what, said in ((name, self.doubt), (f"lobes of the {name}", of_lobes)) if said]
 
 
 @dataclasses.dataclass(frozen=True)

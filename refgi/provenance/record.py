@@ -158,19 +158,26 @@ def method_record(method: str, settings: Any) -> Record:
     return {"method": method, "settings": plain(settings)}
 
 
-def estimate_record(estimate: Any) -> Record:
+def estimate_record(estimate: Any, lobes: Any = None) -> Record:
     """Return what a random estimate says of itself beyond its pixels.
 
     Parameters
     ----------
     estimate : TruthResult
         Mean over independent passes.
+    lobes : TruthResult, optional
+        Of receivers' lobes, where a glossy surface is seen.
 
     Returns
     -------
     dict
-        JSON values under the one key `estimate`: mean irradiance over the pixels that see a surface and the standard
-        error of that mean, W/m^2; and `TruthResult.errors`.
+        JSON values under the key `estimate`: mean irradiance over the pixels that see a surface and the standard
+        error of that mean, W/m^2; and `TruthResult.errors`. The same of lobes, W/m^2/sr, under `lobes` within.
     """
-    return {"estimate": plain({"picture_mean": estimate.picture_mean,
-                               "picture_standard_error": np.sqrt(estimate.picture_variance), **estimate.errors})}
+    of_lobes = {} if lobes is None else {"lobes": _figures(lobes)}
+    return {"estimate": plain({**_figures(estimate), **of_lobes})}
+
+
+def _figures(estimate: Any) -> dict[str, Any]:
+    return {"picture_mean": estimate.picture_mean, "picture_standard_error": np.sqrt(estimate.picture_variance),
+            **estimate.errors}

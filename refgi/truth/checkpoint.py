@@ -1,7 +1,8 @@
 """Checkpoints: all passes so far in one file, which a later run of the same computation continues.
 
 The file holds a first line, SHA-256 digests of the computation and of the content, and the content: number of passes
-(int64), means and sums of squares (float64), values left out (int64), little-endian. Its length follows from the
+(int64), means and sums of squares (float64), values left out (int64), the unit of the tails (float64) and their counts
+(int32), little-endian. Its length follows from the
 computation, so nothing of a file that is damaged, or another's, is ever read.
 """
 
@@ -23,7 +24,8 @@ from refgi.truth.result import Moments, no_passes
 
 Array = npt.NDArray[Any]
 
-FIRST_LINE = b"refgi truth checkpoint 2\n"
+FIRST_LINE = b"refgi truth checkpoint 3\n"
+KINDS = ("<i8", "<f8", "<f8", "<i8", "<f8", "<i4")  # of the fields of `Moments`
 DIGEST = 32  # bytes of SHA-256
 SECONDS_BETWEEN = 10.0  # saves are at least that far apart
 
@@ -39,6 +41,8 @@ class Checkpoint:
         SHA-256 digest of everything that the passes depend on.
     values : int
         How many values a pass has.
+    blocks : int
+        Of how many blocks tails are counted.
 
     Raises
     ------
@@ -46,11 +50,12 @@ class Checkpoint:
         If the file is damaged, belongs to another computation or cannot be written, before anything is computed.
     """
 
-    def __init__(self, path: Path, computation: bytes, values: int) -> None:
+    def __init__(self, path: Path, computation: bytes, values: int, blocks: int = 0) -> None:
         self._path, self._computation, self._warned = path, computation, False
         with _clear_errors(path, "a file in a folder that is there"):
             expect(path.parent.is_dir(), f"checkpoint {path}", "a file in a folder that is there", str(path.parent))
-        self.moments = _load(path, computation, values) if os.path.lexists(path) else no_passes(values)
+        self.moments = (_load(path, computation, no_passes(values, blocks)) if os.path.lexists(path)
+                        else no_passes(values, blocks))
         self._saved = int(self.moments.passes)
         with _clear_errors(path, "a place for a file of its size"), _temporary(path, self._content()):
             pass
@@ -77,12 +82,11 @@ class Checkpoint:
         self._due = time.monotonic() + SECONDS_BETWEEN
 
     def _content(self) -> bytes:
-        content = b"".join(np.asarray(field, kind).tobytes()
-                           for field, kind in zip(self.moments, ("<i8", "<f8", "<f8", "<i8"), strict=True))
+        content = b"".join(np.asarray(field, kind).tobytes() for field, kind in zip(self.moments, KINDS, strict=True))
         return FIRST_LINE + self._computation + _digest(self._computation, content) + content
 
 
-def _load(path: Path, computation: bytes, values: int) -> Moments:
+def _load(path: Path, computation: bytes, empty: Moments) -> Moments:
     with _clear_errors(path, "a checkpoint file"):
         expect(path.is_file(), f"checkpoint {path}", "a checkpoint file", "something else")
         size = path.stat().st_size
@@ -90,20 +94,23 @@ def _load(path: Path, computation: bytes, values: int) -> Moments:
             head = file.read(len(FIRST_LINE) + 2 * DIGEST)
             expect(head.startswith(FIRST_LINE) and len(head) == len(FIRST_LINE) + 2 * DIGEST, f"checkpoint {path}",
                    "a checkpoint file of this version", f"{size} bytes of something else")
-            found, digest = head[len(FIRST_LINE):-DIGEST], head[-DIGEST:]
-            expect(found == computation, f"checkpoint {path}",
+            whose, digest = head[len(FIRST_LINE):-DIGEST], head[-DIGEST:]
+            expect(whose == computation, f"checkpoint {path}",
                    "one of this scene, picture, settings and version of refgi", "another's")
-            whole = len(head) + 8 * (1 + 7 * values)
+            whole = len(head) + sum(field.nbytes for field in empty)
             expect(size == whole, f"checkpoint {path}", f"a whole file of {whole} bytes", size)
             content = file.read(whole - len(head))
     expect(_digest(computation, content) == digest, f"checkpoint {path}", "its own SHA-256 digest", "a damaged file")
-    passes = np.frombuffer(content, "<i8", 1).astype(np.int64).reshape(())
-    mean, squares = np.frombuffer(content, "<f8", 6 * values, 8).astype(np.float64).reshape(2, 3, values)
-    lost = np.frombuffer(content, "<i8", offset=8 * (1 + 6 * values)).astype(np.int64)
-    usable = passes >= 0 and np.isfinite(mean).all() and np.isfinite(squares).all() and (squares >= 0).all()
-    expect(bool(usable and (lost >= 0).all() and (lost <= passes).all()), f"checkpoint {path}", "finite moments",
-           "others")
-    return Moments(passes, np.ascontiguousarray(mean), np.ascontiguousarray(squares), lost)
+    parts, start = [], 0
+    for field, kind in zip(empty, KINDS, strict=True):
+        parts.append(np.frombuffer(content, kind, field.size, start).astype(field.dtype).reshape(field.shape))
+        start += field.nbytes
+    found = Moments(*parts)
+    finite = all(np.isfinite(one).all() for one in (found.mean, found.squares, found.scale))
+    counted = (found.squares >= 0).all() and (found.lost >= 0).all() and (found.lost <= found.passes).all()
+    sound = found.passes >= 0 and finite and counted and found.scale >= 0 and (found.tails >= 0).all()
+    expect(bool(sound), f"checkpoint {path}", "finite moments", "others")
+    return found
 
 
 def _digest(computation: bytes, content: bytes) -> bytes:

@@ -5,15 +5,18 @@ Means over passes: running mean and sum of squared deviations, in float64 (Welfo
 Passes are independent, so the spread of their values gives the variance of the mean, whatever correlation there is
 between the samples inside a pass or between pixels. Pixels share light vertices, so the errors of means over several
 pixels do not follow from theirs: means over blocks of 8 x 8 pixels and over the picture are followed as values of their
-own. A value that is not a finite number is left out of all of them and counted.
+own. A value that is not a finite number is left out of all of them and counted. How heavy the values' tail is
+(`refgi.truth.tails`) says whether that variance can be trusted.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.truth.tails import BINS, TRUSTED, count_tails, doubt_of, share_in_doubt, tail_index
 
 Array = npt.NDArray[Any]
 
@@ -27,6 +30,8 @@ class Moments(NamedTuple):
     mean: Array  # (3, n) float64
     squares: Array  # (3, n) float64, sums of squared deviations from the mean
     lost: Array  # (n,) int64: passes whose value was not a finite number
+    scale: Array  # () float64, the unit of the tails: median of the first pass with light, W/m^2; 0 before
+    tails: Array  # (blocks, BINS) int32: how many values of receivers lie how far above the passes before
 
     @property
     def variance_of_mean(self) -> Array:
@@ -35,23 +40,40 @@ class Moments(NamedTuple):
         return np.where(n > 1, self.squares / np.maximum(n * (n - 1), 1), np.inf)
 
 
-def no_passes(values: int) -> Moments:
+def no_passes(values: int, blocks: int = 0) -> Moments:
     """Return the moments of no passes.
 
-    `values`: how many values a pass has.
+    `values`: how many values a pass has. `blocks`: of how many blocks tails are counted.
     """
-    return Moments(np.zeros((), np.int64), np.zeros((3, values)), np.zeros((3, values)), np.zeros(values, np.int64))
+    return Moments(np.zeros((), np.int64), np.zeros((3, values)), np.zeros((3, values)), np.zeros(values, np.int64),
+                   np.zeros(()), np.zeros((blocks, BINS), np.int32))
 
 
-def add_pass(moments: Moments, values: Array) -> None:
+def add_pass(moments: Moments, values: Array, block: Array | None = None) -> None:
     """Add one pass to the moments (Welford).
 
-    `values` (3, n) float64: what the pass found, W/m^2.
+    `values` (3, n) float64: what the pass found, W/m^2. `block` (r,) int: of each of the first r values, whose tails
+    are counted.
     """
+    if block is not None:
+        r = len(block)
+        count_tails(moments.tails, moments.scale, block, values[:, :r], moments.mean[:, :r],
+                    int(moments.passes) - moments.lost[:r])
     moments.passes[...] += 1
     finite = np.asarray(np.isfinite(values).all(axis=0))
     moments.lost[~finite] += 1
     _add(moments.mean, moments.squares, values, finite, int(moments.passes) - moments.lost)
+
+
+def picture_tail(moments: Moments) -> float:
+    """Return the tail index of the whole picture; NaN where too few values are known."""
+    return float(tail_index(moments.tails.sum(axis=0, dtype=np.int64)[None])[0])
+
+
+def is_doubted(moments: Moments, receivers: int) -> bool:
+    """Return whether the error of a mean is not to be trusted, by its tails."""
+    light = moments.mean[:, receivers:-1].mean(axis=0) * moments.tails.sum(axis=1)
+    return bool(doubt_of(picture_tail(moments), share_in_doubt(tail_index(moments.tails), light)))
 
 
 def blocks_of(pixel: Array, shape: tuple[int, ...]) -> tuple[Array, tuple[int, int]]:
@@ -107,6 +129,8 @@ class TruthResult(NamedTuple):
     block_variance: Array  # the same shape: their variances, with the correlation between pixels
     block_pixels: Array  # (ceil(h / 8), ceil(w / 8)) int64: how many pixels of a block see a surface
     lost: int = 0  # values of a pixel in a pass that were not finite numbers and are left out
+    tail_index: float = math.nan  # k of the picture's largest values; NaN where too few are known
+    block_tail_index: Array = np.full((1, 1), math.nan)  # (ceil(h / 8), ceil(w / 8)) float64: k of each block
 
     @property
     def standard_error(self) -> Array:
@@ -151,21 +175,43 @@ class TruthResult(NamedTuple):
         return float(t.ppf(0.5 + level / 2, self.degrees_of_freedom))
 
     @property
+    def blocks_in_doubt(self) -> float:
+        """Share of the picture's light that lies in blocks of 8 x 8 pixels whose tail index is above 0.7."""
+        return share_in_doubt(self.block_tail_index, self.block_mean.mean(axis=0) * self.block_pixels)
+
+    @property
+    def doubt(self) -> str:
+        """Why the stated error is not to be trusted, and what helps; empty where nothing speaks against it.
+
+        Where too few values are known to tell, it is empty too, but `is_trusted` is None.
+        """
+        return doubt_of(self.tail_index, self.blocks_in_doubt)
+
+    @property
+    def is_trusted(self) -> bool | None:
+        """Whether the stated error can be trusted; None where too few values are known to tell."""
+        return False if self.doubt else None if math.isnan(self.tail_index) else True
+
+    @property
     def error_statement(self) -> str:
-        """The confidence intervals, in a sentence."""
+        """The confidence intervals, and whether they can be trusted, in a sentence."""
         factor = self.confidence_factor()
         parts = ((self.pixel_error, "a pixel"), (self.block_error, f"a block of {BLOCK_SIDE}x{BLOCK_SIDE} pixels"),
                  (self.picture_error, "the picture's mean"))
         freedom = "1 degree" if self.passes == 2 else f"{self.degrees_of_freedom} degrees"
+        known = "not known, of too few values" if math.isnan(self.tail_index) else f"k = {self.tail_index:.2f}"
         return (f"95 % confidence intervals over the picture's mean, by Student's t with {freedom} of freedom "
-                f"({self.passes} passes): " + ", ".join(f"+-{factor * error:.2%} {what}" for error, what in parts))
+                f"({self.passes} passes): " + ", ".join(f"+-{factor * error:.2%} {what}" for error, what in parts)
+                + "; " + (self.doubt or f"tail index {known} (trusted up to {TRUSTED})"))
 
     @property
     def errors(self) -> dict[str, Any]:
         """The figures of the error by name, for reports."""
         return {"pixel": self.pixel_error, "block": self.block_error, "picture": self.picture_error,
                 "passes": self.passes, "degrees_of_freedom": self.degrees_of_freedom,
-                "confidence_factor_95": self.confidence_factor(), "statement": self.error_statement}
+                "confidence_factor_95": self.confidence_factor(),
+                "tail_index": None if math.isnan(self.tail_index) else self.tail_index,
+                "blocks_in_doubt": self.blocks_in_doubt, "trusted": self.is_trusted, "statement": self.error_statement}
 
     def _relative(self, variance: Array, weight: Array) -> float:
         scale, total = float(self.picture_mean.mean()), float(weight.sum())
@@ -192,4 +238,24 @@ def result_of(moments: Moments, pixel: Array, shape: tuple[int, ...], blocks: tu
     block_mean, block_variance = (table[:, r:-1].reshape(3, *grid).copy() for table in (moments.mean, variance_of_mean))
     counts = np.bincount(block, minlength=grid[0] * grid[1]).reshape(grid)
     return TruthResult(mean, variance, samples, moments.mean[:, -1].copy(), variance_of_mean[:, -1].copy(), passes,
-                       block_mean, block_variance, counts, int(moments.lost[:r].sum()))
+                       block_mean, block_variance, counts, int(moments.lost[:r].sum()), picture_tail(moments),
+                       tail_index(moments.tails).reshape(grid))
+
+
+def doubt_of_both(irradiance: TruthResult, lobes: TruthResult | None) -> str:
+    """Return why the error of a truth is not to be trusted, that of receivers' lobes included.
+
+    Parameters
+    ----------
+    irradiance : TruthResult
+        What arrives.
+    lobes : TruthResult or None
+        What lobes make of it, where a glossy surface is seen.
+
+    Returns
+    -------
+    str
+        Empty where nothing speaks against either.
+    """
+    of_lobes = "" if lobes is None or not lobes.doubt else f"lobes of receivers: {lobes.doubt}"
+    return "; ".join(said for said in (irradiance.doubt, of_lobes) if said)

@@ -22,12 +22,21 @@ from refgi.skips import left_out
 from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
 from refgi.truth.cell_pass import with_cells
-from refgi.truth.checkpoint import Checkpoint
+from refgi.truth.checkpoint import FIRST_LINE, Checkpoint
 from refgi.truth.light_pass import pilot
 from refgi.truth.lobe_pass import lobe_pass
 from refgi.truth.lobe_receivers import glossy_triangles, lobes_of, meets_photons
 from refgi.truth.passes import one_pass
-from refgi.truth.result import Moments, TruthResult, add_pass, blocks_of, no_passes, result_of, with_means
+from refgi.truth.result import (
+    Moments,
+    TruthResult,
+    add_pass,
+    blocks_of,
+    is_doubted,
+    no_passes,
+    result_of,
+    with_means,
+)
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import lights_of, surfaces
 from refgi.truth.task import Task, sets_of
@@ -187,13 +196,15 @@ def _averaged(prepare: Prepare, scene: Scene, tracer: Any, buffer: tuple[Array, 
     started = time.perf_counter()
     task = prepare(scene, tracer, *buffer, settings)
     block, grid = blocks_of(task.receivers.pixel, shape)
-    values = len(block) + grid[0] * grid[1] + 1
-    file = _checkpoint(Path(settings.checkpoint), _fingerprint(task, shape), values) if settings.checkpoint else None
-    moments = file.moments if file else no_passes(values)
+    blocks = grid[0] * grid[1]
+    values = len(block) + blocks + 1
+    file = (_checkpoint(Path(settings.checkpoint), _fingerprint(task, shape), values, blocks) if settings.checkpoint
+            else None)
+    moments = file.moments if file else no_passes(values, blocks)
     ready: Task | None = None
     while not _is_done(moments, len(block), settings, time.perf_counter() - started):
         ready = ready or _guided(task)
-        add_pass(moments, with_means(_pass(ready, int(moments.passes)), block, grid[0] * grid[1]))
+        add_pass(moments, with_means(_pass(ready, int(moments.passes)), block, blocks), block)
         if file:
             file.save_when_due()
         report_progress(min(1.0, int(moments.passes) / settings.passes))
@@ -239,7 +250,9 @@ def _warm_up(prepare: Prepare, scene: Scene, tracer: Any, buffer: tuple[Array, A
     position, normal = (field.reshape(3, 1, -1)[..., covered] for field in buffer[:2])
     task = prepare(scene, tracer, position, normal, buffer[2].reshape(1, -1)[:, covered], settings)
     values = with_means(_pass(_guided(task), 0), np.zeros(len(covered), np.int64), 1)
-    add_pass(no_passes(values.shape[1]), values)
+    moments = no_passes(values.shape[1], 1)
+    add_pass(moments, values, np.zeros(len(covered), np.int64))
+    is_doubted(moments, len(covered))
 
 
 def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
@@ -279,12 +292,13 @@ def _with_lobes(scene: Scene, tracer: Any, position: Array, normal: Array, trian
     return task._replace(lobes=lobes)
 
 
-def _checkpoint(place: Path, computation: bytes, values: int) -> Checkpoint:
+def _checkpoint(place: Path, computation: bytes, values: int, blocks: int) -> Checkpoint:
     """Return the checkpoint in a file, or in a folder's file that is named by what is computed."""
-    return Checkpoint(place / f"{computation.hex()}.truth" if place.is_dir() else place, computation, values)
+    return Checkpoint(place / f"{computation.hex()}.truth" if place.is_dir() else place, computation, values, blocks)
 
 
 def _is_done(moments: Moments, receivers: int, settings: TruthSettings, seconds: float) -> bool:
+    """Return whether to stop; an error is not met as long as the tails say that it is not to be trusted."""
     passes = int(moments.passes)
     if passes < 2:
         return False
@@ -293,14 +307,14 @@ def _is_done(moments: Moments, receivers: int, settings: TruthSettings, seconds:
     if settings.target_error is None:
         return False
     error = np.sqrt(moments.variance_of_mean[:, :receivers].mean()) if receivers else 0.0
-    return bool(error <= settings.target_error * moments.mean[:, -1].mean())
+    return bool(error <= settings.target_error * moments.mean[:, -1].mean()) and not is_doubted(moments, receivers)
 
 
 def _fingerprint(task: Task, shape: tuple[int, ...]) -> bytes:
     """Return a digest of everything the passes depend on; not of when they stop."""
     chosen = {field.name: getattr(task.settings, field.name) for field in dataclasses.fields(task.settings)
               if field.name not in STOPPING}
-    digest = hashlib.sha256(repr((sys.modules["refgi"].__version__, shape, chosen)).encode())
+    digest = hashlib.sha256(FIRST_LINE + repr((sys.modules["refgi"].__version__, shape, chosen)).encode())
     view_arrays = () if task.view is None else (task.view.origin, task.view.frame, task.view.half)
     film = () if task.caustics is None else (task.caustics.solid_angle, *task.caustics.mirrors, task.caustics.ior)
     lobes = () if task.lobes is None else (*task.lobes[:3], np.array(task.lobes.photon_exponent))

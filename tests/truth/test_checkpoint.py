@@ -20,8 +20,9 @@ from refgi.scene import load_scene
 from refgi.truth import TruthSettings, checkpoint, trace_truth
 from refgi.truth.checkpoint import DIGEST, FIRST_LINE, Checkpoint, _digest
 from refgi.truth.result import add_pass
+from refgi.truth.tails import BINS
 
-ROOT, SIZE, VALUES = Path(__file__).parents[2], 24, 5
+ROOT, SIZE, VALUES, BLOCKS = Path(__file__).parents[2], 24, 5, 1
 NAME = b"n" * DIGEST
 HEAD = len(FIRST_LINE) + 2 * DIGEST
 
@@ -37,10 +38,10 @@ def passes_in(file):
 
 def saved(file, passes=3):
     """Write a checkpoint of a few passes and return its moments."""
-    made = Checkpoint(file, NAME, VALUES)
+    made = Checkpoint(file, NAME, VALUES, BLOCKS)
     random = np.random.default_rng(2)
     for _ in range(passes):
-        add_pass(made.moments, random.random((3, VALUES)))
+        add_pass(made.moments, random.random((3, VALUES)), np.zeros(3, np.int64))
     made.save()
     return made.moments
 
@@ -71,19 +72,31 @@ def test_a_killed_run_goes_on_from_its_last_pass(frame, tmp_path, evidence):
     resumed = trace_truth(frame, settings)
     straight = trace_truth(frame, dataclasses.replace(settings, checkpoint=None))
     assert resumed.passes == straight.passes == done + 3
-    assert all(np.array_equal(a, b) for a, b in zip(resumed, straight, strict=True))
+    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(resumed, straight, strict=True))
     evidence(f"killed after pass {done}, went on for 3: equal bits")
 
 
 def test_what_is_read_is_what_was_saved(tmp_path):
     file = tmp_path / "c"
     moments = saved(file)
-    again = Checkpoint(file, NAME, VALUES).moments
-    assert all(np.array_equal(a, b) for a, b in zip(moments, again, strict=True))
+    again = Checkpoint(file, NAME, VALUES, BLOCKS).moments
+    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(moments, again, strict=True))
     assert again.mean.dtype == np.float64
     assert again.mean.flags.writeable
     assert again.mean.flags.c_contiguous
-    assert file.stat().st_size == HEAD + 8 * (1 + 7 * VALUES)
+    assert file.stat().st_size == HEAD + 8 * (2 + 7 * VALUES) + 4 * BLOCKS * BINS
+    assert again.tails.sum() == 6  # three values of each pass but the first
+    assert again.scale > 0
+
+
+def test_a_file_of_before_tails_is_refused(tmp_path):
+    file = tmp_path / "c"
+    moments = saved(file)
+    content = b"".join(field.tobytes() for field in moments[:4])
+    old = b"refgi truth checkpoint 2\n"
+    file.write_bytes(old + NAME + _digest(NAME, content) + content)
+    with pytest.raises(InputError, match="expected a checkpoint file of this version"):
+        Checkpoint(file, NAME, VALUES, BLOCKS)
 
 
 @pytest.mark.parametrize("change", [{"seed": 3}, {"interleave": 2}, {"uniform_share": 1.0}, {"light_grid": 16},
@@ -159,30 +172,34 @@ def test_every_damage_is_one_clear_error(tmp_path, evidence):
             continue
         file.write_bytes(mutation)
         with pytest.raises(InputError, match=r"checkpoint .*c: expected"):
-            Checkpoint(file, NAME, VALUES)
+            Checkpoint(file, NAME, VALUES, BLOCKS)
         tried += 1
     evidence(f"{tried} damaged files, one InputError each")
 
 
-@pytest.mark.parametrize("fault", ["passes", "nan", "inf", "negative squares", "lost", "shape"])
+@pytest.mark.parametrize("fault", ["passes", "nan", "inf", "negative squares", "lost", "shape", "scale", "tails"])
 def test_wrong_content_with_a_right_digest(tmp_path, fault):
     file = tmp_path / "c"
     moments = saved(file)
-    passes, mean, squares, lost = (np.array(field) for field in moments)
+    passes, mean, squares, lost, scale, tails = (np.array(field) for field in moments)
     if fault == "passes":
         passes[...] = -1
     elif fault == "negative squares":
         squares[0, 0] = -1
     elif fault == "lost":
         lost[0] = passes + 1
+    elif fault == "scale":
+        scale[...] = np.nan
+    elif fault == "tails":
+        tails[0, 3] = -1
     elif fault == "shape":
         mean = mean[:, :-1]
     else:
         mean[0, 0] = {"nan": np.nan, "inf": np.inf}[fault]
-    content = passes.tobytes() + mean.tobytes() + squares.tobytes() + lost.tobytes()
+    content = b"".join(field.tobytes() for field in (passes, mean, squares, lost, scale, tails))
     file.write_bytes(FIRST_LINE + NAME + _digest(NAME, content) + content)
     with pytest.raises(InputError, match="checkpoint"):
-        Checkpoint(file, NAME, VALUES)
+        Checkpoint(file, NAME, VALUES, BLOCKS)
 
 
 def test_a_huge_file_is_not_read(tmp_path):
@@ -191,7 +208,7 @@ def test_a_huge_file_is_not_read(tmp_path):
     with file.open("r+b") as handle:
         handle.truncate(1 << 42)  # sparse: 4 TB that nobody could hold
     with pytest.raises(InputError, match="whole file"):
-        Checkpoint(file, NAME, VALUES)
+        Checkpoint(file, NAME, VALUES, BLOCKS)
 
 
 def test_a_place_that_cannot_be_written_is_refused_before_computing(frame, tmp_path, monkeypatch):
@@ -224,7 +241,7 @@ def test_a_full_disk_loses_no_picture(frame, tmp_path, monkeypatch):
         result = trace_truth(frame, settings)
     assert [w.category for w in said] == [RefgiWarning]
     assert "still holds 2 passes" in str(said[0].message)
-    assert all(np.array_equal(a, b) for a, b in zip(result, straight, strict=True))
+    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(result, straight, strict=True))
     assert (tmp_path / "c").read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["c"]
 
@@ -234,7 +251,7 @@ def test_saves_are_ten_seconds_apart_and_at_the_end(tmp_path, monkeypatch):
     monkeypatch.setattr(checkpoint.time, "monotonic", lambda: clock[0])
     replace = Path.replace
     monkeypatch.setattr(Path, "replace", lambda path, to: (replaced.append(clock[0]), replace(path, to))[1])
-    made = Checkpoint(tmp_path / "c", NAME, VALUES)
+    made = Checkpoint(tmp_path / "c", NAME, VALUES, BLOCKS)
     assert not (tmp_path / "c").exists()
     for second in range(25):
         clock[0] = float(second)
@@ -249,10 +266,10 @@ def test_saves_are_ten_seconds_apart_and_at_the_end(tmp_path, monkeypatch):
 def test_a_folder_that_is_not_there_is_not_made(tmp_path):
     file = tmp_path / "missing" / "deep" / "ck"
     with pytest.raises(InputError, match="expected a file in a folder that is there") as caught:
-        Checkpoint(file, NAME, VALUES)
+        Checkpoint(file, NAME, VALUES, BLOCKS)
     assert str(file.parent) in str(caught.value)
     assert not list(tmp_path.iterdir())
     below = tmp_path / "file" / "ck"
     below.parent.write_text("no folder")
     with pytest.raises(InputError, match="expected a file in a folder that is there"):
-        Checkpoint(below, NAME, VALUES)
+        Checkpoint(below, NAME, VALUES, BLOCKS)

@@ -13,7 +13,7 @@ from refgi.scene import LightTable, Scene
 from refgi.truth.caustics import Film
 from refgi.truth.light_grid import Density
 from refgi.truth.lobe_receivers import Lobes
-from refgi.truth.paths import Shadows
+from refgi.truth.paths import Shadows, Sides
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import Surfaces
 
@@ -35,6 +35,17 @@ class Task(NamedTuple):
     view: Projection | None = None  # only surfaces visible in it emit; None: all do
     densities: tuple[Density | None, ...] = ()  # of each light's rays; none: even ones
     lobes: Lobes | None = None  # of the receivers, where their lobes and not their irradiance are asked for
+
+    @property
+    def sides(self) -> Sides:
+        """Whether faces hide what lies behind them: with visibility, and where no normal differs from its face's."""
+        eye = (math.nan,) * 3 if self.view is None else tuple(self.view.origin[0].tolist())
+        return Sides(self.settings.visibility or not len(self.surfaces.normals), eye)
+
+    @property
+    def grain_below(self) -> float:
+        """The tracer's grain where receivers see below their faces, m; -1 where they do not."""
+        return -1.0 if self.sides.hide else float(self.tracer.grain)
 
     @property
     def picks(self) -> int:

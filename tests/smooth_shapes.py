@@ -30,20 +30,21 @@ def icosahedron(radius=0.6, middle=(0.0, 0.7, 0.0)):
 def cylinder(sides=12, radius=0.45, low=0.2, high=1.2):
     """A closed cylinder whose rim shares its normals between side and cap."""
     angle = 2 * np.pi * np.arange(sides) / sides
-    ring = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
-    normals = np.concatenate([ring + (0, -1, 0), ring + (0, 1, 0), [(0, -1, 0), (0, 1, 0)]])
-    vertices = np.concatenate([radius * ring + (0, low, 0), radius * ring + (0, high, 0), [(0, low, 0), (0, high, 0)]])
+    ring, up = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1), np.array([0.0, 1.0, 0.0])
+    normals = np.concatenate([ring - up, ring + up, [-up, up]])
+    vertices = np.concatenate([radius * ring + low * up, radius * ring + high * up, [low * up, high * up]])
     faces = []
     for i in range(sides):
         j = (i + 1) % sides
-        faces += [(i, sides + i, j), (j, sides + i, sides + j), (2 * sides, i, j), (2 * sides + 1, sides + j, sides + i)]
+        faces += [(i, sides + i, j), (j, sides + i, sides + j)]
+        faces += [(2 * sides, i, j), (2 * sides + 1, sides + j, sides + i)]
     return Mesh(vertices, np.array(faces), normals / np.linalg.norm(normals, axis=1, keepdims=True), CLAY, "cylinder")
 
 
 def head():
     """A low-poly head of metaballs, with ears and a nose: creases and all."""
-    balls = Balls(np.array([[0, 0.24, 0.0], [-0.11, 0.30, 0], [0.11, 0.30, 0], [0, 0.22, 0.1], [0, 0.16, 0.04]])
-                  + (0, 0, -0.02), np.array([0.085, 0.045, 0.045, 0.04, 0.05]))
+    centers = [[0, 0.24, -0.02], [-0.11, 0.3, -0.02], [0.11, 0.3, -0.02], [0, 0.22, 0.08], [0, 0.16, 0.02]]
+    balls = Balls(np.array(centers), np.array([0.085, 0.045, 0.045, 0.04, 0.05]))
     made = blob(balls, 9)
     return Mesh(4 * made.vertices - (0, 0.3, 0), made.faces, made.normals, CLAY, "head")
 

@@ -171,8 +171,9 @@ def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: t
     `starts` (sets, 3) int64: first block of each set, its first of lobes and one past its last. `tiles`: receivers
     sorted by set, and the table of tiles. `sampling`: first receiver of the span; picks of each; seed of the random
     shift, a hash of it and the receiver's pixel; the tracer's grain: segments end above the sender's face by
-    `ray_offset` and `far_offset`, m; whether faces hide what lies behind them. `rays`: filled: origins, directions (n, 3), reach (n,), contribution (n, 3) W/m^2,
-    float32, and the point picked (n,) int32; n = picks x receivers. The reach is 0 where there is nothing to gain.
+    `ray_offset` and `far_offset`, m; whether faces hide what lies behind them. `rays`: filled: origins, directions
+    (n, 3), reach (n,), contribution (n, 3) W/m^2, float32, and the point picked (n,) int32; n = picks x receivers. The
+    reach is 0 where there is nothing to gain.
     """
     members, table = tiles
     for number in prange(len(table)):

@@ -34,8 +34,8 @@ def send_along_lobes(receivers: RayReceivers, lobes: Lobes, span: tuple[int, int
 
     `span`: first receiver and one past the last. `points` (s, 2) uint32: the pass's point set. `seed`: random shift: a
     hash of it and the receiver's pixel. `grain`: as for `send`. `paths`: origins, directions, reach, lengths, cosines
-    and weights are filled. `density` (n,) float64: filled: D <m.w>^P of each direction, 1/sr; inf for a receiver that takes nothing from light
-    vertices.
+    and weights are filled. `density` (n,) float64: filled: D <m.w>^P of each direction, 1/sr; inf for a receiver that
+    takes nothing from light vertices.
     """
     count = span[1] - span[0]
     for chunk in prange((count + CHUNK - 1) // CHUNK):

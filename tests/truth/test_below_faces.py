@@ -50,7 +50,7 @@ def place_at(name, camera=UP, lobe=None):
     return Scene("by hand", geometry, materials, camera, (SUN,)), at, up, np.zeros(SHAPE, np.int32)
 
 
-def expected(name, hide, weight=lambda w: 1.0):
+def expected(name, hide, weight=None):
     """Return the sum over a fine grid of the plate, with `hide` only what both faces look at."""
     point, normal, face = (np.asarray(v, float) for v in PLACES[name])
     if face @ normal < 0:
@@ -60,7 +60,7 @@ def expected(name, hide, weight=lambda w: 1.0):
     d = np.stack([x, 0 * x, z], axis=-1) - point
     r2 = (d**2).sum(axis=-1)
     w = d / np.sqrt(r2)[..., None]
-    term = np.maximum(w @ unit(normal), 0) * np.maximum(-(w @ LEANING), 0) / r2 * weight(w)
+    term = np.maximum(w @ unit(normal), 0) * np.maximum(-(w @ LEANING), 0) / r2 * (1 if weight is None else weight(w))
     if hide:
         term *= (w @ face > 0) & (point[1] > 0)
     return ALBEDO * np.array(SUN.irradiance) / math.pi * term.mean()

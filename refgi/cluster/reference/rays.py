@@ -52,8 +52,8 @@ def free_share(
         Unit normals at the targets, on the side that rays come from.
     contribution : callable or None
         ``(toward (n, k, 3), up (n, 3)) -> (n, k)``: the weight of each ray, 0 or more, by vectors from some receivers
-        to the targets and the receivers' normals; None: all the same. Targets below the horizon of `shading` do not count;
-        those above it and below the face count as hidden.
+        to the targets and the receivers' normals; None: all the same. Targets below the horizon of `shading` do not
+        count; those above it and below the face count as hidden.
     grain : float
         The scene tracer's: how far above their surfaces rays start and end, as `ray_offset` has it, m.
     ball : Ball, optional

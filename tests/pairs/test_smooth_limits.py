@@ -8,14 +8,17 @@ import numpy as np
 import pytest
 
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.val import val
+from refgi.cluster.val import val, val_lobes
 from refgi.frame import Frame
 from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.splat.multires.multires import multires
+from refgi.splat.sii.lobes import sii_lobes
 from refgi.splat.sii.settings import SiiSettings
 from refgi.splat.sii.sii import sii
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
+from refgi.truth.vpl import vpl_lobes
+from tests.glossy import glossy_box
 from tests.smooth_shapes import scene
 from tests.splat.multires.choices import unclamped
 
@@ -57,6 +60,20 @@ def test_limits_of_methods_meet(name, dtype, evidence):
     }
     evidence(f"{name}, {np.dtype(dtype).name}: " + "; ".join(f"{what} {by:.1e}" for what, by in pairs.items()))
     assert max(pairs.values()) < LIMIT
+
+
+@pytest.mark.feature("REF-32")
+@pytest.mark.parametrize("name", SCENES[:2])
+def test_limits_of_lobes_meet(name, evidence):
+    """A glossy floor, a glossy ball: radiance of their lobes."""
+    frame = Frame(glossy_box(8.0, name=name, blocks=3.0), width=32, height=32, rsm_resolution=48, shadows="exact")
+    free, rays = (vpl_lobes(frame, of(VplSettings, lights=LIGHTS, visibility=v)) for v in (False, True))
+    clustered = of(ValSettings, lights=LIGHTS, clusters=LIGHTS, visibility="rays_vpls", clamp="none")
+    summed = sii_lobes(frame, of(SiiSettings, lights=LIGHTS, clamp="none"))
+    by = off(summed, free), off(val_lobes(frame, clustered), rays)
+    evidence(f"{name}: sii from vpl without visibility {by[0]:.1e}, val by rays from vpl {by[1]:.1e}")
+    assert max(by) < LIMIT
+    assert off(rays, free) > 0.01
 
 
 @pytest.mark.parametrize("name", SMOOTH)

@@ -183,15 +183,18 @@ def test_what_cosines_let_through_and_the_face_hides_counts_as_hidden(box):
         -1: (visibility_by(areas, maps, behind, None, frame.tracer),
              back_projection_visibility(areas, maps, rectangle_visibility(frame, areas, behind.maps))),
     }
+    tried = {side: 0 for side in given}
     for m in np.flatnonzero(maps.map_of >= 0):
         toward = areas.center[:, m, None] - points
+        reach = np.linalg.norm(areas.offset[:, m]) + np.linalg.norm(areas.side[:, m]) / 2
         far = np.linalg.norm(toward, axis=0)
         for side, functions in given.items():
-            some = (far > 1.1 * areas.side[:, m].sum()) & (side * height_above(areas, m, points) > 1e-3)
-            at, look = points[:, some], (toward / far)[:, some]
+            some = (far > 1.01 * reach) & (side * height_above(areas, m, points) > 1e-3)
+            at, look, tried[side] = points[:, some], (toward / far)[:, some], tried[side] + np.count_nonzero(some)
             for visibility_of in functions:
                 assert (visibility_of(m, at, -look) == 1).all()  # nothing counts
                 assert not visibility_of(m, at, -look, shading=look).any()
+    assert min(tried.values()) > 20
 
 
 @pytest.mark.feature("REF-32")

@@ -215,8 +215,9 @@ class Frame:
         if self.shadows == "map":
             from refgi.rsm import shadow_map_visibility
 
-            return shadow_map_visibility(buffer.position, buffer.normal, buffer.covered, self.rsms[index])
-        visible: Array = self.tracer.visible_from_light(buffer.position, buffer.normal, buffer.covered, light)
+            return shadow_map_visibility(buffer.position, buffer.facing, buffer.covered, self.rsms[index],
+                                         interpolated=buffer.facing is not buffer.normal)
+        visible: Array = self.tracer.visible_from_light(buffer.position, buffer.facing, buffer.covered, light)
         return visible
 
 

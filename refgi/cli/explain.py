@@ -48,6 +48,7 @@ def _explain(session: Session, /, method: str, preset: str, pairs: tuple[str, ..
     The method runs at a small size. The four rows are those of SII Table 1: light and camera still or moving. With
     --measure each skip is switched off at the picture's own size; the exit code is 1 where that changes a bit.
     """
+    from refgi import stages
     from refgi.cli.memory import require_memory
     from refgi.cli.options import on_threads
     from refgi.cli.session import progress
@@ -58,14 +59,16 @@ def _explain(session: Session, /, method: str, preset: str, pairs: tuple[str, ..
     from refgi.errors import RefgiWarning
 
     settings = settings_for(method, pairs, seed, preset)
-    whole = View(**options).load()
+    with stages.observe() as loading:
+        whole = View(**options).load()
     scene = _small(whole)
     require_memory(whole if measure else scene, dtype, rsm_resolution, traced=method == "truth",
                    settings={method: settings})
     frame_options = {"dtype": dtype, "rsm_resolution": rsm_resolution, "shadows": shadows}
     with on_threads(threads), progress() as tell:
         warm_up([method], dtype, tell)
-        first = _watch(scene, method, settings, frame_options, None)
+        first = [dataclasses.replace(run, depth=0) for run in loading.runs if run.status == "skipped"]
+        first += _watch(scene, method, settings, frame_options, None)
         tell(method, 0.2)
         animation = {}
         with warnings.catch_warnings():

@@ -152,7 +152,7 @@ def light_pixels(
     footprint = footprints(frame, settings.lights, settings.pairs)
     warn_of_clamp(receivers_of(frame), lights, settings.pairs, footprint, "val")
     return clustered_irradiance(
-        receivers_of(frame), face_normals(frame), lights, areas, maps, settings, footprint=footprint,
+        receivers_of(frame), frame.gbuffer.facing, lights, areas, maps, settings, footprint=footprint,
         visibility_of=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
         rays=frame.tracer if settings.maps.behind == "raytrace" else None)
 
@@ -226,23 +226,6 @@ def receivers_of(frame: "Frame") -> Receivers:
         Positions and shading normals.
     """
     return Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
-
-
-def face_normals(frame: "Frame") -> Array:
-    """Return the normals of the triangles that a frame's pixels see.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene with its buffers.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Unit vectors on the side of the shading normals.
-    """
-    buffer = frame.gbuffer
-    return facing_normals(frame.scene.geometry, buffer.triangle_id, buffer.normal)
 
 
 def extra_bytes(settings: ValSettings, extent: Extent) -> int:

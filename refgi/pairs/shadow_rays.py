@@ -3,7 +3,7 @@
     E(x) = sum_i Phi_i / pi <n_i . w> <n_x . -w> / r^2 V(x, x_i),
 
 and the same with a lobe. A ray is traced for each pair whose unshadowed term is not zero. Pairs are made in batches and
-never all held.
+never all held. That a light lies below the receiver's face is part of V: without visibility cosines alone bound a pair.
 
 `RayReceivers` are the points to light: position, shading normal, face normal and the origin of their shadow rays.
 
@@ -111,7 +111,7 @@ def shadowed_sum(
     lights : PixelLights
         The lights.
     visibility : bool
-        Whether to trace the rays; without, every pair counts.
+        Whether to trace the rays; without, every pair counts, below the receiver's face as well.
     batch : int
         Pairs held at a time; changes no bit of the result.
     hidden : callable, optional
@@ -135,6 +135,7 @@ def summed(tracer: Tracer, to: RayReceivers, lights: "PixelLights", visibility: 
     contributions. None leaves them as they are.
     """
     senders, total = senders_of(lights), np.zeros((3, len(to.pixel)))
+    to = to if visibility else to._replace(facing=to.normal)  # no face hides anything
     step = max(1, batch // LIGHTS_AT_A_TIME)
     for first in range(0, total.shape[1], step):
         last = min(first + step, total.shape[1])

@@ -159,7 +159,7 @@ class Tracer:
         Parameters
         ----------
         position, normal : (3, h, w) ndarray
-            Points and unit normals, world space, m.
+            Points, m, and the unit normals of their faces, world space.
         covered : (h, w) bool ndarray
             Where there is a surface.
         light : Light
@@ -168,7 +168,7 @@ class Tracer:
         Returns
         -------
         (h, w) bool ndarray
-            True where nothing blocks; False without surface and where the light is behind the normal.
+            True where nothing blocks; False without surface and where the light is behind the face.
         """
         at, up = position[:, covered].T.astype(np.float64), normal[:, covered].T.astype(np.float64)
         origins = at + self.offsets(at)[:, None] * up

@@ -21,6 +21,7 @@ from refgi.scene.repair import lights_with_power, repaired_all, warn_of_flat_fac
 from refgi.scene.texture.image import image_file
 from refgi.scene.texture.texture import Texture
 from refgi.scene.transform import transformed_all
+from refgi.stages import skip
 
 READERS: dict[str, Callable[[Path], Contents]] = {
     ".glb": read_gltf, ".gltf": read_gltf, ".obj": read_obj, ".ply": read_ply,
@@ -195,6 +196,9 @@ def _object_meshes(
         try:
             meshes += [_with_material(mesh, item, materials, entry.smooth_normals, path.parent)
                        for mesh in found.meshes]
+            if item.smooth_normals is None and "smooth_normals" not in entry.model_fields_set and any(
+                    mesh.normals is not None for mesh in found.meshes):
+                skip("scene.vertex_normals", f"{item.mesh}: the scene file says nothing of smooth_normals")
         except InputError as error:
             faults.append(f"{path}: objects[{number}].material: {error}")
             continue

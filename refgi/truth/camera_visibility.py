@@ -80,8 +80,9 @@ def _aim_paths(view: Projection, surfaces: Surfaces, grain: float, paths: Paths,
     for ray in range(span[0], span[1]):
         rays.reach[ray] = 0
         if paths.triangle_id[ray] != MISS:
-            w, y = hit_point(paths, ray)
-            g = face_normal(surfaces, paths.triangle_id[ray], -w[0], -w[1], -w[2])  # where light leaves to the path
+            _, y = hit_point(paths, ray)
+            g = face_normal(surfaces, paths.triangle_id[ray], y[0] - view.origin[0, 0], y[1] - view.origin[0, 1],
+                            y[2] - view.origin[0, 2])  # on the eye's side; `leaves` asks whether that is the light's
             aim_at_eye(view, lift(surfaces, paths.triangle_id[ray], y, g, grain), y, g, written, ray)
 
 

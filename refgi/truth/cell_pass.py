@@ -24,7 +24,7 @@ def with_cells(task: Task) -> Task:
 def beside_of(task: Task, first: int) -> Beside:
     """Return what densities of lobes depend on, for rays of the receivers from `first` on."""
     assert task.cells is not None
-    return Beside(task.cells, task.receivers, task.counts, first)
+    return Beside(task.cells, task.receivers, task.counts, first, task.sides.hide)
 
 
 def add_cells(task: Task, seed: int, sums: Array) -> None:

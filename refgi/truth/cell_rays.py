@@ -80,6 +80,7 @@ class Beside(NamedTuple):
     receivers: RayReceivers
     counts: Counts
     first: int  # receiver of the first ray
+    hide: bool  # as in `refgi.truth.paths.Sides`
 
 
 class Tops(NamedTuple):
@@ -110,7 +111,7 @@ def picks_for(count: int) -> Picks:
 @kernel
 def near_density(directions: float, cos_x: float, image: float, sender: tuple[float, float, float]) -> Any:
     """Return (n_a + n_c) r^2; `image`: k_c p_c D. `sender`: <g.-w>, d^2 (1 for a directional light), <g.l>."""
-    return (directions * cos_x / np.pi + image) * sender[0] * sender[1] / max(sender[2], 1e-30)
+    return (directions * cos_x / np.pi + image) * abs(sender[0]) * sender[1] / max(sender[2], 1e-30)
 
 
 @kernel
@@ -350,7 +351,9 @@ def _connect_to_receiver(beside: Beside, r: int, surfaces: Surfaces, lights: Lig
     y = (y[0] - height * g[0], y[1] - height * g[1], y[2] - height * g[2])
     way, n = subtract(y, point_of(receivers.position, r)), point_of(receivers.normal, r)
     length = math.sqrt(dot(way, way))
-    if length == 0 or dot(g, way) >= 0 or dot(point_of(receivers.facing, r), way) <= 0 or dot(n, way) <= 0:
+    if length == 0 or dot(n, way) <= 0:
+        return
+    if beside.hide and (dot(g, way) >= 0 or dot(point_of(receivers.facing, r), way) <= 0):
         return
     w = (way[0] / length, way[1] / length, way[2] / length)
     toward, power = toward_light(lights, k, y), row(lights.intensity, k)

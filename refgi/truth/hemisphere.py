@@ -17,12 +17,12 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import DIRECTIONAL, incident_light
-from refgi.rays import MISS
+from refgi.rays import MISS, ray_offset
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.scene import LightTable
 from refgi.truth.cell_rays import Beside, Tops, found_for, near_density, rays_beside, tops_for
 from refgi.truth.next_event import aim_at_light, toward_light
-from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point, row
+from refgi.truth.paths import CHUNK, Paths, Shadows, Sides, dot, hit_point, leaves, row
 from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_pattern, shading_normal
 from refgi.truth.textured import diffuse_at
 
@@ -69,22 +69,33 @@ def shifted(points: Array, s: int, pixel: int, seed: int) -> tuple[float, float]
     return u, ((points[s, 1] ^ hash_bits(word ^ np.uint32(0xB5297A4D))) + 0.5) * 2.0**-32
 
 
+@kernel
+def to_far_side(receivers: RayReceivers, r: int, above: float, grain: float) -> Any:
+    """Return how far below its usual origin a ray starts: 0, m, or where it goes below the face the way through it."""
+    if above > 0 or grain < 0:
+        return 0.0
+    return 2.0 * ray_offset(receivers.position[0, r], receivers.position[1, r], receivers.position[2, r], grain)
+
+
 @kernel(parallel=True)
-def send(receivers: RayReceivers, span: tuple[int, int], points: Array, seed: int, reach: float, paths: Paths) -> None:
+def send(receivers: RayReceivers, span: tuple[int, int], points: Array, seed: int, reach: float, grain: float,
+         paths: Paths) -> None:
     """Send one ray for each point of the set from each receiver of a span.
 
     `span`: first receiver and one past the last. `points` (s, 2) uint32: the pass's point set. `seed`: random shift: a
-    hash of it and the receiver's pixel. `reach`: how far to look, m. `paths`: origins, directions, reach, lengths,
-    cosines and weights are filled.
+    hash of it and the receiver's pixel. `reach`: how far to look, m. `grain`: the tracer's, m, where rays go below the
+    receiver's face as well; negative: they do not. `paths`: origins, directions, reach, lengths, cosines and weights
+    are filled.
     """
     count = span[1] - span[0]
     for chunk in prange((count + CHUNK - 1) // CHUNK):
-        _send(receivers, span[0], (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)), points, seed, reach, paths)
+        _send(receivers, span[0], (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)), points, seed, reach, grain,
+              paths)
 
 
 @kernel
 def _send(receivers: RayReceivers, first: int, span: tuple[int, int], points: Array, seed: int, reach: float,
-          paths: Paths) -> None:
+          grain: float, paths: Paths) -> None:
     origins, directions, reaches, travelled, cosines, _, _, weights = paths
     pixel, _, normals, facing, starts = receivers
     ray = span[0] * len(points)
@@ -94,19 +105,20 @@ def _send(receivers: RayReceivers, first: int, span: tuple[int, int], points: Ar
             x, y, z = cosine_direction(*shifted(points, s, pixel[r], seed))
             w = around(normal, x, y, z)
             above = facing[0, r] * w[0] + facing[1, r] * w[1] + facing[2, r] * w[2]
-            reaches[ray] = reach if above > 0 else 0
+            reaches[ray] = reach if above > 0 or grain >= 0 else 0
+            down = to_far_side(receivers, r, above, grain)
             travelled[ray] = 0
             cosines[ray] = z
             for c in range(3):
-                origins[ray, c] = starts[c, r]
+                origins[ray, c] = starts[c, r] - down * facing[c, r]
                 directions[ray, c] = w[c]
                 weights[ray, c] = np.pi / len(points)
             ray += 1
 
 
 @kernel(parallel=True)
-def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, float, float], paths: Paths,
-           shadows: Shadows, beside: Beside | None) -> None:
+def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, float, float], sides: Sides,
+           paths: Paths, shadows: Shadows, beside: Beside | None) -> None:
     """Next-event estimation: write the shadow ray from each hit point to one light, and its contribution.
 
     `limits`: bound on G in units of 1 / footprint (0: none), measure of one light direction (sr or m^2), and the
@@ -115,12 +127,13 @@ def gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, 
     """
     count = len(paths.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):
-        _gather(surfaces, lights, k, limits, paths, shadows, beside, (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
+        _gather(surfaces, lights, k, limits, sides, paths, shadows, beside,
+                (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
 
 
 @kernel
-def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, float, float], paths: Paths,
-            shadows: Shadows, beside: Beside | None, span: tuple[int, int]) -> None:
+def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float, float, float], sides: Sides,
+            paths: Paths, shadows: Shadows, beside: Beside | None, span: tuple[int, int]) -> None:
     bound, measure, grain = limits
     if beside is not None:
         tops = tops_for(beside.cells.tree)
@@ -135,8 +148,8 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         # the most frequent exits first, before anything is divided or normalised
         toward = toward_light(lights, k, y)
         cross = face_cross(surfaces, triangle)
-        side, side_out = dot(cross, toward), dot(cross, w)
-        if side * side_out <= 0:
+        side = dot(cross, toward)
+        if not leaves(sides, y, cross, side, dot(cross, w)):
             continue
         glossy = row(surfaces.specular, material)
         has_lobe = max(glossy[0], glossy[1], glossy[2]) > 0
@@ -156,7 +169,7 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         g = (cross[0] * scale, cross[1] * scale, cross[2] * scale)
         n = shading_normal(surfaces, triangle, y, g)
         # radiance = rho F / pi * pattern / <g.w>, F = E_perp <g.l>
-        factor = dot(g, light) / (np.pi * dot(g, w))
+        factor = dot(g, light) / (np.pi * abs(dot(g, w)))
         # pattern times the MIS weight max(0, (G - b) / G)
         diffuse, lobe = max(0.0, dot(n, w) - least), 0.0
         if has_lobe:

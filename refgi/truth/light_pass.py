@@ -78,7 +78,7 @@ def pick_points(task: Task, sets: PointSets, span: tuple[int, int], picks: int, 
     """
     rays, picked = shadow_batch((span[1] - span[0]) * picks), np.empty((span[1] - span[0]) * picks, np.int32)
     written = (rays.origin, rays.direction, rays.reach, rays.contribution, picked)
-    sampling = (span[0], picks, seed, np.float32(task.tracer.grain))
+    sampling = (span[0], picks, seed, np.float32(task.tracer.grain), task.sides.hide)
     if task.lobes is None:
         pick(*sets, task.receivers, tiles(task.set_of, *span), sampling, written)
     else:

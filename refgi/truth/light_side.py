@@ -71,9 +71,12 @@ def _diffuse_term(points: LightVertices, j: int, tile: Array, i: int) -> Any:
 
 
 @kernel
-def aim(points: LightVertices, j: int, receivers: RayReceivers, r: int, grain: Any, origins: Array, directions: Array,
-         ray: int) -> Any:
-    """Write the shadow segment to a picked point and return its reach: 1, or 0 where a face is seen from behind."""
+def aim(points: LightVertices, j: int, receivers: RayReceivers, r: int, grain: Any, hide: bool, origins: Array,
+        directions: Array, ray: int) -> Any:
+    """Write the shadow segment to a picked point and return its reach: 1, or 0 where a face is seen from behind.
+
+    `hide`: as in `Sides`; without, no segment is traced, and its reach is 1.
+    """
     real = np.float32
     from_x, from_y = real(0), real(0)
     x, y, z = points.position[0, j], points.position[1, j], points.position[2, j]
@@ -85,7 +88,7 @@ def aim(points: LightVertices, j: int, receivers: RayReceivers, r: int, grain: A
         toward = points.position[c, j] - receivers.position[c, r]
         from_x += receivers.facing[c, r] * toward
         from_y -= points.facing[c, j] * toward
-    return real(1) if from_x > real(0) and from_y > real(0) else real(0)
+    return real(1) if not hide or (from_x > real(0) and from_y > real(0)) else real(0)
 
 
 def tiles(set_of: Array, first: int, last: int) -> tuple[Array, Array]:
@@ -104,14 +107,15 @@ def tiles(set_of: Array, first: int, last: int) -> tuple[Array, Array]:
 
 @kernel(parallel=True)
 def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: tuple[Array, Array],
-         sampling: tuple[int, int, int, Any], rays: tuple[Array, Array, Array, Array, Array]) -> None:
+         sampling: tuple[int, int, int, Any, bool], rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Pick light vertices for each receiver of some tiles; write shadow rays and their contributions.
 
     `starts` (sets, 2) int64: first block of each set and one past its last. `tiles`: receivers
     sorted by set, and the table of tiles. `sampling`: first receiver of the span; picks of each; seed of the random
     shift, a hash of it and the receiver's pixel; the tracer's grain: segments end above the sender's face by
-    `ray_offset` and `far_offset`, m. `rays`: filled: origins, directions (n, 3), reach (n,), contribution (n, 3) W/m^2,
-    float32, and the point picked (n,) int32; n = picks x receivers. The reach is 0 where there is nothing to gain.
+    `ray_offset` and `far_offset`, m; whether faces hide what lies behind them. `rays`: filled: origins, directions
+    (n, 3), reach (n,), contribution (n, 3) W/m^2, float32, and the point picked (n,) int32; n = picks x receivers. The
+    reach is 0 where there is nothing to gain.
     """
     members, table = tiles
     for number in prange(len(table)):
@@ -135,11 +139,11 @@ def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: t
 
 @kernel
 def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array, tile: Array,
-              sampling: tuple[int, int, int, Any], sums: tuple[int, Array, Array],
+              sampling: tuple[int, int, int, Any, bool], sums: tuple[int, Array, Array],
               rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Let receivers pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""
     origins, directions, reach, contribution, picked = rays
-    first, picks, seed, grain = sampling
+    first, picks, seed, grain, hide = sampling
     first_point, blocks, parts = sums
     real = np.float32
     for i in range(len(members)):
@@ -161,7 +165,7 @@ def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array, ti
                 j += 1
                 term = _diffuse_term(points, j, tile, i)
             if term > real(0):
-                reach[ray] = aim(points, j, receivers, r, grain, origins, directions, ray)
+                reach[ray] = aim(points, j, receivers, r, grain, hide, origins, directions, ray)
                 picked[ray] = j
                 for c in range(3):
                     contribution[ray, c] = share * points.colour[c, j]

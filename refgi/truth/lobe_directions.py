@@ -18,10 +18,10 @@ from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS
 from refgi.scene import LightTable
-from refgi.truth.hemisphere import shifted
+from refgi.truth.hemisphere import shifted, to_far_side
 from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, comes_by_photons, density_on_axis
 from refgi.truth.next_event import aim_at_light, toward_light
-from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point, row
+from refgi.truth.paths import CHUNK, Paths, Shadows, Sides, dot, hit_point, leaves, row
 from refgi.truth.surfaces import around, face_cross, lift, lobe_pattern, shading_normal
 from refgi.truth.textured import diffuse_at
 
@@ -30,23 +30,23 @@ Array = npt.NDArray[Any]
 
 @kernel(parallel=True)
 def send_along_lobes(receivers: RayReceivers, lobes: Lobes, span: tuple[int, int], points: Array, seed: int,
-                     paths: Paths, density: Array) -> None:
+                     grain: float, paths: Paths, density: Array) -> None:
     """Send one ray for each point of the set along the lobe of each receiver of a span.
 
     `span`: first receiver and one past the last. `points` (s, 2) uint32: the pass's point set. `seed`: random shift: a
-    hash of it and the receiver's pixel. `paths`: origins, directions, reach, lengths, cosines and weights are filled.
-    `density` (n,) float64: filled: D <m.w>^P of each direction, 1/sr; inf for a receiver that takes nothing from light
-    vertices.
+    hash of it and the receiver's pixel. `grain`: as for `send`. `paths`: origins, directions, reach, lengths, cosines
+    and weights are filled. `density` (n,) float64: filled: D <m.w>^P of each direction, 1/sr; inf for a receiver that
+    takes nothing from light vertices.
     """
     count = span[1] - span[0]
     for chunk in prange((count + CHUNK - 1) // CHUNK):
-        _send(receivers, lobes, span[0], (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)), points, seed, paths,
-              density)
+        _send(receivers, lobes, span[0], (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)), points, seed, grain,
+              paths, density)
 
 
 @kernel
 def _send(receivers: RayReceivers, lobes: Lobes, first: int, span: tuple[int, int], points: Array, seed: int,
-          paths: Paths, density: Array) -> None:
+          grain: float, paths: Paths, density: Array) -> None:
     origins, directions, reaches, travelled, cosines, _, _, weights = paths
     pixel, _, normals, facing, starts = receivers
     ray, count = span[0] * len(points), len(points)
@@ -58,7 +58,8 @@ def _send(receivers: RayReceivers, lobes: Lobes, first: int, span: tuple[int, in
             w = around(mirror, x, y, z)
             cosine = normals[0, r] * w[0] + normals[1, r] * w[1] + normals[2, r] * w[2]
             above = facing[0, r] * w[0] + facing[1, r] * w[1] + facing[2, r] * w[2]
-            reaches[ray] = np.inf if above > 0 and cosine > 0 else 0
+            reaches[ray] = np.inf if (above > 0 or grain >= 0) and cosine > 0 else 0
+            down = to_far_side(receivers, r, above, grain)
             travelled[ray] = 0
             cosines[ray] = cosine
             # cos^P = u^(P / (P + 1))
@@ -67,14 +68,14 @@ def _send(receivers: RayReceivers, lobes: Lobes, first: int, span: tuple[int, in
             # f_s <n.w> over the density
             weight = cosine * (exponent + 2) / (exponent + 1) / count
             for c in range(3):
-                origins[ray, c] = starts[c, r]
+                origins[ray, c] = starts[c, r] - down * facing[c, r]
                 directions[ray, c] = w[c]
                 weights[ray, c] = lobes.specular[c, r] * weight
             ray += 1
 
 
 @kernel(parallel=True)
-def gather_along_lobes(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float, float],
+def gather_along_lobes(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float, float], sides: Sides,
                        rays: tuple[int, int], paths: Paths, density: Array, shadows: Shadows) -> None:
     """Next-event estimation: write the shadow ray from each hit point to one light, and its contribution.
 
@@ -84,13 +85,13 @@ def gather_along_lobes(lobes: Lobes, lights: LightTable, k: int, limits: tuple[b
     """
     count = len(paths.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):
-        _gather(lobes, lights, k, limits, rays, paths, density, shadows,
+        _gather(lobes, lights, k, limits, sides, rays, paths, density, shadows,
                 (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
 
 
 @kernel
-def _gather(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float, float], rays: tuple[int, int],
-            paths: Paths, density: Array, shadows: Shadows, span: tuple[int, int]) -> None:
+def _gather(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float, float], sides: Sides,
+            rays: tuple[int, int], paths: Paths, density: Array, shadows: Shadows, span: tuple[int, int]) -> None:
     _, measure, grain = limits
     directional, surfaces = lights.kind[k] == DIRECTIONAL, lobes.surfaces
     for ray in range(span[0], span[1]):
@@ -101,8 +102,8 @@ def _gather(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float,
         w, y = hit_point(paths, ray)
         toward = toward_light(lights, k, y)
         cross = face_cross(surfaces, triangle)
-        side, side_out = dot(cross, toward), dot(cross, w)
-        if side * side_out <= 0:
+        side = dot(cross, toward)
+        if not leaves(sides, y, cross, side, dot(cross, w)):
             continue
         lx, ly, lz, far, red, green, blue = incident_light(lights, k, y[0], y[1], y[2])
         if max(red, green, blue) <= 0:
@@ -114,6 +115,8 @@ def _gather(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float,
         n = shading_normal(surfaces, triangle, y, g)
         share = 1.0  # of the power heuristic: 1 / (1 + (r^2 / A)^2)
         if limits[0] and density[ray] < np.inf:
+            if cos_out < 0:  # light vertices have all that leaves below its face
+                continue
             length = np.float64(paths.travelled[ray]) + paths.distance[ray]
             a = density[ray] * cos_out * (measure if directional else measure * dot(toward, toward)) / cos_in
             ratio = length * length / a
@@ -124,7 +127,7 @@ def _gather(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float,
         if max(glossy[0], glossy[1], glossy[2]) > 0:
             lobe = _lobe_share(lobes, rays[0] + ray // rays[1], surfaces.material_of_face[triangle], share)
             lobe *= lobe_pattern(surfaces, surfaces.material_of_face[triangle], n, light, w)
-        factor, most = cos_in / (np.pi * cos_out), 0.0
+        factor, most = cos_in / (np.pi * abs(cos_out)), 0.0
         for c in range(3):
             # radiance = rho F / pi * pattern / <g.w>, F = E_perp <g.l>
             contribution = paths.weight[ray, c] * factor * irradiance[c] * (rho[c] * diffuse + glossy[c] * lobe)

@@ -104,7 +104,7 @@ def _term(points: LightVertices, j: int, tile: Array, i: int) -> Any:
 
 @kernel(parallel=True)
 def pick_for_lobes(points: LightVertices, starts: Array, receivers: RayReceivers, lobes: Lobes,
-                   tiles: tuple[Array, Array], sampling: tuple[int, int, int, Any, float],
+                   tiles: tuple[Array, Array], sampling: tuple[int, int, int, Any, bool, float],
                    rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Pick light vertices for each glossy receiver of some tiles; write shadow rays and their contributions.
 
@@ -116,7 +116,7 @@ def pick_for_lobes(points: LightVertices, starts: Array, receivers: RayReceivers
         low, high, chosen = table[number, 0], table[number, 1], table[number, 2]
         # lanes beyond the count receive nothing
         tile = np.zeros((ROWS, TILE), np.float32)
-        _fill_tile(receivers, lobes, members[low:high], sampling[4], tile)
+        _fill_tile(receivers, lobes, members[low:high], sampling[5], tile)
         first, size = starts[chosen, 0], starts[chosen, 1] - starts[chosen, 0]
         parts, blocks = np.zeros((size * PARTS, TILE), np.float32), np.zeros((size, TILE), np.float32)
         lanes = min(TILE, (high - low + LANES - 1) // LANES * LANES)
@@ -143,11 +143,11 @@ def _fill_tile(receivers: RayReceivers, lobes: Lobes, members: Array, directions
 
 @kernel
 def _pick_all(points: LightVertices, receivers: RayReceivers, lobes: Lobes, members: Array, tile: Array,
-              sampling: tuple[int, int, int, Any, float], sums: tuple[int, Array, Array],
+              sampling: tuple[int, int, int, Any, bool, float], sums: tuple[int, Array, Array],
               rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Let receivers pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""
     origins, directions, reach, contribution, picked = rays
-    first, picks, seed, grain, _ = sampling
+    first, picks, seed, grain, hide, _ = sampling
     first_point, blocks, parts = sums
     real = np.float32
     for i in range(len(members)):
@@ -169,7 +169,7 @@ def _pick_all(points: LightVertices, receivers: RayReceivers, lobes: Lobes, memb
                 j += 1
                 term = _term(points, j, tile, i)
             if term > real(0):
-                reach[ray] = aim(points, j, receivers, r, grain, origins, directions, ray)
+                reach[ray] = aim(points, j, receivers, r, grain, hide, origins, directions, ray)
                 picked[ray] = j
                 for c in range(3):
                     contribution[ray, c] = share * points.colour[c, j] * real(lobes.specular[c, r])

@@ -50,7 +50,8 @@ def _add_directions(task: Task, words: Array, sums: Array) -> None:
     points = scrambled_points(count, int(words[3]))
     for first, last in spans(task, count):
         paths, density = paths_for((last - first) * count), np.empty((last - first) * count)
-        send_along_lobes(task.receivers, task.lobes, (first, last), points, int(words[3]), paths, density)
+        send_along_lobes(task.receivers, task.lobes, (first, last), points, int(words[3]), task.grain_below, paths,
+                         density)
         for bounce in range(task.settings.bounces):
             if bounce == 0:
                 _follow_lobes(task, paths, density, first, sums)
@@ -69,7 +70,7 @@ def _follow_lobes(task: Task, paths: Paths, density: Array, first: int, sums: Ar
             measure, _ = footprint(light, task.scene.geometry, task.settings.light_grid)
             shadows = shadow_batch(len(paths.reach))
             gather_along_lobes(task.lobes, task.lights, k, (task.picks > 0, measure, task.tracer.grain),
-                               (first, task.directions), paths, density, shadows)
+                               task.sides, (first, task.directions), paths, density, shadows)
             if hidden is not None:
                 shadows.reach[hidden] = 0
             add_unblocked(task, shadows, first, task.directions, sums, True)

@@ -120,7 +120,7 @@ def _hemisphere(task: Task, words: Array, sums: Array) -> None:
     points, reach = scrambled_points(count, int(words[3])), _reach(task)
     for first, last in spans(task, count):
         paths = paths_for((last - first) * count)
-        send(task.receivers, (first, last), points, int(words[3]), reach, paths)
+        send(task.receivers, (first, last), points, int(words[3]), reach, task.grain_below, paths)
         for bounce in range(task.settings.bounces):
             if bounce:
                 scatter(task.surfaces, task.tracer.grain, int(words[3 + bounce]), task.receivers, first, count, paths)
@@ -137,7 +137,8 @@ def follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums:
         for k, light in enumerate(task.scene.lights):
             measure, _ = footprint(light, task.scene.geometry, task.settings.light_grid)
             shadows = shadow_batch(len(paths.reach))
-            gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.grain), paths, shadows, beside)
+            gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.grain), task.sides, paths, shadows,
+                   beside)
             if hidden is not None:
                 shadows.reach[hidden] = 0
             add_unblocked(task, shadows, first, count, sums, True)

@@ -42,6 +42,13 @@ class Shadows(NamedTuple):
     contribution: Array  # (n, 3) float32, W/m^2
 
 
+class Sides(NamedTuple):
+    """On which sides of faces light leaves and arrives."""
+
+    hide: bool  # a face hides what lies behind it; else cosines of interpolated normals alone bound a pair
+    eye: tuple[float, float, float]  # of the camera that has to see an emitter, m; nan: none has to
+
+
 @kernel
 def dot(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
     """Return the dot product of two vectors."""
@@ -55,6 +62,18 @@ def row(rows: Array, i: int) -> tuple[float, float, float]:
     `rows` (n, 3): vectors or colours.
     """
     return np.float64(rows[i, 0]), np.float64(rows[i, 1]), np.float64(rows[i, 2])
+
+
+@kernel
+def leaves(sides: Sides, y: tuple[float, float, float], cross: tuple[float, float, float], lit: float,
+           out: float) -> bool:
+    """Return whether light may leave a point towards a path.
+
+    `y`: the point, m. `cross`: along its face's normal. `lit`, `out`: how far along that the light and the path lie.
+    """
+    if lit * out <= 0 and (sides.hide or lit * out == 0):
+        return False
+    return not lit * dot(cross, (sides.eye[0] - y[0], sides.eye[1] - y[1], sides.eye[2] - y[2])) <= 0
 
 
 @kernel

@@ -15,7 +15,7 @@ from refgi.truth.cell_rays import Counts
 from refgi.truth.light_grid import Density
 from refgi.truth.lobe_cells import LobeCells
 from refgi.truth.lobe_receivers import Lobes
-from refgi.truth.paths import Shadows
+from refgi.truth.paths import Shadows, Sides
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import Surfaces
 
@@ -42,8 +42,19 @@ class Task(NamedTuple):
     @property
     def counts(self) -> Counts:
         """Samples of each receiver in a pass that meet senders' lobes; the light estimator knows no directions."""
-        mirrors = self.picks // 2 if self.directions else 0
+        mirrors = self.picks // 2 if self.directions and self.sides.hide else 0
         return Counts(self.directions, self.picks - mirrors, mirrors)
+
+    @property
+    def sides(self) -> Sides:
+        """Whether faces hide what lies behind them: with visibility, and where no normal differs from its face's."""
+        eye = (math.nan,) * 3 if self.view is None else tuple(self.view.origin[0].tolist())
+        return Sides(self.settings.visibility or not len(self.surfaces.normals), eye)
+
+    @property
+    def grain_below(self) -> float:
+        """The tracer's grain where receivers see below their faces, m; -1 where they do not."""
+        return -1.0 if self.sides.hide else float(self.tracer.grain)
 
     @property
     def picks(self) -> int:

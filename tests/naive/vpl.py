@@ -11,8 +11,8 @@ from tests.naive.pair_term import contributions
 def picture(frame, lights, visibility=True, maps=None, seed=0):
     """Return the irradiance, (3, h, w), by lights that were chosen from the frame's shadow maps.
 
-    Nothing arrives from below a face, whatever normals are interpolated; what leaves below one is blocked by it. With
-    `maps`, settings of imperfect ones, those stand for rays.
+    With visibility nothing arrives from below a face, whatever normals are interpolated, and what leaves below one is
+    blocked by it; without, cosines alone bound a pair. With `maps`, settings of imperfect ones, those stand for rays.
     """
     buffer, geometry = frame.gbuffer, frame.scene.geometry
     pixels = np.argwhere(buffer.covered)
@@ -25,7 +25,7 @@ def picture(frame, lights, visibility=True, maps=None, seed=0):
     for i, sent in enumerate(light):
         place = lights.position[:, i].astype(float)
         toward = place - position
-        counts = ((toward * facing).sum(axis=1) > 0) & sent.any(axis=1)
+        counts = sent.any(axis=1) & (((toward * facing).sum(axis=1) > 0) | (not visibility))
         if visibility and maps is not None:
             counts[counts] = unmapped(corners_of(geometry), lights, i, position[counts], facing[counts], maps, seed)
         elif visibility:

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from refgi import stages
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene import Camera, DirectionalLight, PointLight, SpotLight, load_scene
 from tests.scene.samples import SCENE, TRIANGLES, glb_bytes, ply_bytes, write_scene
@@ -76,6 +77,22 @@ def test_normals_only_where_asked_for(tmp_path: Path) -> None:
     for key, value, expected in (("smooth_normals", None, False), ("smooth_normals", True, False)):
         scene = load_scene(write_scene(tmp_path, **{key: value}))
         assert (scene.geometry.vertex_normals is not None) is expected  # the mesh has none to give
+
+
+@pytest.mark.parametrize(("said", "noted"), [({}, True), ({"smooth_normals": False}, False),
+                                             ({"smooth_normals": True}, False)])
+def test_normals_that_nobody_asks_for_are_noted(said: dict[str, bool], noted: bool, data_dir: Path,
+                                                tmp_path: Path) -> None:
+    """A mesh file on its own is shaded with its normals; a scene file that says nothing leaves them out."""
+    tree = json.loads((data_dir / "metaballs.json").read_text()) | said
+    for item in tree["objects"]:
+        item["mesh"] = str(data_dir / item["mesh"])
+    (tmp_path / "scene.json").write_text(json.dumps(tree))
+    with stages.observe() as log:
+        scene = load_scene(tmp_path / "scene.json")
+    notes = [run.reason for run in log.runs if run.name == "scene.vertex_normals"]
+    assert ["metaballs.ply: the scene file says nothing of smooth_normals" in note for note in notes] == [True] * noted
+    assert (scene.geometry.vertex_normals is not None) == said.get("smooth_normals", False)
 
 
 @pytest.mark.parametrize(("change", "key", "value"), [

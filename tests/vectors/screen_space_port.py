@@ -41,6 +41,7 @@ def points(arrays):
 
 def shadows(case, arrays, index):
     position, normal = points(arrays)
+    normal = arrays.get("gbuffer.facing", normal)  # planes, sides and offsets are the face's
     visible = np.zeros(position.shape[1:], bool)
     lamp = lamps(arrays).get(f"light{index}")
     for at in pixels(arrays):

@@ -29,7 +29,7 @@ from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import Clusters, ValSettings
-from refgi.cluster.val import face_normals, val
+from refgi.cluster.val import val
 from refgi.frame import Frame
 from refgi.lights import PixelLights
 from refgi.lights.selection import choose_lights
@@ -221,7 +221,7 @@ def lit_by(frame: Frame, found: Clustered, settings: ValSettings, maps: ShadowMa
     maps = maps_of(frame, found, settings) if maps is None else maps
     to = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
     by_reference = reference_visibility(frame, found.lights, found.areas, maps, settings)
-    return clustered_irradiance(to, face_normals(frame), found.lights, found.areas, maps, settings,
+    return clustered_irradiance(to, frame.gbuffer.facing, found.lights, found.areas, maps, settings,
                                 visibility_of=by_reference)
 
 

@@ -67,7 +67,7 @@ def clustered_irradiance(
     receivers : Receivers
         Receivers; their dtype is that of the result.
     facing : (3, h, w) ndarray
-        Normals of the triangles that the points lie on.
+        Normals of the triangles that the points lie on; the receivers' own array where nothing is interpolated.
     lights : PixelLights
         N lights.
     areas : AreaLights
@@ -79,7 +79,8 @@ def clustered_irradiance(
     footprint : (N,) ndarray, optional
         Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
     visibility_of : callable, optional
-        V from elsewhere: (m, points (3, n), facing (3, n)) -> (n,).
+        V from elsewhere, a `VisibilityFunction`: (m, points (3, n), facing (3, n)) -> (n,), with the receivers' normals
+        by the name `shading` where they are not the faces'.
     interleaving : int
         n: each pixel of n x n sums its own lights, n^2 times; 1: all.
     rays : Tracer, optional
@@ -121,7 +122,8 @@ def clustered_irradiance(
     if by_tiles:
         _add_by_tiles(tiles, members, areas, maps, settings, sums)
     else:
-        _add_by_lists(tiles, parts, members, visibility_by(areas, maps, settings, visibility_of, rays), sums)
+        _add_by_lists(tiles, parts, members, visibility_by(areas, maps, settings, visibility_of, rays),
+                      is_interpolated(receivers.normal, facing), sums)
     result = np.zeros(np.shape(receivers.position), sums.dtype)
     scatter_pixels(sums, parts, sums.dtype.type(interleaving**2), result.reshape(3, -1))
     clear(result, covered, shown)
@@ -225,7 +227,8 @@ def _filters(maps: "ShadowMaps | None", chosen: Array, settings: "ValSettings") 
 
 
 def _add_by_lists(
-    tiles: ReceiverTiles, parts: Subsets, members: MemberLights, visibility_of: VisibilityFunction, sums: Array
+    tiles: ReceiverTiles, parts: Subsets, members: MemberLights, visibility_of: VisibilityFunction,
+    interpolated: bool, sums: Array
 ) -> None:
     """Add every area light to receivers: the light of its members first, then V where there is any."""
     packed = members.packed
@@ -238,9 +241,15 @@ def _add_by_lists(
             add_members(tiles.position, tiles.normal, parts, members, m, part)
         places = places_with_light(part)
         if len(places):
-            visible = visibility_of(m, tiles.position[:, places], tiles.facing[:, places])
+            shading = {"shading": tiles.normal[:, places]} if interpolated else {}
+            visible = visibility_of(m, tiles.position[:, places], tiles.facing[:, places], **shading)
             sums[:, places] += part[:, places] * np.asarray(visible, sums.dtype)
         report_progress((m + 1) / len(members.start))
+
+
+def is_interpolated(normal: Array, facing: Array) -> bool:
+    """Return whether normals are others than the faces': they share no memory (`facing_normals`)."""
+    return not np.may_share_memory(normal, facing)
 
 
 def places_with_light(part: Array) -> Array:
@@ -259,9 +268,9 @@ def visibility_by(
     if visibility_of is not None:
         return visibility_of
 
-    def by_maps(m: int, points: Array, facing: Array) -> Array:
+    def by_maps(m: int, points: Array, facing: Array, shading: Array | None = None) -> Array:
         if maps is None or settings.visibility is None:
             return np.ones(points.shape[1], points.dtype)
-        return visibility(maps, areas, m, points, facing, settings, rays)
+        return visibility(maps, areas, m, points, facing, settings, rays, shading)
 
     return by_maps

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
-from refgi.cluster.lighting.clustered import places_with_light, visibility_by
+from refgi.cluster.lighting.clustered import is_interpolated, places_with_light, visibility_by
 from refgi.cluster.lighting.interleave import member_lights, some_lights
 from refgi.errors import expect
 from refgi.pairs.glossy import as_receivers, block_order, summed
@@ -40,7 +40,7 @@ def clustered_radiance(
     points : GlossyPoints
         The n receivers; their dtype is that of the result.
     facing : (3, n) ndarray
-        Normals of the triangles that the points lie on.
+        Normals of the triangles that the points lie on; the points' own array where nothing is interpolated.
     lights : PixelLights
         N lights.
     areas : AreaLights
@@ -52,7 +52,7 @@ def clustered_radiance(
     footprint : (N,) ndarray, optional
         Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
     visibility_of : callable, optional
-        V from elsewhere: (m, points (3, n), facing (3, n)) -> (n,).
+        As for `clustered_irradiance`.
     rays : Tracer, optional
         As for `clustered_irradiance`.
     width : int
@@ -76,14 +76,15 @@ def clustered_radiance(
     order = np.arange(len(points.pixel)) if width == 0 else block_order(points.pixel, width)
     here = GlossyPoints(*(np.ascontiguousarray(plane[..., order]) for plane in points))
     faces = np.ascontiguousarray(facing[:, order], here.position.dtype)
-    sums = np.zeros_like(here.position)
+    sums, interpolated = np.zeros_like(here.position), is_interpolated(points.normal, facing)
     for m, (start, lobe_start) in enumerate(zip(members.start, members.lobe_start, strict=True)):
         some = some_lights(members.packed, start, lobe_start)
         if some.diffuse.shape[1] > 1 or some.lobes is not None:
             part = summed(here, some, (None, None))
             places = places_with_light(part)
             if len(places):
-                visible = visible_from(m, here.position[:, places], faces[:, places])
+                shading = {"shading": here.normal[:, places]} if interpolated else {}
+                visible = visible_from(m, here.position[:, places], faces[:, places], **shading)
                 # Sec. 4: sum_m V_m L_m
                 sums[:, places] += part[:, places] * np.asarray(visible, sums.dtype)
         report_progress((m + 1) / len(members.start))

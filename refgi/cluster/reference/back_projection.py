@@ -51,13 +51,14 @@ def back_projection_visibility(
     Returns
     -------
     callable
-        ``(m, points (3, n), facing (3, n)) -> (n,)``, in the dtype of the points.
+        A `VisibilityFunction`, in the dtype of the points.
 
     Notes
     -----
     Patches of neighbouring texels at unlike depths leave gaps or overlap, as published: V is too large behind slanted
     surfaces by up to their share. What a map does not see from its centre cannot hide anything. An area light without
-    a map has V = 1, and so has a receiver with no part of the rectangle above its surface.
+    a map has V = 1, and so has a receiver with no part of the rectangle above its horizon. What lies above that of an
+    interpolated normal and below the face counts as hidden.
     """
     @lru_cache(maxsize=2)
     def patches_of(m: int, sign: float) -> Patches:
@@ -65,19 +66,23 @@ def back_projection_visibility(
         depth, frame = (maps.depth, maps.frame[k]) if sign > 0 else (maps.behind, BACKWARD @ maps.frame[k])
         return _patches(np.asarray(depth)[k], frame, _axes(areas, m) * turned)
 
-    def visibility_of(m: int, points: Array, facing: Array) -> Array:
+    def visibility_of(m: int, points: Array, facing: Array, shading: Array | None = None) -> Array:
         k, visible = maps.map_of[m], np.ones(points.shape[1])
         center = maps.center[k] if k >= 0 else areas.center[:, m]
         x = _axes(areas, m) @ (points.astype(np.float64) - center[:, None])
         up = _axes(areas, m) @ facing.astype(np.float64)
+        horizon = up if shading is None else _axes(areas, m) @ shading.astype(np.float64)
         for sign in () if k < 0 else (1.0,) if maps.behind is None else (1.0, -1.0):
             turned = np.array([1.0, 1.0, sign])[:, None]  # behind: mirrored, so that it lies ahead
             low, cell = _grid(areas, maps, m, k)
             low[2] *= sign
             on = x[2] * sign > 0
-            visible[on] = _visible(patches_of(m, sign), turned * x[:, on], turned * up[:, on], low, cell)
+            visible[on] = _visible(patches_of(m, sign), turned * x[:, on], turned * up[:, on],
+                                   turned * horizon[:, on], low, cell)
         if rays is not None:
-            visible[x[2] <= 0] = rays(m, points[:, x[2] <= 0], facing[:, x[2] <= 0])
+            back = x[2] <= 0
+            beside = {} if shading is None else {"shading": shading[:, back]}
+            visible[back] = rays(m, points[:, back], facing[:, back], **beside)
         return visible.astype(points.dtype)
 
     return visibility_of
@@ -112,17 +117,17 @@ def _grid(areas: AreaLights, maps: ShadowMaps, m: int, k: int) -> tuple[Array, A
     return np.array([*(areas.offset[:, m] - side / 2), lift]), side / CELLS
 
 
-def _visible(patches: Patches, x: Array, up: Array, low: Array, cell: Array) -> Array:
+def _visible(patches: Patches, x: Array, up: Array, horizon: Array, low: Array, cell: Array) -> Array:
     visible = np.ones(x.shape[1])
-    _project(patches.corner, patches.direction, patches.depth, np.ascontiguousarray(x), np.ascontiguousarray(up), low,
-             cell, visible)
+    _project(patches.corner, patches.direction, patches.depth, np.ascontiguousarray(x), np.ascontiguousarray(up),
+             np.ascontiguousarray(horizon), low, cell, visible)
     return visible
 
 
 @kernel(parallel=True)
-def _project(corner: Array, direction: Array, depth: Array, x: Array, up: Array, low: Array, cell: Array,
-             visible: Array) -> None:
-    """Fill V of receivers (3, n) ahead of the rectangle."""
+def _project(corner: Array, direction: Array, depth: Array, x: Array, up: Array, horizon: Array, low: Array,
+             cell: Array, visible: Array) -> None:
+    """Fill V of receivers (3, n) ahead of the rectangle; `up` normals of their faces, `horizon` those of cosines."""
     blocks = (x.shape[1] + AT_ONCE - 1) // AT_ONCE
     for block in prange(blocks):
         hidden, quad = np.zeros((CELLS, CELLS), np.bool_), np.empty((4, 2))
@@ -135,7 +140,7 @@ def _project(corner: Array, direction: Array, depth: Array, x: Array, up: Array,
                 limit = height / approach if approach * height > 0.0 else np.inf
                 if depth[k] < limit * (1.0 - SLACK) and _project_patch(corner, k, x, i, low, cell, quad):
                     _hide(quad, hidden)
-            visible[i] = _share(hidden, x, up, i, low, cell)
+            visible[i] = _share(hidden, x, up, horizon, i, low, cell)
 
 
 @kernel
@@ -172,14 +177,15 @@ def _hide(quad: Array, hidden: Array) -> None:
 
 
 @kernel
-def _share(hidden: Array, x: Array, up: Array, i: int, low: Array, cell: Array) -> float:
-    """Return the share of the cells above the receiver's surface that nothing hides."""
+def _share(hidden: Array, x: Array, up: Array, horizon: Array, i: int, low: Array, cell: Array) -> float:
+    """Return the share of the cells above the receiver's horizon that nothing hides, its face among that."""
     free, whole = 0, 0
     for row in range(CELLS):
         v = low[1] + (row + 0.5) * cell[1] - x[1, i]
         for column in range(CELLS):
-            u = low[0] + (column + 0.5) * cell[0] - x[0, i]
-            if u * up[0, i] + v * up[1, i] + (low[2] - x[2, i]) * up[2, i] > 0.0:
+            u, w = low[0] + (column + 0.5) * cell[0] - x[0, i], low[2] - x[2, i]
+            if u * horizon[0, i] + v * horizon[1, i] + w * horizon[2, i] > 0.0:
                 whole += 1
-                free += 0 if hidden[row, column] else 1
+                above = u * up[0, i] + v * up[1, i] + w * up[2, i] > 0.0
+                free += 1 if above and not hidden[row, column] else 0
     return free / whole if whole > 0 else 1.0

@@ -36,6 +36,7 @@ class Ball(NamedTuple):
 def free_share(
     tracer: "Tracer", points: Array, facing: Array, targets: Array, upward: Array,
     contribution: Callable[[Array, Array], Array] | None, grain: float, ball: Ball | None = None,
+    shading: Array | None = None,
 ) -> Array:
     """Return the share of each receiver's rays that arrives, each ray weighted by its contribution.
 
@@ -44,19 +45,21 @@ def free_share(
     tracer : Tracer
         What blocks.
     points, facing : (3, n) ndarray
-        Receivers (m) and the unit normals of their surfaces, off which rays start.
+        Receivers (m) and the unit normals of their faces, off which rays start.
     targets : (3, k) ndarray
         Points on lights, m.
     upward : (3, k) or (3, 1) ndarray
         Unit normals at the targets, on the side that rays come from.
     contribution : callable or None
         ``(toward (n, k, 3), up (n, 3)) -> (n, k)``: the weight of each ray, 0 or more, by vectors from some receivers
-        to the targets and the receivers' normals; None: all the same. Rays without weight, and those to targets below a
-        receiver's surface, are not traced.
+        to the targets and the receivers' normals; None: all the same. Targets below the horizon of `shading` do not
+        count; those above it and below the face count as hidden.
     grain : float
         The scene tracer's: how far above their surfaces rays start and end, as `ray_offset` has it, m.
     ball : Ball, optional
         Rays end where they enter it.
+    shading : (3, n) ndarray, optional
+        Unit normals that cosines are taken with; the faces' where absent.
 
     Returns
     -------
@@ -69,12 +72,13 @@ def free_share(
     step = max(1, RAYS_AT_ONCE // max(1, targets.shape[1]))
     for first in range(0, len(visible), step):
         part = slice(first, first + step)
-        at, up = points[:, part].T.astype(np.float64), facing[:, part].T.astype(np.float64)
+        at, face = points[:, part].T.astype(np.float64), facing[:, part].T.astype(np.float64)
+        up = face if shading is None else shading[:, part].T.astype(np.float64)
         toward = targets.T[None] - at[:, None]
-        above = np.einsum("nkc,nc->nk", toward, up) > 0
-        weight = np.where(above, 1.0 if contribution is None else contribution(toward, up), 0.0)
-        reach = np.where(weight > 0, _way_to(ball, at, toward), 0.0)
-        starts = at + STEPS * (np.abs(at).sum(axis=1, keepdims=True) + grain) * up
+        counts, above = (np.einsum("nkc,nc->nk", toward, n) > 0 for n in (up, face))
+        weight = np.where(counts, 1.0 if contribution is None else contribution(toward, up), 0.0)
+        reach = np.where(above & (weight > 0), _way_to(ball, at, toward), 0.0)
+        starts = at + STEPS * (np.abs(at).sum(axis=1, keepdims=True) + grain) * face
         lift = STEPS * (np.abs(targets).sum(axis=0) + grain + np.abs(toward).sum(axis=2))
         arrives = ~_blocked(tracer, starts, targets.T + lift[..., None] * upward.T, reach)
         whole = weight.sum(axis=1)
@@ -126,13 +130,13 @@ def rectangle_visibility(
     Returns
     -------
     callable
-        ``(m, points (3, n), facing (3, n)) -> (n,)``, in the dtype of the points.
+        A `VisibilityFunction`, in the dtype of the points.
 
     Notes
     -----
     The rectangle is the bounding one with its own sides, not a disc or square of size Delta. As in the maps,
     nothing within a share `near_distance` of the cluster's radius around the centre blocks, or no plane that passes
-    there (`near_geometry`). Points below the receiver's surface do not count; where none is left V is 1. Behind the
+    there (`near_geometry`). Points below the receiver's horizon do not count; where none is left V is 1. Behind the
     area light V is 1 ("visible"), or what rays say in all other modes of `behind`.
     """
     drawn = blockers(frame.scene.geometry, settings.occluders_alone, ends)
@@ -142,7 +146,7 @@ def rectangle_visibility(
     def tracer_of(m: int) -> Tracer:
         return tracer_without_near(frame, drawn, areas, m, settings)
 
-    def visibility_of(m: int, points: Array, facing: Array) -> Array:
+    def visibility_of(m: int, points: Array, facing: Array, shading: Array | None = None) -> Array:
         tracer, visible = tracer_of(m), np.ones(points.shape[1], points.dtype)
         radius = settings.near_share * float(areas.radius[m])
         ball = Ball(areas.center[:, m], radius) if settings.near_geometry == "ball" else None
@@ -151,7 +155,8 @@ def rectangle_visibility(
         for side in (1.0, -1.0):
             on = within & (height * side > 0)
             visible[on] = free_share(tracer, points[:, on], facing[:, on], rectangle_points(areas, m, on_square),
-                                     side * areas.normal[:, m, None], None, frame.tracer.grain, ball)
+                                     side * areas.normal[:, m, None], None, frame.tracer.grain, ball,
+                                     None if shading is None else shading[:, on])
         return visible
 
     return visibility_of

@@ -45,13 +45,14 @@ def vpl_visibility(
     Returns
     -------
     callable
-        ``(m, points (3, n), facing (3, n)) -> (n,)``, in the dtype of the points.
+        A `VisibilityFunction`, in the dtype of the points.
 
     Notes
     -----
-    Lights that face away from a receiver, or lie below its surface, give it nothing and do not count; where none is
-    left V is 1. There is no rule for receivers behind the area light: each light has a normal of its own. A light's
-    flux is the sum over its channels, diffuse and glossy.
+    Lights that face away from a receiver, or lie below its horizon, give it nothing and do not count; where none is
+    left V is 1. Those above the horizon of an interpolated normal and below the face count as hidden. There is no rule
+    for receivers behind the area light: each light has a normal of its own. A light's flux is the sum over its
+    channels, diffuse and glossy.
     """
     position, normal = (np.asarray(a, np.float64) for a in (lights.position, lights.normal))
     flux = np.asarray(lights.flux, np.float64).sum(axis=0)
@@ -60,7 +61,7 @@ def vpl_visibility(
     order = np.argsort(areas.of, kind="stable")
     first = np.searchsorted(areas.of[order], np.arange(len(areas.members) + 1))
 
-    def visibility_of(m: int, points: Array, facing: Array) -> Array:
+    def visibility_of(m: int, points: Array, facing: Array, shading: Array | None = None) -> Array:
         of = order[first[m] : first[m + 1]]
 
         def contribution(toward: Array, up: Array) -> Array:
@@ -75,7 +76,7 @@ def vpl_visibility(
             return light
 
         return free_share(frame.tracer, points, facing, position[:, of], normal[:, of], contribution,
-                          frame.tracer.grain)
+                          frame.tracer.grain, shading=shading)
 
     return visibility_of
 
@@ -102,7 +103,7 @@ def reference_visibility(
     Returns
     -------
     callable or None
-        ``(m, points (3, n), facing (3, n)) -> (n,)``; None where it is not by reference.
+        A `VisibilityFunction`; None where it is not by reference.
     """
     if isinstance(settings.visibility, RaysVpls):
         return vpl_visibility(frame, lights, areas)

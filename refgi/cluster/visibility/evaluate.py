@@ -27,7 +27,7 @@ BESIDE = (np.arange(4) + 0.5) / 4  # points along a side of the rectangle that r
 @stage("cluster.visibility", kept=False)
 def visibility(
     maps: ShadowMaps, areas: AreaLights, m: int, points: Array, facing: Array, settings: ValSettings,
-    tracer: "Tracer | None" = None,
+    tracer: "Tracer | None" = None, shading: Array | None = None,
 ) -> Array:
     """Return how much of one area light each point sees.
 
@@ -42,11 +42,13 @@ def visibility(
     points : (3, n) ndarray
         World space, m.
     facing : (3, n) ndarray
-        Normals of their surfaces; on the lit side for rays, else on either.
+        Normals of their faces; on the lit side for rays, else on either.
     settings : ValSettings
         `visibility` is one of `BY_MAPS` or None; `maps.behind` says what points behind the area light see.
     tracer : Tracer, optional
         Rays against the scene, for points behind the area light and ``maps.behind == "raytrace"``.
+    shading : (3, n) ndarray, optional
+        Normals that cosines are taken with, for the same; the faces' where absent.
 
     Returns
     -------
@@ -80,14 +82,16 @@ def visibility(
     if traced and tracer is not None:
         back = areas.normal[:, m] @ (points - areas.center[:, m, None]) <= 0
         radius = settings.drawn_maps.near_share * float(areas.radius[m])
-        visible[back] = _by_rays(tracer, areas, m, radius, points[:, back], facing[:, back])
+        visible[back] = _by_rays(tracer, areas, m, radius, points[:, back], facing[:, back],
+                                 None if shading is None else shading[:, back])
     return visible
 
 
-def _by_rays(tracer: "Tracer", areas: AreaLights, m: int, radius: float, points: Array, facing: Array) -> Array:
+def _by_rays(tracer: "Tracer", areas: AreaLights, m: int, radius: float, points: Array, facing: Array,
+             shading: Array | None) -> Array:
     targets = rectangle_points(areas, m, np.array(np.meshgrid(BESIDE, BESIDE)).reshape(2, -1))
     ball = Ball(areas.center[:, m], radius)
-    return free_share(tracer, points, facing, targets, -areas.normal[:, m, None], None, tracer.grain, ball)
+    return free_share(tracer, points, facing, targets, -areas.normal[:, m, None], None, tracer.grain, ball, shading)
 
 
 @kernel(parallel=True)

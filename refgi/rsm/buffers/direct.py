@@ -1,6 +1,7 @@
 """Direct light of one light source: irradiance at the receivers, and shadow-map visibility.
 
-The shadow test compares with the receiver's own plane (a receiver-plane depth bias) in place of a constant bias.
+The shadow test compares with the receiver's own plane (a receiver-plane depth bias) in place of a constant bias. The
+plane is the face's, whatever normal the cosine is taken with: above an interpolated one lies part of the face itself.
 """
 
 import math
@@ -12,7 +13,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.radiometry import FOR_FLOAT32, POINT, SPOT, falloff_in_float64, incident_light
+from refgi.radiometry import DIRECTIONAL, FOR_FLOAT32, POINT, SPOT, falloff_in_float64, incident_light
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.buffers.texel_rays import row_view
@@ -46,14 +47,14 @@ class SurfacePoints(NamedTuple):
 
 @stage("rsm.shadow_map_visibility")
 def shadow_map_visibility(
-    position: Array, normal: Array, covered: Array, rsm: Rsm, bias: float | None = None
+    position: Array, normal: Array, covered: Array, rsm: Rsm, bias: float | None = None, interpolated: bool = False
 ) -> Array:
     """Return which receivers a light reaches: the shadow-map test, one look-up at the nearest texel.
 
     Parameters
     ----------
     position, normal : (3, h, w) ndarray
-        Receivers, world space.
+        Receivers, world space, and the unit normals of their faces.
     covered : (h, w) ndarray of bool
         Where there is a receiver.
     rsm : Rsm
@@ -61,6 +62,9 @@ def shadow_map_visibility(
     bias : float, optional
         A receiver is visible up to this far behind the stored depth, m: the published test. By default it is in
         shadow where the stored point lies above the receiver's own plane by more than a fraction of a texel.
+    interpolated : bool
+        Whether cosines are those of interpolated normals. These may face a light that the face is turned away from:
+        such receivers are in shadow then, as they are for rays.
 
     Returns
     -------
@@ -84,7 +88,22 @@ def shadow_map_visibility(
     shadow_map = ShadowMap(depth.reshape(-1), map_position.reshape(3, -1), -1.0 if bias is None else bias)
     receivers = SurfacePoints(position, normal, covered)
     _shadow_lookup(rsm.projection, receivers, shadow_map, numba.get_num_threads(), visible)
+    if interpolated:
+        _hide_turned_away(light_table((rsm.light,)), position, normal, visible)
     return visible
+
+
+@kernel(parallel=True)
+def _hide_turned_away(lights: LightTable, position: Array, normal: Array, visible: Array) -> None:
+    """Clear `visible` where the light is behind the face."""
+    for row in prange(visible.shape[0]):
+        receivers, factor = SurfacePoints(position, normal, visible), np.empty(visible.shape[1])
+        if lights.kind[0] == DIRECTIONAL:
+            _directional_factors(lights, receivers, row, visible[row], factor)
+        else:
+            _point_factors(lights, receivers, row, visible[row], factor)
+        for x in range(len(factor)):
+            visible[row, x] = factor[x] > 0.0
 
 
 @kernel(parallel=True)

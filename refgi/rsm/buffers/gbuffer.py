@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, resolve_at, resolve_materials
+from refgi.rsm.buffers.facing import facing_normals
 from refgi.rsm.buffers.surfaces import Surface
 from refgi.rsm.buffers.textures import paint
 from refgi.rsm.pool import plane
@@ -105,6 +106,13 @@ class GBuffer:
     def normal(self) -> Array:
         """Unit normal on the visible side, (3, h, w): interpolated where the geometry has vertex normals."""
         return self.resolve("normal")[0]
+
+    @property
+    def facing(self) -> Array:
+        """Unit normal of the face on the side of `normal`, (3, h, w); the very array `normal` on flat geometry."""
+        if "facing" not in self._channels:
+            self._channels["facing"] = facing_normals(self._geometry, self.triangle_id, self.normal)
+        return self._channels["facing"]
 
     @property
     def albedo(self) -> Array:

@@ -16,8 +16,11 @@ Test = Callable[..., Arrays]
 SQUARE = "horizontal", "vertical"  # what a square map does not tell
 
 
-def shadow_map_family(test: Test, name: str, maps: Projection, index: int) -> tuple[Bug, ...]:
-    """Return likely bugs of a look-up: `test` (arrays, type, constant bias), `name` of the map, number of the light."""
+def shadow_map_family(test: Test, name: str, maps: Projection, index: int, facing: str) -> tuple[Bug, ...]:
+    """Return likely bugs of a look-up.
+
+    `test` (arrays, type, constant bias); `name` of the map, number of the light, name of the normals of faces.
+    """
     if maps.kind == PARABOLOID:
         return ()
     made, printed = f"shadow{index}.visible", name.replace(".", "__")
@@ -40,7 +43,7 @@ def shadow_map_family(test: Test, name: str, maps: Projection, index: int) -> tu
         Bug("points outside the map are lit: beyond a spot's cone", outside, OUTSIDE),
         Bug("lit and shadowed points are exchanged: the depth comparison is turned round", inverted, PLANE),
         Bug("the receiver's normal points inwards: the plane's bias has the wrong sign",
-            reading(test, gbuffer__normal=lambda a: -a), PLANE),
+            reading(test, **{facing.replace(".", "__"): np.negative}), PLANE),
         *(Bug(f"the map: {cause}", _viewed(test, name, maps, change), paper)
           for cause, change, paper in view_changes(maps) if not any(word in cause for word in SQUARE)),
         Bug("depths of the map are one column off", reading(test, **{

@@ -28,6 +28,7 @@ from refgi.vectors.stages.buffers import (
     geometry_of,
     light_of,
 )
+from refgi.vectors.stages.facing import FACING, add_facing
 
 POINTS = ("gbuffer.position", "gbuffer.normal", "gbuffer.triangle_id")
 Shadows = Literal["map", "exact"]
@@ -36,6 +37,8 @@ Shadows = Literal["map", "exact"]
 def add_direct(recipe: Recipe, scene: Scene, size: tuple[int, int], shadows: Shadows, resolution: int = 32) -> None:
     """Add shadows and direct irradiance of all lights: `size` (columns, rows), texels of a shadow map's side."""
     view = camera_projection(scene.camera, *size)
+    if scene.geometry.vertex_normals is not None:
+        add_facing(recipe, scene)
     for index, light in enumerate(scene.lights):
         _give_light(recipe, f"light{index}", light)
         if shadows == "exact":
@@ -53,6 +56,21 @@ def surface_points(arrays: Arrays, real: Any, scene: Scene, view: Projection) ->
     return GBuffer(scene.geometry, materials, view, ids, real, known)
 
 
+def _faces(scene: Scene) -> tuple[str, str, str]:
+    """Return the names of the pixels' positions, of their faces' normals and of their ids."""
+    return (POINTS[0], POINTS[1] if scene.geometry.vertex_normals is None else FACING, POINTS[2])
+
+
+def _interpolated(run: Any, scene: Scene) -> tuple[Bug, ...]:
+    """Return the bug of shadows that take interpolated normals, of a smooth scene."""
+    def altered(arrays: Arrays, real: Any) -> Arrays:
+        return dict(run({**arrays, FACING: arrays[POINTS[1]]}, real))
+
+    smooth = scene.geometry.vertex_normals is not None
+    return (Bug("interpolated normals in place of faces'", altered, "docs/conventions: which normal serves what"),
+            ) if smooth else ()
+
+
 def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
     """Add the depths that a light sees, and whether it sees what the camera does."""
     name, light = f"rsm{index}", scene.lights[index]
@@ -60,22 +78,22 @@ def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
     _give_maps(recipe, name, maps)
     _add_ids(recipe, name, name, maps, scene)
     _add_surface(recipe, name, name, maps, scene, ("depth", "position", "normal"))
-    depths = f"{name}.depth", f"{name}.position"
+    depths, points = (f"{name}.depth", f"{name}.position"), _faces(scene)
 
     def test(arrays: Arrays, real: Any, bias: float | None = None) -> Arrays:
         projection = _maps_of(arrays, name, maps)
         view = GBuffer(scene.geometry, material_table(scene.materials, real), projection,
                        _visible(np.zeros(maps.shape, np.int32)), real)
         known = {key.split(".")[1]: np.ascontiguousarray(arrays[key], real) for key in depths}
-        position, normal = (np.ascontiguousarray(arrays[key], real) for key in POINTS[:2])
+        position, normal = (np.ascontiguousarray(arrays[key], real) for key in points[:2])
         rsm = Rsm(light, view, material_table(scene.materials, real), known)
         return {f"shadow{index}.visible": shadow_map_visibility(position, normal, np.asarray(arrays[POINTS[2]]) >= 0,
-                                                                rsm, bias)}
+                                                                rsm, bias, points[1] == FACING)}
 
     printed = name.replace(".", "__")
     recipe.add(f"shadow{index}", "the nearest texel's point does not lie above the receiver's own plane", test,
-               (*POINTS, *_map_names(name), *depths), {f"shadow{index}.visible": _visible_spec()},
-               paper="docs/rasterizer: receiver-plane bias", exact=(*POINTS[:2], *depths), bugs=(
+               (*points, *_map_names(name), *depths), {f"shadow{index}.visible": _visible_spec()},
+               paper="docs/rasterizer: receiver-plane bias", exact=(*points[:2], *depths), bugs=(
                    Bug("the bias is a constant 0", lambda a, r: test(a, r, 0.0), "receiver-plane bias"),
                    Bug("the bias is a constant tenth of the scene's size", lambda a, r: test(a, r, 0.2),
                        "receiver-plane bias"),
@@ -84,16 +102,16 @@ def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
                    Bug("the map's depths are those at its texels' corners", reading(test, **{
                        f"{printed}__depth": _moved, f"{printed}__position": _moved}), "texel centres at + 1/2"),
                    Bug("nothing is in shadow", writing(test, **{f"shadow{index}__visible": np.ones_like}), ""),
-                   *shadow_map_family(test, name, maps, index)))
+                   *_interpolated(test, scene), *shadow_map_family(test, name, maps, index, points[1])))
 
 
 def _add_rays(recipe: Recipe, scene: Scene, index: int) -> None:
     """Add whether a ray from each pixel's point reaches a light."""
-    lamp, light = f"light{index}", scene.lights[index]
+    lamp, light, points = f"light{index}", scene.lights[index], _faces(scene)
 
     def test(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 rays have one precision
         tracer = Tracer(geometry_of(arrays, scene))
-        position, normal, triangle_id = (np.asarray(arrays[key]) for key in POINTS)
+        position, normal, triangle_id = (np.asarray(arrays[key]) for key in points)
         return {f"shadow{index}.visible": tracer.visible_from_light(position, normal, triangle_id >= 0,
                                                                     light_of(arrays, lamp, light))}
 
@@ -101,10 +119,10 @@ def _add_rays(recipe: Recipe, scene: Scene, index: int) -> None:
     wrong = (Bug("the light is looked for at the origin", reading(test, **{
         place[0].replace(".", "__"): np.zeros_like}), "a ray to the light"),) if place else ()
     recipe.add(f"shadow{index}", "no triangle lies between the pixel's point and the light", test,
-               (*SCENE, *POINTS, *_light_names(lamp, light)), {f"shadow{index}.visible": _visible_spec()},
-               paper="shadow rays", exact=("scene.vertices", *POINTS[:2]), bugs=(
+               (*SCENE, *points, *_light_names(lamp, light)), {f"shadow{index}.visible": _visible_spec()},
+               paper="shadow rays", exact=("scene.vertices", *points[:2]), bugs=(
                    Bug("nothing is in shadow", writing(test, **{f"shadow{index}__visible": np.ones_like}), ""),
-                   Bug("rays start below the surface", reading(test, gbuffer__normal=lambda a: -a),
+                   Bug("rays start below the surface", reading(test, **{points[1].replace(".", "__"): np.negative}),
                        "off the surface, on the side that is seen"), *wrong))
 
 

@@ -15,15 +15,13 @@ from refgi.cluster.lighting.interleave import (
 )
 from refgi.cluster.settings import BackProjection, BoxBlur, Csm, GeometryBlur, Hard, Pcf, Pcss, ValSettings
 from refgi.pairs.irradiance import Receivers, checked
-from refgi.rsm import facing_normals
 from refgi.scene import Scene
 from refgi.settings import replaced
 from refgi.vectors.bugs.pair import EQ2, RECEIVERS
-from refgi.vectors.bugs.val_facing import facing_bugs
 from refgi.vectors.bugs.val_sum import sum_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
-from refgi.vectors.stages.buffers import VECTOR, geometry_of
+from refgi.vectors.stages.facing import add_facing
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.val_areas import add_areas
 from refgi.vectors.stages.val_basis import add_basis
@@ -32,7 +30,7 @@ from refgi.vectors.stages.val_csm import add_csm
 from refgi.vectors.stages.val_maps import add_maps
 from refgi.vectors.stages.val_pcss import add_binary, add_pcss
 from refgi.vectors.stages.val_projected import add_back_projection
-from refgi.vectors.stages.val_search import FACING, add_search
+from refgi.vectors.stages.val_search import add_search
 
 BLUR = "VAL Sec. 6, E-VAL-13; docs/methods/val"
 
@@ -46,28 +44,9 @@ def add_val(recipe: Recipe, scene: Scene, settings: ValSettings) -> None:
     delta = recipe.expected()["areas.delta"]
     if isinstance(settings.visibility, Csm) and delta.any():
         add_basis(recipe, settings.visibility)
-    _add_facing(recipe, scene)
+    add_facing(recipe, scene)
     add_visibility(recipe, settings, delta)
     add_lighting(recipe, settings)
-
-
-def _add_facing(recipe: Recipe, scene: Scene) -> None:
-    smooth = scene.geometry.vertex_normals is not None
-    source = ("scene.vertices", "scene.faces", "scene.material_of_face", "scene.vertex_normals") if smooth else ()
-
-    def run(arrays: Arrays, real: Any) -> Arrays:
-        normal = np.ascontiguousarray(arrays["gbuffer.normal"], real)
-        if not smooth:
-            return {FACING: normal}
-        return {FACING: facing_normals(geometry_of(arrays, scene), np.asarray(arrays["gbuffer.triangle_id"]), normal)}
-
-    recipe.add("facing", "normals of the triangles that pixels see, on the side of the interpolated ones", run,
-               ("gbuffer.normal", "gbuffer.triangle_id", *source),
-               {FACING: Spec("xyz, row, column", VECTOR, "plane of what a pixel sees; 0 without surface", "world")},
-               paper="A.6 P4: receiver's plane", bugs=(
-                   Bug("they point away from the viewer", writing(run, **{"gbuffer__facing": lambda a: -a}), ""),
-                   *((Bug("interpolated normals", lambda a, r: {FACING: a["gbuffer.normal"]}, "d_plane"),  # noqa: ARG005
-                      *facing_bugs()) if smooth else ())))
 
 
 def add_visibility(recipe: Recipe, settings: ValSettings, delta: Array) -> None:

@@ -15,10 +15,10 @@ from refgi.vectors.bugs.val_cone import cone_bugs
 from refgi.vectors.bugs.val_pcf import pcf_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run
+from refgi.vectors.stages.facing import FACING
 from refgi.vectors.stages.val_maps import shadow_maps_of
 from refgi.vectors.stages.val_projected import BEHIND, of_both, second_map_bugs
 from refgi.vectors.stages.val_search import (
-    FACING,
     LIGHT,
     PIXELS,
     Lane,

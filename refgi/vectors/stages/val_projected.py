@@ -9,8 +9,9 @@ from refgi.cluster.maps.shadow_maps import BACKWARD
 from refgi.cluster.reference.back_projection import CELLS, back_projection_visibility
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run
+from refgi.vectors.stages.facing import FACING
 from refgi.vectors.stages.val_maps import shadow_maps_of
-from refgi.vectors.stages.val_search import FACING, LIGHT, PIXELS, share_spec
+from refgi.vectors.stages.val_search import LIGHT, PIXELS, share_spec
 
 BEHIND = "maps.behind"
 AREAS = ("areas.axes", "areas.side", "areas.offset", "clusters.center", "clusters.normal", "maps.scene_far")

@@ -28,7 +28,6 @@ from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.val_maps import VIEW, shadow_maps_of
 
 PIXELS = ("gbuffer.position", "gbuffer.triangle_id")
-FACING = "gbuffer.facing"
 PLACE = "area light, row, column"
 REGION = Spec("area light, (s, t, radius), row, column", "1", "disc of the map, [-1, 1] units; 0 where none")
 LIGHT = (*VIEW, "areas.delta", "maps.near")

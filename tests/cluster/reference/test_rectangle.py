@@ -7,6 +7,7 @@ import pytest
 
 from refgi.cluster.clustering.kmeans import cluster
 from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.lighting.clustered import visibility_by
 from refgi.cluster.maps.shadow_maps import shadow_maps
 from refgi.cluster.reference import back_projection_visibility, rectangle_visibility, reference_visibility
 from refgi.cluster.reference.rays import rectangle_points
@@ -17,6 +18,9 @@ from refgi.lights.selection import choose_lights
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
+from tests.cluster.reference.edge import SETTINGS as EDGE
+from tests.cluster.reference.edge import receivers, square_light
+from tests.cluster.reference.edge import scene as edge_scene
 from tests.naive import back_projection as naive
 from tests.naive import truth
 
@@ -166,3 +170,42 @@ def test_same_bits_for_any_threads_and_any_split(box):
         assert single.dtype == np.float32
         assert np.isfinite(single).all()
     assert reference_visibility(frame, lights, areas, maps, SETTINGS) is None
+
+
+@pytest.mark.feature("REF-32")
+def test_what_cosines_let_through_and_the_face_hides_counts_as_hidden(box):
+    """Receivers whose interpolated normal looks at an area light and whose face looks away."""
+    frame, _, areas, points, _ = box
+    behind = replaced(SETTINGS, {"behind": "raytrace"})
+    maps = shadow_maps(frame.scene.geometry, areas, SETTINGS.maps, np.float64)
+    given = {
+        1: (rectangle_visibility(frame, areas, SETTINGS.maps), back_projection_visibility(areas, maps)),
+        -1: (visibility_by(areas, maps, behind, None, frame.tracer),
+             back_projection_visibility(areas, maps, rectangle_visibility(frame, areas, behind.maps))),
+    }
+    tried = {side: 0 for side in given}
+    for m in np.flatnonzero(maps.map_of >= 0):
+        toward = areas.center[:, m, None] - points
+        reach = np.linalg.norm(areas.offset[:, m]) + np.linalg.norm(areas.side[:, m]) / 2
+        far = np.linalg.norm(toward, axis=0)
+        for side, functions in given.items():
+            some = (far > 1.01 * reach) & (side * height_above(areas, m, points) > 1e-3)
+            at, look, tried[side] = points[:, some], (toward / far)[:, some], tried[side] + np.count_nonzero(some)
+            for visibility_of in functions:
+                assert (visibility_of(m, at, -look) == 1).all()  # nothing counts
+                assert not visibility_of(m, at, -look, shading=look).any()
+    assert min(tried.values()) > 20
+
+
+@pytest.mark.feature("REF-32")
+def test_a_face_that_cuts_the_rectangle_hides_what_lies_behind_it():
+    frame, areas = Frame(edge_scene(), dtype=np.float64), square_light(0.5)
+    points, _, exact, _ = receivers(0.5)
+    lit = points[:, exact == 1][:, :3]
+    lit = lit + 1e-3 * (areas.center[:, :1] - lit)  # off the floor, in which no such face lies
+    maps = shadow_maps(frame.scene.geometry, areas, EDGE.maps, np.float64)
+    look = areas.center[:, :1] - lit
+    face = areas.axes[0, 0][:, None] - (areas.axes[0, 0] @ look) * look / (look**2).sum(axis=0)  # through the centre
+    for visibility_of in rectangle_visibility(frame, areas, EDGE.maps), back_projection_visibility(areas, maps):
+        half = visibility_of(0, lit, face / np.linalg.norm(face, axis=0), shading=look)
+        np.testing.assert_allclose(half, 0.5, atol=0.05)

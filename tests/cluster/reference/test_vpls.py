@@ -19,10 +19,10 @@ ROUNDING = 1e-6  # of the maximum: V times float64 terms against sums of float32
 PAIRS = 400
 
 
-@pytest.fixture(scope="module")
-def box():
-    """Return frame, lights, receivers and the sum that `vpl` takes."""
-    frame = Frame(load_scene("cornell_box"), width=20, height=20, rsm_resolution=64)
+@pytest.fixture(scope="module", params=["cornell_box", "cornell_sphere:faces=100"])
+def box(request):
+    """Return frame, lights, receivers and the sum that `vpl` takes: in a flat scene and on a coarse smooth mesh."""
+    frame = Frame(load_scene(request.param), width=20, height=20, rsm_resolution=64)
     lights = choose_lights(frame, SETTINGS.lights)
     lights = lights._replace(flux=np.broadcast_to(lights.flux.mean(axis=0), lights.flux.shape))  # all of one colour
     buffer = frame.gbuffer
@@ -49,7 +49,7 @@ def with_visibility(to, lights, areas, given):
     light, total = light_of_each(to, lights), np.zeros(to.position.shape[1])
     points, facing = to.position.astype(np.float64), to.facing.astype(np.float64)  # and so V is not rounded to float32
     for m in range(len(areas.members)):
-        total += given(m, points, facing) * light[:, areas.of == m].sum(axis=1)
+        total += given(m, points, facing, shading=to.normal.astype(np.float64)) * light[:, areas.of == m].sum(axis=1)
     return total
 
 

@@ -7,7 +7,7 @@ the light, F = I(l) cos(g, l) / d^2 the incident flux per area, w a direction aw
 - Lobe: rho_s F (P + 1) / (2 pi K) <r.w>^P [n.w > 0], r the mirror direction about n, K the part above the surface.
 
 Both are written rho F / pi * pattern(w), where pattern is <n.w>, or (P + 1) / (2 K) <r.w>^P. Light leaves only on the
-side of the light: g.w > 0.
+side of the light, g.w > 0, where faces hide what lies behind them (`refgi.truth.paths.Sides`).
 """
 
 import math

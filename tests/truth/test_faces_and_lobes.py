@@ -32,16 +32,17 @@ def test_nothing_arrives_from_below_a_face(estimator):
     assert before_a_wall(-1.6, askew)(estimator=estimator).mean.any()
 
 
+@pytest.mark.parametrize("visibility", [True, False])
 @pytest.mark.parametrize("estimator", ESTIMATORS)
-def test_nothing_leaves_through_the_back_of_a_face(estimator):
-    """A wall whose normals look up: a receiver behind it, before its normals, gets exactly nothing."""
+def test_nothing_leaves_through_the_back_of_a_face_that_hides(estimator, visibility):
+    """A wall whose normals look up: a receiver behind it, before its normals, gets nothing but without visibility."""
     floor = rectangle((1, -2, 3), (4, 0, 0), (0, 0, -6), WHITE)
     wall = rectangle((2, -1, -1), (0, 0, 2), (0, 2, 0), WHITE)
     room = scene([floor, wall], SIDEWAYS)
     normals = np.tile((-0.1, 0.995, 0.0), (len(room.geometry.vertices), 1))
     room = dataclasses.replace(room, geometry=dataclasses.replace(room.geometry, vertex_normals=normals))
-    settings = TruthSettings(samples=24 * 20, visibility=False, estimator=estimator)
-    for x, lit in ((2.5, False), (1.5, True)):
+    settings = TruthSettings(samples=24 * 20, visibility=visibility, estimator=estimator)
+    for x, lit in ((2.5, not visibility), (1.5, True)):
         result = at(room, [(x, 3.0, 0.0)], [(0.0, -1.0, 0.0)], settings, repeat=64)
         assert result.mean.any() == lit
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 ROUND = 1e-9  # a spread this near to that of a disc has no direction
-# (area light, points (3, n), facing (3, n)) -> V (n,); `shading` (3, n) by name where cosines take other normals
+# (area light, points (3, n), facing (3, n)) -> V (n,); one with a parameter `shading` takes the cosines' normals
 VisibilityFunction = Callable[..., Array]
 UPRIGHT = 0.999  # |y| of a normal from which a map's up is -z, as for all maps
 FLAT = 1e-5  # of a cluster's radius: a narrower rectangle is a line, of no width but the rounding of its lights

@@ -6,6 +6,7 @@ visibility that is found in Python (by rays, back projection, from behind), go b
 """
 
 from collections.abc import Iterator
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 import numba
@@ -79,8 +80,8 @@ def clustered_irradiance(
     footprint : (N,) ndarray, optional
         Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
     visibility_of : callable, optional
-        V from elsewhere, a `VisibilityFunction`: (m, points (3, n), facing (3, n)) -> (n,), with the receivers' normals
-        by the name `shading` where they are not the faces'.
+        V from elsewhere, a `VisibilityFunction`: (m, points (3, n), facing (3, n)) -> (n,). One with a parameter
+        `shading` is given the receivers' normals as well where they are not the faces'.
     interleaving : int
         n: each pixel of n x n sums its own lights, n^2 times; 1: all.
     rays : Tracer, optional
@@ -122,8 +123,8 @@ def clustered_irradiance(
     if by_tiles:
         _add_by_tiles(tiles, members, areas, maps, settings, sums)
     else:
-        _add_by_lists(tiles, parts, members, visibility_by(areas, maps, settings, visibility_of, rays),
-                      is_interpolated(receivers.normal, facing), sums)
+        visible_from = visibility_by(areas, maps, settings, visibility_of, rays)
+        _add_by_lists(tiles, parts, members, visible_from, asks_shading(visible_from, receivers.normal, facing), sums)
     result = np.zeros(np.shape(receivers.position), sums.dtype)
     scatter_pixels(sums, parts, sums.dtype.type(interleaving**2), result.reshape(3, -1))
     clear(result, covered, shown)
@@ -228,7 +229,7 @@ def _filters(maps: "ShadowMaps | None", chosen: Array, settings: "ValSettings") 
 
 def _add_by_lists(
     tiles: ReceiverTiles, parts: Subsets, members: MemberLights, visibility_of: VisibilityFunction,
-    interpolated: bool, sums: Array
+    shading: bool, sums: Array
 ) -> None:
     """Add every area light to receivers: the light of its members first, then V where there is any."""
     packed = members.packed
@@ -241,15 +242,15 @@ def _add_by_lists(
             add_members(tiles.position, tiles.normal, parts, members, m, part)
         places = places_with_light(part)
         if len(places):
-            shading = {"shading": tiles.normal[:, places]} if interpolated else {}
-            visible = visibility_of(m, tiles.position[:, places], tiles.facing[:, places], **shading)
+            beside = {"shading": tiles.normal[:, places]} if shading else {}
+            visible = visibility_of(m, tiles.position[:, places], tiles.facing[:, places], **beside)
             sums[:, places] += part[:, places] * np.asarray(visible, sums.dtype)
         report_progress((m + 1) / len(members.start))
 
 
-def is_interpolated(normal: Array, facing: Array) -> bool:
-    """Return whether normals are others than the faces': they share no memory (`facing_normals`)."""
-    return not np.may_share_memory(normal, facing)
+def asks_shading(visibility_of: VisibilityFunction, normal: Array, facing: Array) -> bool:
+    """Return whether V asks for the normals of cosines, and these are not the faces' own array (`facing_normals`)."""
+    return not np.may_share_memory(normal, facing) and "shading" in signature(visibility_of).parameters
 
 
 def places_with_light(part: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
-from refgi.cluster.lighting.clustered import is_interpolated, places_with_light, visibility_by
+from refgi.cluster.lighting.clustered import asks_shading, places_with_light, visibility_by
 from refgi.cluster.lighting.interleave import member_lights, some_lights
 from refgi.errors import expect
 from refgi.pairs.glossy import as_receivers, block_order, summed
@@ -76,15 +76,15 @@ def clustered_radiance(
     order = np.arange(len(points.pixel)) if width == 0 else block_order(points.pixel, width)
     here = GlossyPoints(*(np.ascontiguousarray(plane[..., order]) for plane in points))
     faces = np.ascontiguousarray(facing[:, order], here.position.dtype)
-    sums, interpolated = np.zeros_like(here.position), is_interpolated(points.normal, facing)
+    sums, shading = np.zeros_like(here.position), asks_shading(visible_from, points.normal, facing)
     for m, (start, lobe_start) in enumerate(zip(members.start, members.lobe_start, strict=True)):
         some = some_lights(members.packed, start, lobe_start)
         if some.diffuse.shape[1] > 1 or some.lobes is not None:
             part = summed(here, some, (None, None))
             places = places_with_light(part)
             if len(places):
-                shading = {"shading": here.normal[:, places]} if interpolated else {}
-                visible = visible_from(m, here.position[:, places], faces[:, places], **shading)
+                beside = {"shading": here.normal[:, places]} if shading else {}
+                visible = visible_from(m, here.position[:, places], faces[:, places], **beside)
                 # Sec. 4: sum_m V_m L_m
                 sums[:, places] += part[:, places] * np.asarray(visible, sums.dtype)
         report_progress((m + 1) / len(members.start))

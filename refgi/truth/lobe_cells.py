@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.rays import Tracer
+from refgi.rays import MISS, Tracer
 from refgi.scene import DirectionalLight, Light, LightTable, Scene
 from refgi.truth.light_grid import rays_through
 from refgi.truth.light_square import LightSquares, light_squares
@@ -126,6 +126,7 @@ def _sampled(source: _Source, k: int, corner: Array) -> tuple[Lobe, Array, Array
     square = ((corner[:, None, :2] + PLACES) / 2.0 ** corner[:, None, 2:]).transpose(1, 0, 2).reshape(-1, 2)
     rays = rays_through(light, source.scene.geometry, square, 1)
     triangle, distance = closest_of(source.tracer, rays)
+    distance[triangle == MISS] = 0
     points = light_vertices(source.surfaces, source.lights, k, rays, (triangle, distance), np.inf, lobes=True)
     position, axis, facing, normal = (field[:, 5 * m :].T.reshape(5, m, 3).astype(np.float64) for field in
                                       (points.position, points.axis, points.facing, points.normal))
@@ -135,7 +136,7 @@ def _sampled(source: _Source, k: int, corner: Array) -> tuple[Lobe, Array, Array
     width = 1 / (points.exponent[5 * m : 6 * m].astype(np.float64) + 1)
     cosine = np.maximum(-(facing[0] * rays.directions[:m]).sum(axis=1), GRAZING)
     parallel = isinstance(light, DirectionalLight)
-    radius = angle / cosine if parallel else angle * np.maximum(distance[:m], 0) / cosine
+    radius = angle / cosine if parallel else angle * distance[:m] / cosine
     edge = _on_edge(position, facing, power > 0)
     turn = _apart(normal[0], normal[1:])
     bend = np.maximum(_bend(source.surfaces, triangle[:m], radius),

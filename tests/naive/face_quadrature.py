@@ -2,10 +2,10 @@
 
     E(x) = sum_lamps int_A I / d^2 <g.l> V(y, lamp) p(y, l, w) <n.w> / r^2 V(x, y) dA,
 
-with p the diffuse part and the lobe of `tests.naive.light_tracing.pattern`, w from y to x. A face is cut into four until
-its integral by seven points (degree 5) and that of its quarters agree. What seven points could pass over is cut first:
-cells that are long beside their distance from receiver or lamp, and cells whose lobe is not flat between corners: with
-e = r - w a lobe is (1 - e^2 / 2)^P, a highlight around e = 0 whose width is 1 / sqrt(P).
+with p the diffuse part and the lobe of `tests.naive.light_tracing.pattern`, w from y to x. A face is cut into four
+until its integral by seven points (degree 5) and that of its quarters agree. What seven points could pass over is cut
+first: cells that are long beside their distance from receiver or lamp, and those whose lobe is not flat between corners:
+with e = r - w a lobe is (1 - e^2 / 2)^P, a highlight around e = 0 whose width is 1 / sqrt(P).
 """
 
 from typing import NamedTuple
@@ -18,8 +18,8 @@ from tests.naive.crossings import corners_of, face_normals
 from tests.naive.light_tracing import Vertices, pattern, shading_normals
 from tests.naive.receiver_lobes import unit
 
-NEAR = 1.0  # longest edge of a cell over its distance from receiver and lamp
-FLAT = 1.0  # widths of a highlight from corner to corner of a cell
+NEAR = 2.0  # longest edge of a cell over its distance from receiver and lamp
+FLAT = 3.0  # widths of a highlight from corner to corner of a cell
 NEGLIGIBLE = 1e-9  # of a lobe's peak: cells whose lobe is below that all over are not cut for it
 DEEPEST = 20  # times that a face is halved
 BELOW = 1e-6  # of the scene: faces that rise less above a receiver's plane send it nothing
@@ -195,7 +195,8 @@ def _density(scene, tracer, lamp, receivers, face, y):
     else:
         end = np.asarray(lamp.position, float)
         hidden = _blocked(tracer, start, end - start, 1 - tracer.offsets(end) / distance[counts] - STEPS)
-    hidden[~hidden] = _blocked(tracer, start[~hidden], (x + tracer.offsets(x)[:, None] * up - start)[~hidden], 1 - STEPS)
+    end = x + tracer.offsets(x)[:, None] * up
+    hidden[~hidden] = _blocked(tracer, start[~hidden], (end - start)[~hidden], 1 - STEPS)
     seen = np.zeros_like(result)
     seen[counts[~hidden]] = result[counts[~hidden]]
     return seen

@@ -1,8 +1,7 @@
 """Small scenes of glossy senders of every exponent: near and far, flat and curved, and lamps of every kind.
 
-All lie in a room of 2 m, or beside one; pictures are 16 x 5 to 24 x 18 pixels. `reference` holds the irradiance of every
-pixel by `tests.naive.face_quadrature`, stored in glossy_references.npz; `python -m tests.truth.glossy_scenes` makes it
-again.
+All lie in a room of 2 m, or beside one; pictures are 24 x 18 pixels. `reference` holds the irradiance of every pixel by
+`tests.naive.face_quadrature`, stored in glossy_references.npz; `python -m tests.truth.glossy_scenes` makes it again.
 """
 
 import dataclasses
@@ -86,8 +85,8 @@ def corner_600_900(name):
 
 def lamp_close(name):
     """A point lamp 2 cm above a floor of 20."""
-    return made(name, [*room(lobe(20.0), WALL), *block((-0.7, 0, -0.6), (0.4, 0, 0.1), (0, 0.5, 0), (-0.1, 0, -0.3), GREY)],
-                ROOM, PointLight((0.1, 0.02, 0.1), (0.3, 0.4, 0.5)))
+    shapes = [*room(lobe(20.0), WALL), *block((-0.7, 0, -0.6), (0.4, 0, 0.1), (0, 0.5, 0), (-0.1, 0, -0.3), GREY)]
+    return made(name, shapes, ROOM, PointLight((0.1, 0.02, 0.1), (0.3, 0.4, 0.5)))
 
 
 def lamp_close_1000(name):
@@ -136,8 +135,8 @@ def mirror_floor(name):
     return made(name, shapes, ROOM, PointLight((0.3, 1.2, 0.5), (1.0, 1.5, 2.0)))
 
 
-MAKERS = (diffuse, far_wall, corner, corner_600_900, lamp_close, lamp_close_1000, coarse_ball, small_ball, ball_and_block,
-          sun_on_blocks, mirror_like, mirror_floor)
+MAKERS = (diffuse, far_wall, corner, corner_600_900, lamp_close, lamp_close_1000, coarse_ball, small_ball,
+          ball_and_block, sun_on_blocks, mirror_like, mirror_floor)
 SCENES = {maker.__name__: maker for maker in MAKERS}
 EXPONENTS = {"diffuse": "-", "far_wall": "60", "corner": "200", "corner_600_900": "600, 900", "lamp_close": "20",
              "lamp_close_1000": "1000", "coarse_ball": "1000", "small_ball": "60", "ball_and_block": "200",

@@ -39,7 +39,8 @@ def test_a_lobe_of_one_straight_down_is_diffuse():
     """P = 1 and light along the normal: (P + 1) / 2 pi <n.w> is 1 / pi <n.w>, so a plate gives its form factor."""
     plate = rectangle((0, 0, 0), (1, 0, 0), (0, 0, -1.5), glossy(1.0))
     corners = [(0, 0, 0), (1, 0, 0), (1, 0, -1.5), (0, 0, -1.5)]
-    for point, normal in (((0.5, 0.8, -0.7), (0, -1, 0)), ((-0.3, 0.4, -0.5), (1, 0, 0)), ((0.5, 0.01, 0.01), (0, 0, -1))):
+    for point, normal in (((0.5, 0.8, -0.7), (0, -1, 0)), ((-0.3, 0.4, -0.5), (1, 0, 0)),
+                          ((0.5, 0.01, 0.01), (0, 0, -1))):
         expected = 0.9 * RHO * DOWN.irradiance * polygon_form_factor(point, normal, corners)
         np.testing.assert_allclose(found(scene([plate], DOWN), [point], [normal])[0], expected, rtol=TOLERANCE)
 

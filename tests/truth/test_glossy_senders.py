@@ -64,7 +64,7 @@ def bright(name, level):
 
 
 def squares(name, result):
-    """Return squared deviations from the oracle over the variance that a run states: of bright blocks, of the picture."""
+    """Return squared deviations from the oracle over what a run states: of bright blocks, of the picture."""
     found = {}
     for level in ("block", "picture"):
         mean, variance = levels(result)[level]

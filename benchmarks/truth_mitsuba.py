@@ -4,8 +4,8 @@ REFGI_MITSUBA names a Python that has Mitsuba (`pip install mitsuba`, an environ
 libllvm 19, named by DRJIT_LIBLLVM_PATH), REFGI_DATA the folder of real scenes. Without the first, this is one line.
 The quantity is that of docs/truth.md: rays start at refgi's receivers, lifted by its offsets; a lobe is refgi's formula
 in a kernel written for it. Samples are doubled until a run has the aim or takes SECONDS; each round then times a run of
-the truth and one of each of Mitsuba's ways in turn. relMSE as in `truth_glossy`; from what a run has to the aim it falls
-as 1 / N. The reference is the oracle of glossy scenes, each pixel REPEAT x REPEAT times; else a long run of the truth,
+the truth and one of each of Mitsuba's ways in turn. relMSE as in `truth_glossy`; from a run to the aim it falls as
+1 / N. The reference is the oracle of glossy scenes, each pixel REPEAT x REPEAT times; else a long run of the truth,
 whose own stated variance is taken out of what both are off by. A row's note says how far means of the picture are off.
 """
 

@@ -4,8 +4,8 @@
 
 with p the diffuse part and the lobe of `tests.naive.light_tracing.pattern`, w from y to x. A face is cut into four
 until its integral by seven points (degree 5) and that of its quarters agree. What seven points could pass over is cut
-first: cells that are long beside their distance from receiver or lamp, and those whose lobe is not flat between corners:
-with e = r - w a lobe is (1 - e^2 / 2)^P, a highlight around e = 0 whose width is 1 / sqrt(P).
+first: cells that are long beside the scene, a spot's cone or their distance from receiver or lamp, and cells whose lobe
+is not flat between corners: with e = r - w a lobe is (1 - e^2 / 2)^P, a highlight around e = 0 of a width 1 / sqrt(P).
 """
 
 from typing import NamedTuple
@@ -13,13 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from refgi.rays import STEPS, Tracer
-from refgi.scene import DirectionalLight, PointLight
+from refgi.scene import DirectionalLight, PointLight, SpotLight
 from tests.naive.crossings import corners_of, face_normals
 from tests.naive.light_tracing import Vertices, pattern, shading_normals
 from tests.naive.receiver_lobes import unit
 
-NEAR = 2.0  # longest edge of a cell over its distance from receiver and lamp
-FLAT = 3.0  # widths of a highlight from corner to corner of a cell
+NEAR = 1.0  # longest edge of a cell over its distance from receiver and lamp
+LARGEST = 1 / 8  # of a cell, over the scene
+FLAT = 2.0  # widths of a highlight from corner to corner of a cell
 NEGLIGIBLE = 1e-9  # of a lobe's peak: cells whose lobe is below that all over are not cut for it
 DEEPEST = 20  # times that a face is halved
 BELOW = 1e-6  # of the scene: faces that rise less above a receiver's plane send it nothing
@@ -145,7 +146,13 @@ def _must_be_cut(scene, lamp, receivers, cells):
     x, middle = receivers.position[cells.receiver], cells.corners.mean(axis=1)
     reach = np.linalg.norm(middle - x, axis=1) - edges / 2
     to_lamp = _toward(lamp, middle)[1] - edges / 2
-    result = edges > NEAR * np.maximum(np.minimum(reach, to_lamp), 1e-9)
+    longest = NEAR * np.maximum(np.minimum(reach, to_lamp), 1e-9)
+    result = edges > np.minimum(longest, LARGEST * scene.geometry.diagonal)
+    if isinstance(lamp, SpotLight):
+        toward, distance = _toward(lamp, middle)
+        angle = np.arccos(np.clip(-toward @ unit(np.asarray(lamp.direction)), -1, 1))
+        near_cone = angle < lamp.outer_half_angle + edges / distance
+        result |= near_cone & (edges > lamp.outer_half_angle / 2 * distance)
     exponents = np.array([m.exponent if any(m.specular) else -1.0 for m in scene.materials])
     exponent = exponents[scene.geometry.material_of_face[cells.face]]
     glossy = np.flatnonzero(~result & (exponent >= 0))

@@ -164,10 +164,10 @@ def reference(name):
 
 def main(names):
     """Compute the references of scenes by name, of all without names."""
-    stored = dict(np.load(REFERENCES)) if REFERENCES.exists() else {}
     for name in names or SCENES:
         to = receivers_of(frame(name))
         value, moved = irradiance(frame(name).scene, to)
+        stored = dict(np.load(REFERENCES)) if REFERENCES.exists() else {}
         stored[name] = np.concatenate([to.position, to.normal, value], axis=1)
         np.savez_compressed(REFERENCES, **{key: stored[key] for key in SCENES if key in stored})
         print(f"{name}: {len(value)} receivers, mean {value.mean(axis=0)}, moved by {(moved / value.mean()).max():.1e}",

@@ -45,6 +45,14 @@ def test_a_lobe_of_one_straight_down_is_diffuse():
         np.testing.assert_allclose(found(scene([plate], DOWN), [point], [normal])[0], expected, rtol=TOLERANCE)
 
 
+def test_a_narrow_spot_on_a_large_floor():
+    """A patch of light that is small beside its face: 2/5 rho I / h^2 (1 - cos^5 c)."""
+    c, h = 0.12, 0.7
+    lamp = SpotLight((0.0, h, 0.0), (0.0, -1.0, 0.0), c, c, (1.0, 2.0, 0.5))
+    expected = 0.4 * 0.6 * np.array(lamp.intensity) / h**2 * (1 - math.cos(c) ** 5)
+    np.testing.assert_allclose(found(scene([floor(9.0)], lamp), [(0, h, 0)], [(0, -1, 0)])[0], expected, rtol=TOLERANCE)
+
+
 def test_a_lobe_of_zero_straight_down_sends_its_solid_angle():
     """P = 0: the same intensity everywhere above; a parallel receiver gets F / 2 pi times the plate's solid angle."""
     plate = rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), glossy(0.0))
@@ -93,10 +101,10 @@ def test_a_point_lamp_above_a_receiver(exponent):
     np.testing.assert_allclose(got, expected, rtol=TOLERANCE)
 
 
-@pytest.mark.parametrize(("exponent", "tilt"), [(5.0, 0.0), (20.0, 1.2), (200.0, 1.5)])
+@pytest.mark.parametrize(("exponent", "tilt"), [(5.0, 0.0), (20.0, 1.2), (60.0, 1.5)])
 def test_what_leaves_a_small_plate_is_its_flux(exponent, tilt):
     """The flux through a large half sphere is rho F A, whatever part of the lobe lies below the surface."""
-    side, rounds, turns = 1e-3, 96, 96
+    side, rounds, turns = 1e-3, 48, 48
     sun = DirectionalLight((math.sin(tilt), -math.cos(tilt), 0.0), (1.0, 2.0, 3.0))
     plate = rectangle((-side / 2, 0, side / 2), (side, 0, 0), (0, 0, -side), glossy(exponent))
     z, weight = gauss_legendre(rounds)
@@ -107,7 +115,7 @@ def test_what_leaves_a_small_plate_is_its_flux(exponent, tilt):
     value, _ = irradiance(scene([plate], sun), facing(points, -points), 1e-2)
     flux = (value.reshape(rounds, turns, 3) * weight[:, None, None]).sum(axis=(0, 1)) * 2 * math.pi / turns
     expected = 0.9 * RHO * sun.irradiance * math.cos(tilt) * side**2
-    np.testing.assert_allclose(flux, expected, rtol=5e-4)  # of 96 rings; the plate is 1e-3 long
+    np.testing.assert_allclose(flux, expected, rtol=5e-4)  # of 48 rings; the plate is 1e-3 long
 
 
 def cluttered_room():

@@ -1,5 +1,6 @@
 """The oracle of glossy senders against closed forms, quadrature in one dimension and light tracing."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -17,6 +18,7 @@ from tests.truth.scenes import floor, rectangle, scene
 
 TOLERANCE = 1e-4  # relative, what is asked of the oracle
 RHO = np.array((0.9, 0.7, 0.5))
+RED = Material("red", (0.6, 0.5, 0.4))
 DOWN = DirectionalLight((0.0, -1.0, 0.0), (1.0, 2.0, 3.0))
 
 
@@ -48,9 +50,34 @@ def test_a_lobe_of_one_straight_down_is_diffuse():
 def test_a_narrow_spot_on_a_large_floor():
     """A patch of light that is small beside its face: 2/5 rho I / h^2 (1 - cos^5 c)."""
     c, h = 0.12, 0.7
-    lamp = SpotLight((0.0, h, 0.0), (0.0, -1.0, 0.0), c, c, (1.0, 2.0, 0.5))
+    place = (2.31, h, -1.47)  # over the inside of a face
+    lamp = SpotLight(place, (0.0, -1.0, 0.0), c, c, (1.0, 2.0, 0.5))
     expected = 0.4 * 0.6 * np.array(lamp.intensity) / h**2 * (1 - math.cos(c) ** 5)
-    np.testing.assert_allclose(found(scene([floor(9.0)], lamp), [(0, h, 0)], [(0, -1, 0)])[0], expected, rtol=TOLERANCE)
+    np.testing.assert_allclose(found(scene([floor(9.0)], lamp), [place], [(0, -1, 0)])[0], expected, rtol=TOLERANCE)
+
+
+def test_a_sharp_highlight_inside_a_face():
+    """Parallel light on a large floor of 1e6: a receiver gets all that lands below it."""
+    got = found(scene([floor(9.0, glossy(1e6))], DOWN), [(2.31, 0.8, -1.47)], [(0, -1, 0)])[0]
+    np.testing.assert_allclose(got, 0.9 * RHO * DOWN.irradiance, rtol=TOLERANCE)
+
+
+@pytest.mark.parametrize("flip", [1, -1])
+def test_a_small_plate_with_normals_askew_in_the_edge_of_a_spot(flip):
+    """Flux by the face's normal and the spot's smoothstep, what is sent by the interpolated normal."""
+    side, askew = 1e-3, unit(np.array((0.3, 1.0, 0.1)))
+    plate = rectangle((-side / 2, 0, flip * side / 2), (side, 0, 0), (0, 0, -flip * side), RED)
+    plate = dataclasses.replace(plate, normals=np.tile(askew, (4, 1)))
+    lamp = SpotLight((0.6, 0.8, 0.0), (-0.6, -0.8, 0.35), 0.2, 0.5, (1.0, 2.0, 3.0))
+    axis = np.array(lamp.direction) / math.hypot(*lamp.direction)
+    t = (axis @ (-0.6, -0.8, 0.0) - math.cos(0.5)) / (math.cos(0.2) - math.cos(0.5))
+    assert 0.2 < t < 0.8
+    flux = np.array(lamp.intensity) * t * t * (3 - 2 * t) * 0.8 * side**2
+    x = np.array((-0.3, 0.9, 0.4))
+    r = np.linalg.norm(x)
+    expected = flux * (0.6, 0.5, 0.4) / math.pi * (askew @ x / r) / r**2  # the receiver looks straight at it
+    got = found(scene([plate], lamp, smooth=True), [x], [-x])[0]
+    np.testing.assert_allclose(got, expected, rtol=1e-5)  # the plate is 1e-3 long
 
 
 def test_a_lobe_of_zero_straight_down_sends_its_solid_angle():
@@ -112,7 +139,8 @@ def test_what_leaves_a_small_plate_is_its_flux(exponent, tilt):
     turn = 2 * math.pi * (np.arange(turns) + 0.5) / turns
     flat = np.sqrt(1 - z * z)[:, None]
     points = np.stack([flat * np.cos(turn), np.broadcast_to(z[:, None], (rounds, turns)), flat * np.sin(turn)], axis=-1)
-    value, _ = irradiance(scene([plate], sun), facing(points, -points), 1e-2)
+    speck = rectangle((0, -1, 0), (side, 0, 0), (0, 0, side), Material("black", (0.0,) * 3))  # one cell for the plate
+    value, _ = irradiance(scene([plate, speck], sun), facing(points, -points), 1e-2)
     flux = (value.reshape(rounds, turns, 3) * weight[:, None, None]).sum(axis=(0, 1)) * 2 * math.pi / turns
     expected = 0.9 * RHO * sun.irradiance * math.cos(tilt) * side**2
     np.testing.assert_allclose(flux, expected, rtol=5e-4)  # of 48 rings; the plate is 1e-3 long
@@ -143,6 +171,7 @@ def test_light_tracing_agrees(evidence):
     assert np.median(error / expected) < 0.06
 
 
+@pytest.mark.slow
 def test_a_finer_tolerance_moves_it_within_the_coarser(evidence):
     room = cluttered_room()
     to = facing([(0.0, 0.8, -1 + 1e-3), (0.3, 1e-3, -1 + 1e-2)], [(0, 0, 1), (0, 1, 0)])

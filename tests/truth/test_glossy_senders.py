@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import f
 
-from refgi.frame import Frame
+from benchmarks.truth_glossy import claimed_over_true
 from refgi.truth import TruthSettings, trace_truth
 from tests.naive.face_quadrature import TOGETHER, irradiance, receivers_of
 from tests.truth.glossy_scenes import EXPONENTS, SCENES, frame, reference
@@ -18,7 +18,7 @@ from tests.truth.glossy_scenes import EXPONENTS, SCENES, frame, reference
 CERTAIN = 1e-4  # a value beyond the quantiles of this tail comes once in 10,000 runs
 DARK = 1e-3  # of the picture's mean: blocks below it see light in the far tails of lobes alone
 LOW, HIGH = 0.9, 1.15  # claimed over true variance
-# Standard errors of that ratio, relative, over SEEDS runs. With more the few runs that met the light decide it.
+# Standard errors of that ratio, relative, over SEEDS runs. With more, the few runs that met the light decide it.
 KNOWN_TO = {"pixel": 0.1, "block": 0.2, "picture": 0.4}
 SEEDS, PASSES, LONG_RUN = 60, 3, 10  # many runs of few passes; one of more
 # What has the oracle's mean within an error that it can know in LONG_RUN passes. Alone, the light side knows no corner,
@@ -95,18 +95,11 @@ def test_each_estimator_has_that_mean_where_it_knows_its_error(name, estimator, 
 
 
 @cache
-def claimed_over_true(name):
-    """Return {level: (ratio, standard error)} over many seeds; values weighted as by relMSE."""
-    runs = [levels(run(name, 100 + seed, PASSES)) for seed in range(SEEDS)]
-    found = {}
-    for level, oracle in expected(name).items():
-        weight = bright(name, level) / (oracle**2 + (0.1 * expected(name)["picture"].mean()) ** 2)
-        true = np.array([((r[level][0] - oracle) ** 2 * weight).sum() for r in runs])
-        claimed = np.array([(r[level][1] * weight).sum() for r in runs])
-        without = (claimed.sum() - claimed) / (true.sum() - true)  # jackknife
-        spread = np.sqrt((SEEDS - 1) / SEEDS * ((without - without.mean()) ** 2).sum())
-        found[level] = claimed.sum() / true.sum(), spread
-    return found
+def claimed(name):
+    """Return {level: (ratio, standard error)} of claimed over true variance, over many seeds."""
+    runs = [run(name, 100 + seed, PASSES) for seed in range(SEEDS)]
+    return {level: (ratio, error) for level, ratio, error in
+            claimed_over_true(reference(name), frame(name).gbuffer.covered, runs)}
 
 
 @pytest.mark.slow
@@ -114,7 +107,7 @@ def claimed_over_true(name):
 @pytest.mark.parametrize("level", KNOWN_TO)
 @pytest.mark.parametrize("name", SCENES)
 def test_claimed_variance_is_the_true_one(name, level, evidence):
-    ratio, error = claimed_over_true(name)[level]
+    ratio, error = claimed(name)[level]
     evidence(f"{name}, P = {EXPONENTS[name]}, {level}: claimed over true variance {ratio:.3f} +- {error:.3f}")
     assert error < KNOWN_TO[level] * ratio
     assert LOW - 3 * error < ratio < HIGH + 3 * error
@@ -124,7 +117,6 @@ def test_claimed_variance_is_the_true_one(name, level, evidence):
 @pytest.mark.parametrize("name", SCENES)
 def test_the_stored_oracle_is_what_is_computed(name):
     """A few receivers of each scene: what is stored is what the quadrature gives today, at a finer tolerance."""
-    assert Frame(SCENES[name](name)).width == frame(name).width
     to = receivers_of(frame(name))
     chosen = np.linspace(0, len(to.position) - 1, max(4, TOGETHER // 1000)).astype(int)
     value, _ = irradiance(frame(name).scene, type(to)(*(field[chosen] for field in to)), 3e-5)

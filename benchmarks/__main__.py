@@ -1,4 +1,4 @@
-"""Run the benchmarks: `python -m benchmarks [--quick] [--out DIR] [topic ...]`.
+"""Run the benchmarks: `python -m benchmarks [--quick] [--out DIR] [--against results.json] [topic ...]`.
 
 Every figure is a ratio within one run, or reported without an aim. Results: a table here, results.json in --out.
 `python -m benchmarks paper NAME --out DIR` makes a paper's figures and tables again; `python -m benchmarks mutate` puts
@@ -30,7 +30,7 @@ COMMANDS = {"accuracy": "benchmarks.accuracy", "before-after": "benchmarks.befor
             "kit-score": "benchmarks.kit_score", "kill-batch": "benchmarks.kill_batch", "skips": "benchmarks.skips",
             "stability": "benchmarks.stability.runner"}
 NOT_TOPICS = {"__init__", "__main__", "accuracy", "before_after", "harness", "signatures", "kit_score", "kill_batch",
-              "skips", "llvmpipe", "embree_packets"}
+              "skips", "llvmpipe", "embree_packets", "mitsuba_worker"}
 
 
 def topics() -> list[str]:
@@ -48,28 +48,37 @@ def main() -> int:
     parser.add_argument("topics", nargs="*", metavar="topic", help=f"of {', '.join(topics())}; all if none")
     parser.add_argument("--quick", action="store_true", help="smaller sizes, fewer repeats")
     parser.add_argument("--out", type=Path, help="folder for results.json")
+    parser.add_argument("--against", type=Path, help="results.json of another run: values over its values")
     options = parser.parse_args()
     if unknown := set(options.topics) - set(topics()):
         parser.error(f"no benchmark named {', '.join(sorted(unknown))}; there are {', '.join(topics())}")
     console = Console()
+    before = _values(options.against) if options.against else {}
     results: dict[str, list[Row]] = {}
     for topic in options.topics or topics():
         module = importlib.import_module(f"benchmarks.{topic}")
         console.print(f"[bold]{topic}[/bold]  {(module.__doc__ or '').splitlines()[0]}")
         results[topic] = list(module.rows(options.quick))
-        console.print(_table(results[topic]))
+        console.print(_table(results[topic], before))
     if options.out:
         _write(options.out, results)
         console.print(f"written: {options.out / 'results.json'}")
     return 0
 
 
-def _table(rows: list[Row]) -> Table:
-    table = Table("what", "value", "unit", "aim", "", "note", box=None)
+def _table(rows: list[Row], before: dict[str, float]) -> Table:
+    table = Table("what", "value", "unit", "aim", "", "note", *(["over before"] if before else []), box=None)
     for row in rows:
         verdict = {None: "", True: "[green]met[/green]", False: "[red]short[/red]"}[row.meets_aim]
-        table.add_row(row.name, f"{row.value:.4g}", row.unit, row.aim, verdict, row.note)
+        over = [f"{row.value / before[row.name]:.3g}" if before.get(row.name) else "-"] if before else []
+        table.add_row(row.name, f"{row.value:.4g}", row.unit, row.aim, verdict, row.note, *over)
     return table
+
+
+def _values(place: Path) -> dict[str, float]:
+    """Return the values of an earlier run by their rows' names."""
+    topics = json.loads(place.read_text())["results"]
+    return {row["name"]: row["value"] for rows in topics.values() for row in rows}
 
 
 def _write(folder: Path, results: dict[str, list[Row]]) -> None:

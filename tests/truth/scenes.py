@@ -17,8 +17,8 @@ def rectangle(corner, along, across, material=WHITE):
                 np.array([[0, 1, 2], [0, 2, 3]]), None, material)
 
 
-def scene(meshes, *lights):
-    geometry, materials = merge(meshes)
+def scene(meshes, *lights, smooth=False):
+    geometry, materials = merge(meshes, smooth=smooth)
     return Scene("by hand", geometry, materials, CAMERA, lights)
 
 

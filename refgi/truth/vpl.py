@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from refgi.lights.settings import LightSettings, MapLights, most_lights
 from refgi.method import Approximation, Extent, Method
 from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, Hidden, receivers, shadowed_sum
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 FLOAT32 = 4  # bytes
-MOST_LIGHTS = 1 << 24  # a map: every texel of one of 4096 x 4096
+MOST_LIGHTS = 1 << 24  # every texel of one of 4096 x 4096
 Pattern = Literal["grid", "halton", "all", "random"]
 
 
@@ -34,7 +35,8 @@ class VplLights(Settings):
 
     PRINCIPAL = "count"
 
-    count: int = setting(768, "pixel lights of a map", least=1, most=MOST_LIGHTS)
+    count: int = setting(768, "pixel lights of all lamps together, shared out by the flux they bring", least=1,
+                         most=MOST_LIGHTS)
     pattern: Pattern = setting("halton", "where they lie in a map; all: every texel, whatever the count")
     filtered: bool = setting(False, "flux is averaged over each light's cell (SII Sec. 4)")
     seed: int = setting(0, "which random numbers", least=0, most=LAST_SEED)
@@ -144,8 +146,10 @@ def _map_bytes(settings: VplSettings, extent: Extent) -> int:
     """Return bytes of the maps of all lights."""
     if settings.maps is None or not settings.visibility:
         return 0
-    of_map = extent.texels if settings.lights.pattern == "all" else min(settings.lights.count, extent.texels)
-    return FLOAT32 * extent.maps * of_map * settings.maps.resolution**2
+    chosen = settings.lights
+    count = most_lights(LightSettings(count=chosen.count, source=MapLights(pattern=chosen.pattern)), extent.maps,
+                        extent.texels)
+    return FLOAT32 * count * settings.maps.resolution**2
 
 
 METHOD = Method("vpl", "the same pixel lights with visibility by rays or imperfect shadow maps", vpl, VplSettings,

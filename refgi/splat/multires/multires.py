@@ -168,7 +168,8 @@ def light_areas(frame: "Frame", lights: "PixelLights", settings: MultiresSetting
     """
     if "ams_disc" not in settings.as_published:
         return footprints(frame, settings.lights, settings.effective_pairs)
-    return demo_footprints(lights, frame.scene.lights, drawn_from_maps(frame.rsms, settings.lights))
+    shares = [one.drawn for one in drawn_from_maps(frame.rsms, settings.lights)]
+    return demo_footprints(lights, frame.scene.lights, shares)
 
 
 def doubled(frame: "Frame") -> "GBuffer":

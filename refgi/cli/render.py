@@ -97,7 +97,7 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     size = "x".join(map(str, content["size"]))
     text = f"{job.scene.name} by {job.method}: {size} in {seconds:.2f} s"
     text += f" -> {', '.join(content['files'])}" if files.files else ""
-    text += f"\n{record['estimate']['statement']}" if "estimate" in record else ""
+    text += "".join(f"\n{record[key]['statement']}" for key in ("estimate", "sampling_error") if key in record)
     if again is not None:
         other = differences(Path(again), planes)
         content["again"] = {"file": again, "same": not other, "differs": other}
@@ -107,7 +107,7 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
 
 
 def _record(job: "Job", picture: "Picture") -> "Record":
-    from refgi.provenance import estimate_record, method_record, scene_record
+    from refgi.provenance import estimate_record, method_record, sampling_record, scene_record
 
     frame, estimate = picture.frame, picture.estimate
     options = {"dtype": frame.dtype.name, "rsm_resolution": frame.rsm_resolution, "shadows": frame.shadows}
@@ -120,6 +120,8 @@ def _record(job: "Job", picture: "Picture") -> "Record":
         record |= job.still.record
     if estimate is not None:
         record |= estimate_record(estimate)
+    if picture.sampling_error is not None:
+        record |= {"sampling_error": sampling_record(picture.sampling_error)}
     return record
 
 
@@ -139,7 +141,7 @@ def _content(picture: "Picture", job: "Job", seconds: float, record: "Record") -
             "covered_pixels": int(covered.sum()), "mean_indirect_irradiance": float(mean), **lobes,
             "brightest_radiance": float(picture.radiance.max()),
             "non_finite_pixels": count_non_finite(picture.radiance), "versions": record["versions"],
-            "provenance": record, **{key: record[key] for key in ("estimate",) if key in record},
+            "provenance": record, **{key: record[key] for key in ("estimate", "sampling_error") if key in record},
         }
 
 

@@ -19,6 +19,7 @@ from refgi.lights.settings import most_lights, with_clamp
 from refgi.method import Extent
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_clamp
+from refgi.pairs.sampling import report_sampling
 from refgi.rsm import facing_normals
 from refgi.rsm.buffers.glossy import GlossyPoints, spread_over_picture
 from refgi.stages import skip
@@ -151,6 +152,7 @@ def light_pixels(
     """
     footprint = footprints(frame, settings.lights, settings.pairs)
     warn_of_clamp(receivers_of(frame), lights, settings.pairs, footprint, "val")
+    report_sampling(receivers_of(frame), lights, settings.pairs, footprint, "val")
     return clustered_irradiance(
         receivers_of(frame), face_normals(frame), lights, areas, maps, settings, footprint=footprint,
         visibility_of=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.diagnostics import is_due
 from refgi.lights.footprints import with_equal_solid_angles
 from refgi.lights.settings import LightSettings, MapLights, PathLights
 from refgi.stages import skip
@@ -118,7 +119,8 @@ def with_openness(frame: "Frame", lights: "PixelLights", settings: LightSettings
     free = _openness(frame, lights.position, lights.normal, settings)
     if settings.openness.flux == "scale":
         scaled = scale_flux(lights, free, "sii_openness" in settings.openness.as_published)[0]
-        warn_of_loss(lost_share(power(lights).sum(), power(scaled).sum()), "openness_flux 'scale'")
+        if is_due("lights.openness_loss"):
+            warn_of_loss(lost_share(power(lights).sum(), power(scaled).sum()), "openness_flux 'scale'")
         return scaled
     return roulette(lights, free, settings.openness.floor, settings.seed)
 

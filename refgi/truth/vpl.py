@@ -11,11 +11,16 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from refgi.diagnostics import SamplingError, asked
 from refgi.lights.settings import LightSettings, MapLights, most_lights
 from refgi.method import Approximation, Extent, Method
+from refgi.pairs.irradiance import Receivers
+from refgi.pairs.loss import sample_for
+from refgi.pairs.sampling import error_of_halves, half_of, warn_of_sampling
 from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, Hidden, receivers, shadowed_sum
 from refgi.settings import Settings, setting
+from refgi.stages import stage
 from refgi.truth.imperfect import Imperfect, fill_hidden, imperfect_maps
 
 if TYPE_CHECKING:
@@ -25,6 +30,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 FLOAT32 = 4  # bytes
+SAMPLED = 512  # pixels of which the sampling error is estimated, at least
 MOST_LIGHTS = 1 << 24  # every texel of one of 4096 x 4096
 Pattern = Literal["grid", "halton", "all", "random"]
 
@@ -83,7 +89,40 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     irradiance.reshape(3, -1)[:, points.pixel] = shadowed_sum(frame.tracer, points, lights,
                                                               visibility=settings.visibility, batch=settings.batch,
                                                               hidden=hidden)
+    found = asked("vpl.sampling_error")
+    if found is not None:
+        found.sampling_error = vpl_sampling_error(frame, lights, settings)
+        warn_of_sampling(found.sampling_error, "vpl")
     return irradiance
+
+
+@stage("vpl.sampling_error")
+def vpl_sampling_error(frame: "Frame", lights: "PixelLights", settings: VplSettings) -> SamplingError | None:
+    """Return how much the light of a picture depends on which lights were drawn, from two halves of them.
+
+    Parameters
+    ----------
+    frame : Frame
+        The view of the scene.
+    lights : PixelLights
+        Its lights.
+    settings : VplSettings
+        Whether they are shadowed; imperfect maps, which shadow all lights together, are left out here.
+
+    Returns
+    -------
+    SamplingError or None
+        At sampled pixels; None where every texel is a light, or there is no light.
+    """
+    if lights.half is None:
+        return None
+    sample = sample_for(Receivers(*frame.gbuffer.resolve("position", "normal", "covered")), lights, least=SAMPLED)
+    points = receivers(frame.scene.geometry, sample.position, sample.normal,
+                       frame.gbuffer.triangle_id.reshape(-1)[sample.place], frame.tracer.grain)
+    shadowed = settings.visibility and settings.maps is None
+    first, second = (shadowed_sum(frame.tracer, points, half_of(lights, later)[0], visibility=shadowed,
+                                  batch=settings.batch) for later in (False, True))
+    return error_of_halves(first, second, lights.drawn)
 
 
 def vpl_lobes(frame: "Frame", settings: VplSettings) -> Array:

@@ -14,6 +14,7 @@ from refgi.method import Extent
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.lightcuts.tree import tree_bytes
 from refgi.pairs.loss import thinned, warn_of_clamp
+from refgi.pairs.sampling import report_sampling
 from refgi.splat.multires.error_target.error_driven import MANY, clusters, error_driven
 from refgi.splat.multires.error_target.pixel_sum import PixelSum, shadowed_by_clusters, shadowed_by_rays
 from refgi.splat.multires.light_lists.per_light import per_light
@@ -72,7 +73,9 @@ def _irradiance(
     _resolve_channels(buffer, subsplats)
     few = isinstance(subsplats, ByError) and subsplats.visibility is None and clusters(lights, settings.lightcuts)
     some = thinned(lights, footprint) if few or settings.bounded is not None else (lights, footprint)
-    warn_of_clamp(Receivers(buffer.position, buffer.normal, buffer.covered), some[0], pairs, some[1], "multires")
+    receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
+    warn_of_clamp(receivers, some[0], pairs, some[1], "multires")
+    report_sampling(receivers, lights, pairs, footprint, "multires", all_summed=some[0] is lights)
     if isinstance(subsplats, ByError):
         irradiance = error_driven(buffer, lights, subsplats, pairs, footprint, settings.lights.seed,
                                   settings.lightcuts, _shadowed(frame, buffer, lights, footprint, settings)).irradiance

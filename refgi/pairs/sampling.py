@@ -1,0 +1,122 @@
+"""Sampling error of a sum of pixel lights, estimated from two halves of the lights at some pixels of the picture.
+
+Each half, doubled, is an estimate of the picture of its own, so half of their difference is one of the error of both
+together: of independent draws its mean square is the variance. A light so near that it decides the error of a picture
+without a clamp is seen only where a sampled pixel is near it: the estimate is then too low.
+"""
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.diagnostics import SamplingError, asked
+from refgi.errors import RefgiWarning
+from refgi.pairs.irradiance import Receivers, add_lights
+from refgi.pairs.loss import LEAST_SAMPLED, sample_for
+from refgi.pairs.packing import pack
+from refgi.pairs.settings import PairSettings
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.pairs.pixel_lights import PixelLights
+
+Array = npt.NDArray[Any]
+
+LEAST_ERROR = 0.2  # share of the light from which a sampling error gives a warning
+FEW_SAMPLED = 128  # pixels, where a picture does not sum all of its lights
+
+
+def half_of(lights: "PixelLights", second: bool) -> tuple["PixelLights", Array]:
+    """Return the lights of one half of the draw, and which they are, (N,) bool."""
+    assert lights.half is not None
+    chosen = lights.half == second
+    parts: dict[str, Any] = {name: values[..., chosen] for name, values in lights._asdict().items()
+                             if isinstance(values, np.ndarray)}
+    return lights._replace(**parts), chosen
+
+
+@stage("pairs.sampling_error")
+def sampling_error(
+    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None,
+    least: int = LEAST_SAMPLED,
+) -> SamplingError | None:
+    """Return how much a picture's light depends on which lights were drawn.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        The picture's points.
+    lights : PixelLights
+        Its lights.
+    settings : PairSettings
+        How one light lights one receiver.
+    footprint : (N,) ndarray, optional
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+    least : int
+        Pixels to sample at least.
+
+    Returns
+    -------
+    SamplingError or None
+        Of the light without visibility; None where every texel is a light, or there is no light.
+    """
+    if lights.half is None:
+        return None
+    sample = sample_for(receivers, lights, least=least)
+    halves = []
+    for second in (False, True):
+        some, chosen = half_of(lights, second)
+        sums = np.zeros_like(sample.position)
+        add_lights(sample.position, sample.normal,
+                   pack(some, settings, None if footprint is None else footprint[chosen], sums.dtype), sums)
+        halves.append(sums)
+    return error_of_halves(halves[0], halves[1], lights.drawn)
+
+
+def error_of_halves(first: Array, second: Array, samples: int, of: str = "pixel lights") -> SamplingError | None:
+    """Return the error of the sum of two halves (3, n) of a picture's light; None where there is none.
+
+    Parameters
+    ----------
+    first, second : (3, n) ndarray
+        What each half of the samples gives, not doubled.
+    samples : int
+        Of both.
+    of : str
+        What they are.
+
+    Returns
+    -------
+    SamplingError or None
+        |2 first - 2 second| / 2 over the mean of first + second.
+
+    Examples
+    --------
+    >>> error_of_halves(np.array([[1.0, 2.0]]), np.array([[2.0, 1.0]]), 8)[:2]
+    (0.3333333333333333, 0.0)
+    """
+    whole = float((first + second).mean(dtype=np.float64)) if first.size else 0.0
+    if whole <= 0:
+        return None
+    off = np.subtract(first, second, dtype=np.float64)
+    return SamplingError(float(np.sqrt((off**2).mean())) / whole, abs(float(off.mean())) / whole, samples, of)
+
+
+def report_sampling(
+    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None, method: str, *,
+    all_summed: bool = True,
+) -> None:
+    """Tell whoever collects diagnostics of a method's sampling error, and warn where it is more than `LEAST_ERROR`."""
+    found = asked("pairs.sampling_error")
+    if found is not None:
+        found.sampling_error = sampling_error(receivers, lights, settings, footprint,
+                                              LEAST_SAMPLED if all_summed else FEW_SAMPLED)
+        warn_of_sampling(found.sampling_error, method)
+
+
+def warn_of_sampling(error: SamplingError | None, method: str) -> None:
+    """Warn where a method's sampling error is more than `LEAST_ERROR`."""
+    if error is not None and error.pixel > LEAST_ERROR:
+        warnings.warn(RefgiWarning(f"{method}: {error.statement}; more {error.of} lower it"), stacklevel=3)

@@ -15,7 +15,7 @@ from refgi.diagnostics import SamplingError, asked
 from refgi.lights.settings import LightSettings, MapLights, most_lights
 from refgi.method import Approximation, Extent, Method
 from refgi.pairs.irradiance import Receivers
-from refgi.pairs.loss import sample_for
+from refgi.pairs.loss import sample_pixels
 from refgi.pairs.sampling import error_of_halves, half_of, warn_of_sampling
 from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, Hidden, receivers, shadowed_sum
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 FLOAT32 = 4  # bytes
-SAMPLED = 512  # pixels of which the sampling error is estimated, at least
+SAMPLED = 512  # pixels of which the sampling error is estimated
 MOST_LIGHTS = 1 << 24  # every texel of one of 4096 x 4096
 Pattern = Literal["grid", "halton", "all", "random"]
 
@@ -116,7 +116,7 @@ def vpl_sampling_error(frame: "Frame", lights: "PixelLights", settings: VplSetti
     """
     if lights.half is None:
         return None
-    sample = sample_for(Receivers(*frame.gbuffer.resolve("position", "normal", "covered")), lights, least=SAMPLED)
+    sample = sample_pixels(Receivers(*frame.gbuffer.resolve("position", "normal", "covered")), SAMPLED)
     points = receivers(frame.scene.geometry, sample.position, sample.normal,
                        frame.gbuffer.triangle_id.reshape(-1)[sample.place], frame.tracer.grain)
     shadowed = settings.visibility and settings.maps is None

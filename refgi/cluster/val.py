@@ -152,7 +152,7 @@ def light_pixels(
     """
     footprint = footprints(frame, settings.lights, settings.pairs)
     warn_of_clamp(receivers_of(frame), lights, settings.pairs, footprint, "val")
-    report_sampling(receivers_of(frame), lights, settings.pairs, footprint, "val")
+    report_sampling(frame, receivers_of(frame), lights, settings.pairs, footprint, "val")
     return clustered_irradiance(
         receivers_of(frame), face_normals(frame), lights, areas, maps, settings, footprint=footprint,
         visibility_of=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,

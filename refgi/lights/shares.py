@@ -156,7 +156,7 @@ def _systematic(quota: Array, start: float) -> Array:
     """Return how many of the points start, start + 1 .. fall into each of the stretches that quotas make of a line."""
     ends = np.cumsum(quota)
     ends[-1] = round(ends[-1])
-    return np.diff(np.ceil(np.concatenate([[0.0], ends]) - start).astype(np.int64))
+    return np.asarray(np.diff(np.ceil(np.concatenate([[0.0], ends]) - start).astype(np.int64)))
 
 
 def equal_shares(count: int, parts: int) -> list[int]:

@@ -15,11 +15,13 @@ from refgi.diagnostics import SamplingError, asked
 from refgi.errors import RefgiWarning
 from refgi.pairs.irradiance import Receivers, add_lights
 from refgi.pairs.loss import LEAST_SAMPLED, sample_for
+from refgi.pairs.mirrors import warn_of_mirrors
 from refgi.pairs.packing import pack
 from refgi.pairs.settings import PairSettings
 from refgi.stages import stage
 
 if TYPE_CHECKING:
+    from refgi.frame import Frame
     from refgi.pairs.pixel_lights import PixelLights
 
 Array = npt.NDArray[Any]
@@ -105,10 +107,14 @@ def error_of_halves(first: Array, second: Array, samples: int, of: str = "pixel 
 
 
 def report_sampling(
-    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None, method: str, *,
-    all_summed: bool = True,
+    frame: "Frame", receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None,
+    method: str, *, all_summed: bool = True,
 ) -> None:
-    """Tell whoever collects diagnostics of a method's sampling error, and warn where it is more than `LEAST_ERROR`."""
+    """Tell whoever collects diagnostics of a method's sampling error, and warn where it is more than `LEAST_ERROR`.
+
+    Also warn of lobes that no receiver meets.
+    """
+    warn_of_mirrors(frame, lights, method)
     found = asked("pairs.sampling_error")
     if found is not None:
         found.sampling_error = sampling_error(receivers, lights, settings, footprint,

@@ -16,6 +16,7 @@ from refgi.lights.settings import LightSettings, MapLights, most_lights
 from refgi.method import Approximation, Extent, Method
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import sample_pixels
+from refgi.pairs.mirrors import warn_of_mirrors
 from refgi.pairs.sampling import error_of_halves, half_of, warn_of_sampling
 from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, Hidden, receivers, shadowed_sum
@@ -89,6 +90,7 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     irradiance.reshape(3, -1)[:, points.pixel] = shadowed_sum(frame.tracer, points, lights,
                                                               visibility=settings.visibility, batch=settings.batch,
                                                               hidden=hidden)
+    warn_of_mirrors(frame, lights, "vpl")
     found = asked("vpl.sampling_error")
     if found is not None:
         found.sampling_error = vpl_sampling_error(frame, lights, settings)

@@ -8,8 +8,8 @@ import numpy.typing as npt
 from refgi.cluster.val import extra_bytes as bytes_of_shadows
 from refgi.jit import most_threads
 from refgi.lights.footprints import demo_footprints
-from refgi.lights.selection import choose_lights, drawn_from_maps, footprints
-from refgi.lights.settings import most_lights
+from refgi.lights.selection import choose_lights, drawn_from_maps, footprints, light_maps
+from refgi.lights.settings import MapLights, most_lights
 from refgi.method import Extent
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.lightcuts.tree import tree_bytes
@@ -75,7 +75,7 @@ def _irradiance(
     some = thinned(lights, footprint) if few or settings.bounded is not None else (lights, footprint)
     receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
     warn_of_clamp(receivers, some[0], pairs, some[1], "multires")
-    report_sampling(receivers, lights, pairs, footprint, "multires", all_summed=some[0] is lights)
+    report_sampling(frame, receivers, lights, pairs, footprint, "multires", all_summed=some[0] is lights)
     if isinstance(subsplats, ByError):
         irradiance = error_driven(buffer, lights, subsplats, pairs, footprint, settings.lights.seed,
                                   settings.lightcuts, _shadowed(frame, buffer, lights, footprint, settings)).irradiance
@@ -171,7 +171,8 @@ def light_areas(frame: "Frame", lights: "PixelLights", settings: MultiresSetting
     """
     if "ams_disc" not in settings.as_published:
         return footprints(frame, settings.lights, settings.effective_pairs)
-    shares = [one.drawn for one in drawn_from_maps(frame.rsms, settings.lights)]
+    maps = frame.rsms if not isinstance(settings.lights.source, MapLights) else light_maps(frame, settings.lights.source)
+    shares = [one.drawn for one in drawn_from_maps(maps, settings.lights)]
     return demo_footprints(lights, frame.scene.lights, shares)
 
 

@@ -65,7 +65,8 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     some = (lights, footprint) if settings.lightcuts is None else thinned(lights, footprint)
     warn_of_clamp(receivers, some[0], settings.pairs, some[1], "sii")
     warn_of_cut(light, receivers, lights, resolved, footprint)
-    report_sampling(receivers, lights, settings.pairs, footprint, "sii", all_summed=settings.lightcuts is None)
+    report_sampling(frame, receivers, lights, settings.pairs, footprint, "sii",
+                    all_summed=settings.lightcuts is None)
     return light
 
 

@@ -3,8 +3,12 @@
 Each half, doubled, is an estimate of the picture of its own, so half of their difference is one of the error of both
 together: of independent draws its mean square is the variance. A light so near that it decides the error of a picture
 without a clamp is seen only where a sampled pixel is near it: the estimate is then too low.
+
+Where all lights are far from what is seen halves agree on too little. What lit pixels send to each other is part of
+the light, so that a sum of lights below it is off by the difference at least.
 """
 
+import math
 import warnings
 from typing import TYPE_CHECKING, Any
 
@@ -14,10 +18,10 @@ import numpy.typing as npt
 from refgi.diagnostics import SamplingError, asked
 from refgi.errors import RefgiWarning
 from refgi.pairs.irradiance import Receivers, add_lights
-from refgi.pairs.loss import LEAST_SAMPLED, sample_for
+from refgi.pairs.loss import LEAST_SAMPLED, Sample, light_at, sample_for, sample_pixels
 from refgi.pairs.mirrors import warn_of_mirrors
 from refgi.pairs.packing import pack
-from refgi.pairs.settings import PairSettings
+from refgi.pairs.settings import DiscClamp, PairSettings
 from refgi.stages import stage
 
 if TYPE_CHECKING:
@@ -27,6 +31,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 LEAST_ERROR = 0.2  # share of the light from which a sampling error gives a warning
+SENDERS = 1024  # pixels that send light to each other
+GRAZING = 0.02  # least cosine of a pixel's surface
 FEW_SAMPLED = 128  # pixels, where a picture does not sum all of its lights
 
 
@@ -106,6 +112,47 @@ def error_of_halves(first: Array, second: Array, samples: int, of: str = "pixel 
     return SamplingError(float(np.sqrt((off**2).mean())) / whole, abs(float(off.mean())) / whole, samples, of)
 
 
+@stage("pairs.seen_light")
+def seen_light(frame: "Frame", receivers: Receivers, lights: "PixelLights") -> float:
+    """Return the light that visible surfaces under direct light send to each other, over that of all pixel lights.
+
+    Parameters
+    ----------
+    frame : Frame
+        The view, with its direct light.
+    receivers : Receivers
+        Its points.
+    lights : PixelLights
+        All pixel lights.
+
+    Returns
+    -------
+    float
+        Both without visibility and at the same sampled pixels; 0 without any light. Pixels send as discs, which
+        rather lowers their light.
+    """
+    sample = sample_pixels(receivers, SENDERS)
+    whole = light_at(sample, lights, PairSettings(clamp=None))
+    if whole <= 0:
+        return 0.0
+    area = _areas(frame, sample) * (np.count_nonzero(receivers.covered) / max(1, len(sample.place)))
+    reflected = [plane.reshape(3, -1)[:, sample.place] for plane in (frame.gbuffer.albedo, frame.direct)]
+    sent = lights._replace(position=sample.position, normal=sample.normal, flux=reflected[0] * reflected[1] * area,
+                           lobe_flux=None, lobe_axis=None, lobe_exponent=None, texel=None, map_index=None, half=None)
+    return light_at(sample, sent, PairSettings(clamp=DiscClamp()), area) / whole
+
+
+def _areas(frame: "Frame", sample: Sample) -> Array:
+    """Return the surface (n,), m^2, that each pixel shows."""
+    camera = frame.scene.camera
+    ahead = np.subtract(camera.target, camera.eye)
+    ray = sample.position - np.asarray(camera.eye, sample.position.dtype)[:, None]
+    depth = (ray.T @ (ahead / np.linalg.norm(ahead))).astype(ray.dtype)
+    cosine = np.maximum(np.abs((ray * sample.normal).sum(axis=0)) / depth, GRAZING)
+    pixel = (2 * math.tan(camera.vfov / 2) / frame.height) ** 2
+    return np.asarray(depth**2 * ray.dtype.type(pixel) / cosine)
+
+
 def report_sampling(
     frame: "Frame", receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None,
     method: str, *, all_summed: bool = True,
@@ -117,9 +164,19 @@ def report_sampling(
     warn_of_mirrors(frame, lights, method)
     found = asked("pairs.sampling_error")
     if found is not None:
-        found.sampling_error = sampling_error(receivers, lights, settings, footprint,
-                                              LEAST_SAMPLED if all_summed else FEW_SAMPLED)
+        stated = sampling_error(receivers, lights, settings, footprint, LEAST_SAMPLED if all_summed else FEW_SAMPLED)
+        found.sampling_error = with_seen_light(stated, frame, receivers, lights)
         warn_of_sampling(found.sampling_error, method)
+
+
+def with_seen_light(
+    stated: SamplingError | None, frame: "Frame", receivers: Receivers, lights: "PixelLights"
+) -> SamplingError | None:
+    """Return a sampling error that is no less than what lights lack of the light of visible surfaces."""
+    if stated is None:
+        return None
+    lacking = seen_light(frame, receivers, lights) - 1
+    return stated._replace(pixel=max(stated.pixel, lacking), mean=max(stated.mean, lacking))
 
 
 def warn_of_sampling(error: SamplingError | None, method: str) -> None:

@@ -17,7 +17,7 @@ from refgi.method import Approximation, Extent, Method
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import sample_pixels
 from refgi.pairs.mirrors import warn_of_mirrors
-from refgi.pairs.sampling import error_of_halves, half_of, warn_of_sampling
+from refgi.pairs.sampling import error_of_halves, half_of, warn_of_sampling, with_seen_light
 from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, Hidden, receivers, shadowed_sum
 from refgi.settings import Settings, setting
@@ -93,7 +93,9 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     warn_of_mirrors(frame, lights, "vpl")
     found = asked("vpl.sampling_error")
     if found is not None:
-        found.sampling_error = vpl_sampling_error(frame, lights, settings)
+        found.sampling_error = with_seen_light(vpl_sampling_error(frame, lights, settings), frame,
+                                               Receivers(*frame.gbuffer.resolve("position", "normal", "covered")),
+                                               lights)
         warn_of_sampling(found.sampling_error, "vpl")
     return irradiance
 

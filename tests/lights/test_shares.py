@@ -131,7 +131,8 @@ def test_there_are_no_more_lights_than_memory_is_planned_for(how, count):
     frame = Frame(BOX.with_lights(*lamps), **SMALL)
     settings = of(LightSettings, count=count, **how)
     most = most_lights(settings, 8, 32**2)
-    assert choose_lights(frame, settings).flux.shape[1] <= most <= (8 * 32**2 if "all" in how.values() else 8 + 3 * count)
+    limit = 8 * 32**2 if "all" in how.values() else 8 + 3 * count
+    assert choose_lights(frame, settings).flux.shape[1] <= most <= limit
 
 
 def test_methods_say_that_the_count_is_a_total():

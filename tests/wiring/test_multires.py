@@ -170,10 +170,15 @@ def lights_of(frame, settings):
     return lights, areas
 
 
+def reflected(rsm):
+    """Return the flux that a map's surfaces reflect, W, all channels."""
+    return float(rsm.flux.sum() + (0 if rsm.lobe_flux is None else rsm.lobe_flux.sum()))
+
+
 def demo_areas(frame, settings, lights):
     """Return the demo's area of each light; N counts what was drawn from the light's own map, dark texels too."""
     areas, lamps = np.zeros(lights.flux.shape[1]), frame.scene.lights
-    shares = shares_of(settings.lights.count, [float(rsm.flux.sum()) for rsm in frame.rsms])
+    shares = shares_of(settings.lights.count, [reflected(rsm) for rsm in frame.rsms])
     for index, (lamp, share) in enumerate(zip(lamps, shares, strict=True)):
         maps = frame.rsms[index].projection.maps
         drawn = share if settings.lights.source.pattern == "halton" else nearest_grid(share, maps)

@@ -171,7 +171,8 @@ def light_areas(frame: "Frame", lights: "PixelLights", settings: MultiresSetting
     """
     if "ams_disc" not in settings.as_published:
         return footprints(frame, settings.lights, settings.effective_pairs)
-    maps = frame.rsms if not isinstance(settings.lights.source, MapLights) else light_maps(frame, settings.lights.source)
+    source = settings.lights.source
+    maps = light_maps(frame, source) if isinstance(source, MapLights) else frame.rsms
     shares = [one.drawn for one in drawn_from_maps(maps, settings.lights)]
     return demo_footprints(lights, frame.scene.lights, shares)
 

@@ -114,7 +114,7 @@ def same_sequence(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[str]:
     list of str
         Keys, those of objects after a dot; none where nothing differs.
     """
-    same = {"estimate": None, "sampling_error": None}
+    same = {"estimate": None}
     left, right = (_flat({**one, **same, **{key: {**one.get(key, {}), "source": None} for key in ("scene", "path")}})
                    for one in (a, b))
     return sorted(key for key in left.keys() | right.keys() if left.get(key) != right.get(key))
@@ -174,7 +174,7 @@ def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame,
     for step in sequence.over(scenes, first):
         made = step
     return Picture(made.frame, made.irradiance, made.radiance, None if frame.temporal else light.estimate, made.frames,
-                   made.lobes, light.lobe_estimate, None if frame.temporal else light.sampling_error)
+                   made.lobes, light.lobe_estimate)
 
 
 def render_still(scene: Scene, method: str, settings: Any, still: StillFrames, options: Mapping[str, Any]) -> Picture:

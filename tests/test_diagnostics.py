@@ -63,6 +63,13 @@ def test_each_half_of_a_draw_is_a_sample_of_the_whole_map(pattern):
         assert np.abs(counts - 128).max() <= (4 if pattern != "random" else 45)  # random: 4.5 standard deviations
 
 
+def test_halves_of_a_grid_are_the_colours_of_a_chessboard():
+    rsm = box_map(64)
+    lights = choose_pixel_lights([rsm._replace(flux=np.ones_like(rsm.flux))], count=64, pattern="grid")
+    row, column = np.divmod(lights.texel, 64)
+    np.testing.assert_array_equal(lights.half, (row // 8 + column // 8) % 2 == 1)
+
+
 def test_odd_lights_go_to_either_half_in_turn():
     lights = choose_pixel_lights([box_map()] * 4, count=4, pattern="halton", seed=5)
     alone = [lights.half[lights.map_index == k].tolist() for k in range(4)]
@@ -161,8 +168,9 @@ def test_frames_of_a_scene_are_diagnosed_once(method):
         assert picture.sampling_error == first.sampling_error
     grey = tuple(dataclasses.replace(one, diffuse=(0.5,) * 3) for one in BOX.materials)
     geometry = dataclasses.replace(BOX.geometry, vertices=BOX.geometry.vertices * 1.01)
-    for scene in (BOX.with_lights(lamp, *BOX.lights), dataclasses.replace(BOX, materials=grey),
-                  dataclasses.replace(BOX, geometry=geometry)):
+    more = BOX.with_lights(lamp, *BOX.lights)
+    painted = dataclasses.replace(more, materials=grey)
+    for scene in (more, painted, dataclasses.replace(painted, geometry=geometry)):
         animation.render(scene)
         assert ran(animation.runs).keys() == once.keys()
         assert all(ran(animation.runs)[name] >= bool(count) for name, count in once.items())

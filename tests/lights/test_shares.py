@@ -13,8 +13,10 @@ from refgi.lights import choose_pixel_lights
 from refgi.lights.selection import choose_lights
 from refgi.lights.settings import LightSettings, most_lights
 from refgi.lights.shares import lamp_shares, map_flux, map_shares
+from refgi.lights.walk import _shares
 from refgi.methods import METHODS, render
-from refgi.scene import PointLight, SpotLight, load_scene
+from refgi.rays import Tracer
+from refgi.scene import PointLight, SpotLight, light_table, load_scene, material_table
 from refgi.settings import of
 from tests.lights.test_pixel_lights import box_map, cube_map, with_flux
 from tests.naive.shares import shares_of
@@ -121,6 +123,15 @@ def test_paths_go_where_the_flux_is():
     lights = choose_lights(Frame(BOX.with_lights(lamp, strong), **SMALL), of(LightSettings, count=80, source="walk"))
     first = choose_lights(Frame(BOX.with_lights(lamp), **SMALL), of(LightSettings, count=20, source="walk"))
     np.testing.assert_allclose(lights.flux[:, : first.flux.shape[1]], first.flux, rtol=1e-12)
+
+
+def test_a_lamp_whose_trial_meets_nothing_has_one_path_beyond_the_number():
+    """Nothing of a scene that only dark lamps light is drawn anew: they share the number."""
+    lamps, geometry = light_table((MISSES, *BOX.lights)), BOX.geometry
+    tracer, materials = Tracer(geometry), material_table(BOX.materials)
+    assert _shares(tracer, geometry, materials, lamps, 40, 0) == [(0, 1, 1.0), (1, 40, 1.0)]
+    dark = light_table((MISSES, MISSES))
+    assert _shares(tracer, geometry, materials, dark, 40, 0) == [(0, 20, 1.0), (1, 20, 1.0)]
 
 
 @pytest.mark.parametrize("how", [{"pattern": "halton"}, {"pattern": "grid"}, {"source": "walk", "bounces": 3},

@@ -149,7 +149,7 @@ def _in_proportion(count: int, flux: Array) -> Array:
     shares = np.floor(quota + SAME).astype(np.int64)
     order = np.argsort(-np.round(quota - shares, 9), kind="stable")
     shares[order[: count - least.sum() - shares.sum()]] += 1
-    return least + shares
+    return np.asarray(least + shares)
 
 
 def _systematic(quota: Array, start: float) -> Array:

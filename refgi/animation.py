@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from refgi import stages
+from refgi.diagnostics import FrameSession, SamplingError
 from refgi.methods import Picture, render
 from refgi.scene import load_scene
 
@@ -45,6 +46,8 @@ class Animation:
         self.runs: list[stages.Run] = []
         self._options = (method, settings, frame_options)
         self._memory = stages.Memory()
+        self._session = FrameSession()
+        self._sampling_error: SamplingError | None = None
 
     def render(self, scene: "Scene | None" = None) -> Picture:
         """Render the next frame.
@@ -58,7 +61,8 @@ class Animation:
         -------
         Picture
             As that of `refgi.render`, the same object where the scene is that of the frame before. Its arrays are
-            shared with other frames: they are to be read, not written.
+            shared with other frames: they are to be read, not written. Its sampling error is that of the last frame
+            that had diagnostics: the first one, or one with other objects, materials or number of lamps.
 
         Raises
         ------
@@ -71,10 +75,18 @@ class Animation:
             picture: Picture
             rests, picture = self._memory.recall(PICTURE, (scene,))
             if not rests:
-                picture = render(scene, method, settings, **frame_options)
+                picture = self._made(scene, method, settings, frame_options)
                 self._memory.keep(PICTURE, (scene,), picture)
         self.scene, self.runs = scene, runs
         return picture
+
+    def _made(self, scene: "Scene", method: str, settings: Any, frame_options: dict[str, Any]) -> Picture:
+        """Render a frame, with diagnostics where those of the frame before no longer hold."""
+        with self._session.frame(scene) as due:
+            picture = render(scene, method, settings, **frame_options)
+        if due:
+            self._sampling_error = picture.sampling_error
+        return picture._replace(sampling_error=self._sampling_error)
 
     def along(self, scenes: Iterable["Scene"]) -> Iterator[Picture]:
         """Render frames one after the other.

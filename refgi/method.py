@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy.typing as npt
 
+from refgi.diagnostics import SamplingError, diagnosing
 from refgi.errors import InputError, RefgiWarning
 from refgi.settings import Settings
 from refgi.stages import sharing
@@ -49,6 +50,7 @@ class Light(NamedTuple):
     estimate: Any = None  # that the irradiance is the mean of, of a method that states its own error
     lobes: Array | None = None  # (3, h, w) radiance of receivers' lobes by indirect light, W/m^2/sr, if any
     lobe_estimate: Any = None  # that the lobes are the mean of
+    sampling_error: SamplingError | None = None  # of a method that draws lights or samples, where it was asked for
 
 
 class Extent(NamedTuple):
@@ -118,10 +120,13 @@ class Method(NamedTuple):
 
     def light(self, frame: Any, settings: Any) -> "Light":
         """Return all that the method makes of a frame; what irradiance and lobes both need is computed once."""
-        if not frame.glossy_receivers:
-            return Light(*self.compute(frame, settings))
-        with sharing():
-            return Light(*self.compute(frame, settings), *self.compute_lobes(frame, settings))
+        with diagnosing() as found:
+            if not frame.glossy_receivers:
+                light = Light(*self.compute(frame, settings))
+            else:
+                with sharing():
+                    light = Light(*self.compute(frame, settings), *self.compute_lobes(frame, settings))
+        return light._replace(sampling_error=found.sampling_error)
 
     def made(self, frame: Any, settings: Any) -> "Light":
         """Return what the method makes of a frame, without its estimates."""

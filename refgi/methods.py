@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy.typing as npt
 
+from refgi.diagnostics import SamplingError, diagnosing
 from refgi.errors import InputError
 from refgi.method import Method
 from refgi.skips import left_out
@@ -83,6 +84,7 @@ class Picture(NamedTuple):
     frames: Any = None  # (h, w) frames that each pixel is blended of, of a temporal filter that counts them
     lobes: Array | None = None  # (3, h, w) radiance of receivers' lobes by indirect light, W/m^2/sr, if any
     lobe_estimate: Any = None  # as `estimate`, of the lobes, W/m^2/sr
+    sampling_error: SamplingError | None = None  # of the irradiance, of methods that draw lights or samples
 
 
 class KeepingEstimate:
@@ -98,10 +100,14 @@ class KeepingEstimate:
         self._method = method
         self.estimate: Any = None
         self.lobe_estimate: Any = None
+        self.sampling_error: SamplingError | None = None
 
     def __call__(self, frame: "Frame", settings: Any) -> Array:
         """Return the indirect irradiance, (3, h, w), W/m^2."""
-        light, self.estimate = self._method.compute(frame, settings)
+        with diagnosing() as found:
+            light, self.estimate = self._method.compute(frame, settings)
+        if found.due:
+            self.sampling_error = found.sampling_error
         return light
 
     def lobes(self, frame: "Frame", settings: Any) -> Array | None:
@@ -212,7 +218,7 @@ def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = Non
     frame = Frame(load_scene(scene) if isinstance(scene, str | Path) else scene, **frame_options)
     light = known.light(frame, settings)
     picture = Picture(frame, light.irradiance, frame.radiance(light.irradiance, light.lobes), light.estimate,
-                      lobes=light.lobes, lobe_estimate=light.lobe_estimate)
+                      lobes=light.lobes, lobe_estimate=light.lobe_estimate, sampling_error=light.sampling_error)
     if not left_out("frame.buffers", lambda: (len(frame.unused), len(BUFFERS))):
         for name in frame.unused:
             getattr(frame, name)

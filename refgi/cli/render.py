@@ -97,9 +97,8 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     size = "x".join(map(str, content["size"]))
     text = f"{job.scene.name} by {job.method}: {size} in {seconds:.2f} s"
     text += f" -> {', '.join(content['files'])}" if files.files else ""
-    stated = record.get("estimate", {})
-    text += f"\n{stated['statement']}" if stated else ""
-    text += f"\nlobes: {stated['lobes']['statement']}" if "lobes" in stated else ""
+    text += "".join(f"\n{record[key]['statement']}" for key in ("estimate", "sampling_error") if key in record)
+    text += f"\nlobes: {record['estimate']['lobes']['statement']}" if "lobes" in record.get("estimate", {}) else ""
     if again is not None:
         other = differences(Path(again), planes)
         content["again"] = {"file": again, "same": not other, "differs": other}
@@ -109,7 +108,7 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
 
 
 def _record(job: "Job", picture: "Picture") -> "Record":
-    from refgi.provenance import estimate_record, method_record, scene_record
+    from refgi.provenance import estimate_record, method_record, sampling_record, scene_record
 
     frame, estimate = picture.frame, picture.estimate
     options = {"dtype": frame.dtype.name, "rsm_resolution": frame.rsm_resolution, "shadows": frame.shadows}
@@ -122,6 +121,8 @@ def _record(job: "Job", picture: "Picture") -> "Record":
         record |= job.still.record
     if estimate is not None:
         record |= estimate_record(estimate, picture.lobe_estimate)
+    if picture.sampling_error is not None:
+        record |= {"sampling_error": sampling_record(picture.sampling_error)}
     return record
 
 
@@ -141,7 +142,7 @@ def _content(picture: "Picture", job: "Job", seconds: float, record: "Record") -
             "covered_pixels": int(covered.sum()), "mean_indirect_irradiance": float(mean), **lobes,
             "brightest_radiance": float(picture.radiance.max()),
             "non_finite_pixels": count_non_finite(picture.radiance), "versions": record["versions"],
-            "provenance": record, **{key: record[key] for key in ("estimate",) if key in record},
+            "provenance": record, **{key: record[key] for key in ("estimate", "sampling_error") if key in record},
         }
 
 

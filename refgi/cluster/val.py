@@ -15,10 +15,11 @@ from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters, Clusters, Csm, ValSettings
 from refgi.lights.selection import choose_lights, footprints, light_areas
-from refgi.lights.settings import MapLights, with_clamp
+from refgi.lights.settings import most_lights, with_clamp
 from refgi.method import Extent
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.loss import warn_of_clamp
+from refgi.pairs.sampling import report_sampling
 from refgi.rsm import facing_normals
 from refgi.rsm.buffers.glossy import GlossyPoints, spread_over_picture
 from refgi.stages import skip
@@ -151,6 +152,7 @@ def light_pixels(
     """
     footprint = footprints(frame, settings.lights, settings.pairs)
     warn_of_clamp(receivers_of(frame), lights, settings.pairs, footprint, "val")
+    report_sampling(frame, receivers_of(frame), lights, settings.pairs, footprint, "val")
     return clustered_irradiance(
         receivers_of(frame), frame.gbuffer.facing, lights, areas, maps, settings, footprint=footprint,
         visibility_of=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
@@ -244,7 +246,7 @@ def extra_bytes(settings: ValSettings, extent: Extent) -> int:
         Bytes, rather too many than too few.
     """
     size, float_bytes = extent.size, extent.float_bytes
-    texels, count = settings.maps.resolution**2, _most_maps(settings)
+    texels, count = settings.maps.resolution**2, _most_maps(settings, extent)
     sides = 2 if settings.maps.behind == "dual_paraboloid" else 1
     depth = 2 * count * sides * texels * float_bytes  # twice: maps on which there is nothing are dropped by a copy
     filtered = 0
@@ -254,14 +256,12 @@ def extra_bytes(settings: ValSettings, extent: Extent) -> int:
     return depth + filtered + size[0] * size[1] * LISTED_FLOATS * float_bytes
 
 
-def _most_maps(settings: ValSettings) -> int:
+def _most_maps(settings: ValSettings, extent: Extent) -> int:
     if settings.visibility is None or isinstance(settings.visibility, WITHOUT_MAPS):
         return 0
-    most, source = max(1, MOST_TEXELS // settings.maps.resolution**2), settings.lights.source
+    most = max(1, MOST_TEXELS // settings.maps.resolution**2)
     count = settings.clusters.count if isinstance(settings.clusters, Clusters) else most
-    if isinstance(source, MapLights):
-        return count if source.pattern == "all" else min(count, settings.lights.count)
-    return min(count, settings.lights.count * source.bounces)
+    return min(count, most_lights(settings.lights, extent.maps, extent.texels))
 
 
 def _filtered_bytes(csm: Csm, float_bytes: int) -> int:

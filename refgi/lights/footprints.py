@@ -166,5 +166,5 @@ def demo_footprints(lights: "PixelLights", sources: "Sequence[Light]", shares: "
         expect(place is not None, "as_published", "no 'ams_disc' under a directional light", "ams_disc")
         mine = lights.map_index == index
         away = lights.position[:, mine] - np.asarray(place, np.float64)[:, None]
-        area[mine] = np.pi / (DEMO_CONSTANT * count) * (away**2).sum(axis=0)
+        area[mine] = np.pi / (DEMO_CONSTANT * max(1, count)) * (away**2).sum(axis=0)
     return area

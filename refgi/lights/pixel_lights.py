@@ -5,14 +5,14 @@ without flux count in N but are dropped from the list. With a `warp` texels are 
 light's flux is T/N w Phi_t with the weight w of `refgi.lights.warp`. `filtered` replaces T/N times one texel's flux by
 the sum over the texel's cell (SII's filtered flux look-up); the cells partition the map, so the flux sum is the map's.
 
-With several maps each gets an equal share of the count, the first ones one more where it does not divide. Under the
-grid pattern a map draws the k n^2 texels nearest to its share, n x n on each of its k maps (6 for a cube), never none;
-its lights carry T over that number, so rounding moves no light from one map to another.
+With several maps `shares` says how many of the count each gets. Under the grid pattern a map draws the k n^2 texels
+nearest to its share, n x n on each of its k maps (6 for a cube); its lights carry T over that number, so rounding moves
+no light from one map to another.
 """
 
 import math
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -21,15 +21,15 @@ from refgi.draws import PIXEL_LIGHTS, draws
 from refgi.errors import expect
 from refgi.lights.footprints import cell_sums, cells_of_grid, cells_of_nearest, texel_areas, texels_with_flux
 from refgi.lights.importance import importance as importance_of
+from refgi.lights.shares import Pattern, map_shares
 from refgi.lights.warp import Warp, texel_of, warp_stacked
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.rsm.buffers.gbuffer import values_at
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.sampling import grid, halton
-from refgi.stages import skip, stage
+from refgi.stages import stage
 
 Array = npt.NDArray[Any]
-Pattern = Literal["grid", "halton", "all", "random"]
 
 
 class Drawn(NamedTuple):
@@ -38,6 +38,8 @@ class Drawn(NamedTuple):
     texel: Array  # (n,) row * W + column
     weight: float | Array  # T/N, or (n,) T/N w where they are warped
     cell: Array | None  # (H * W,) index of the drawn texel whose light carries a texel's flux; None: own flux alone
+    gain: float = 1.0  # what lights of cells carry beside the flux of their cell; weights contain it
+    half: Array | None = None  # (n,) bool, whether it is of the second half of the draw; None: no draw
 
 
 @stage("lights.draw")
@@ -96,19 +98,22 @@ def draw_texels(
     expect(importance is None or len(importance) == len(rsms), "importance", f"one for each of {len(rsms)} maps",
            None if importance is None else len(importance))
     drawn = []
-    for index, (rsm, share) in enumerate(zip(rsms, map_shares(rsms, count, pattern), strict=True)):
-        weight: float | Array = rsm.texels / share
+    for index, (rsm, (share, gain, place)) in enumerate(zip(rsms, map_shares(rsms, count, pattern, seed), strict=True)):
+        if share == 0:
+            drawn.append(Drawn(np.zeros(0, np.int64), 1.0, None))
+            continue
+        weight: float | Array = rsm.texels / share * gain
         if warp is None:
-            texel = _choose(rsm, share, pattern, seed, index)
+            texel = _choose(rsm, share, pattern, seed, place)
         else:
             texel_importance = importance_of(rsm) if importance is None else importance[index]
-            texel, own = _warped(rsm, _points(rsm, share, pattern, seed, index), texel_importance, warp)
+            texel, own = _warped(rsm, _points(rsm, share, pattern, seed, place), texel_importance, warp)
             weight = weight * (own * (share / own.sum()) if renormalise else own)
         cell = None
         if filtered and pattern != "all":
             on_grid = pattern == "grid" and warp is None
             cell = cells_of_grid(rsm.projection, share) if on_grid else cells_of_nearest(rsm.projection, texel)
-        drawn.append(Drawn(texel, weight, cell))
+        drawn.append(Drawn(texel, weight, cell, gain, _halves(rsm, share, pattern, place)))
     return drawn
 
 
@@ -134,10 +139,17 @@ def lights_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> PixelLights:
     lobe, what the cell's lobes reflect leaves it diffusely: flux alone is filtered, in the paper as here.
     """
     parts = []
-    for index, (rsm, (texel, weight, cell)) in enumerate(zip(rsms, drawn, strict=True)):
-        part = _weighted_lights(rsm, texel, weight) if cell is None else _filtered_lights(rsm, texel, cell)
+    for index in _drawn_from(drawn):
+        rsm, (texel, weight, cell, gain, half) = rsms[index], drawn[index]
+        part = _weighted_lights(rsm, texel, weight, half) if cell is None else _filtered_lights(
+            rsm, texel, cell, gain, half)
         parts.append(part._replace(map_index=np.full(part.flux.shape[1], index, np.int32)))
     return parts[0] if len(parts) == 1 else _joined(parts)
+
+
+def _drawn_from(drawn: Sequence[Drawn]) -> list[int]:
+    """Return which maps any texel is drawn from; the first where there is none."""
+    return [index for index, one in enumerate(drawn) if len(one.texel)] or [0]
 
 
 def choose_pixel_lights(rsms: Sequence[Rsm], **options: Any) -> PixelLights:
@@ -175,64 +187,15 @@ def footprints_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> Array:
         Area, m^2: O d^2 / cos of the texel with the same T/N w as its flux, or of all texels of its cell that reflect.
     """
     parts = []
-    for rsm, (texel, weight, cell) in zip(rsms, drawn, strict=True):
+    for index in _drawn_from(drawn):
+        rsm, (texel, weight, cell, gain, _) = rsms[index], drawn[index]  # a gain is flux of other lamps, not surface
         if cell is None:
             own = texel_areas(rsm, texel)
-            area = own * np.asarray(weight).astype(own.dtype)
+            area = own * np.asarray(weight / gain).astype(own.dtype)
         else:
             (area,) = cell_sums(texel_areas(rsm, np.arange(rsm.texels))[None], cell, len(texel))
         parts.append(area[area != 0])
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
-
-
-def map_shares(rsms: Sequence[Rsm], count: int | None, pattern: Pattern) -> list[int]:
-    """Return how many texels are drawn from each map.
-
-    Parameters
-    ----------
-    rsms : sequence of Rsm
-        One map a light.
-    count : int or None
-        How many are asked for, over all maps; None with pattern "all".
-    pattern : {"grid", "halton", "all", "random"}
-        As for `choose_pixel_lights`.
-
-    Returns
-    -------
-    list of int
-        One number a map, at least 1. They sum to the count, but for the grid, whose n x n cells on each of a map's
-        faces come as near to the map's share as they can.
-
-    Raises
-    ------
-    InputError
-        If the count does not suit the pattern.
-    """
-    if pattern == "all":
-        total = sum(rsm.texels for rsm in rsms)
-        expect(count is None or count == total, "count", f"None or {total} with pattern 'all'", count)
-        return [rsm.texels for rsm in rsms]
-    if not isinstance(count, int | np.integer) or count < len(rsms):
-        expect(False, "count", f"an integer, at least one for each of {len(rsms)} lights", count)
-        raise AssertionError
-    shares = equal_shares(int(count), len(rsms))
-    if pattern != "grid":
-        return shares
-    cells = [_nearest_grid(share, rsm.projection.maps) for share, rsm in zip(shares, rsms, strict=True)]
-    if cells != shares:
-        skip("lights.grid_cells", f"{sum(cells)} texels for {count}: n x n on each map of {len(rsms)} lights")
-    return cells
-
-
-def equal_shares(count: int, parts: int) -> list[int]:
-    """Return `parts` shares of `count` things, the first ones one more where it does not divide."""
-    return [count // parts + (index < count % parts) for index in range(parts)]
-
-
-def _nearest_grid(share: int, maps: int) -> int:
-    """Return the number of cells nearest to a share that puts n x n on each of some maps; of two the smaller."""
-    below = max(1, math.isqrt(share // maps))
-    return min((maps * n * n for n in (below, below + 1)), key=lambda cells: abs(cells - share))
 
 
 def _choose(rsm: Rsm, share: int, pattern: Pattern, seed: int, index: int) -> Array:
@@ -261,6 +224,20 @@ def _points(rsm: Rsm, share: int, pattern: Pattern, seed: int, index: int) -> Ar
     return halton(share, shift=shift)
 
 
+def _halves(rsm: Rsm, share: int, pattern: Pattern, place: int) -> Array | None:
+    """Return which texels are of the second half of a draw, each half a sample of the whole map; None for every texel.
+
+    A Halton set's halves are its first and last points: every other one would be a half of the map. Every other cell
+    of a grid, rows shifted, is spread over all of it. The odd one goes to either half in turn over the maps.
+    """
+    if pattern == "all":
+        return None
+    number = np.arange(share)
+    if pattern == "grid":
+        return np.asarray((number + number // math.isqrt(share // rsm.projection.maps) + place) % 2 == 1)
+    return number >= (share + place % 2) // 2
+
+
 def _warped(rsm: Rsm, points: Array, importance: Array, warp: Warp) -> tuple[Array, Array]:
     """Return the texels that the warped points fall on, and their weights 1 / (T q)."""
     height, width = rsm.projection.shape
@@ -270,26 +247,27 @@ def _warped(rsm: Rsm, points: Array, importance: Array, warp: Warp) -> tuple[Arr
     return texel_of(warped[:, 1], height) * width + texel_of(warped[:, 0], width), weight
 
 
-def _weighted_lights(rsm: Rsm, texel: Array, weight: float | Array) -> PixelLights:
+def _weighted_lights(rsm: Rsm, texel: Array, weight: float | Array, half: Array | None) -> PixelLights:
     """Return the texels as lights with T/N, or T/N w, times their flux."""
     (flux,) = rsm.at(texel, "flux")
     scale = np.asarray(weight).astype(flux.dtype)
     lobe = None if rsm.lobe_flux is None else values_at(rsm.lobe_flux, texel) * scale
-    return _lights(rsm, texel, flux * scale, lobe)
+    return _lights(rsm, texel, flux * scale, lobe, half)
 
 
-def _filtered_lights(rsm: Rsm, texel: Array, cell: Array) -> PixelLights:
-    flux = cell_sums(rsm.flux, cell, len(texel))
+def _filtered_lights(rsm: Rsm, texel: Array, cell: Array, gain: float, half: Array | None) -> PixelLights:
+    by = rsm.flux.dtype.type(gain)
+    flux = cell_sums(rsm.flux, cell, len(texel)) * by
     power = rsm.flux.sum(axis=0) if rsm.lobe_flux is None else (rsm.flux + rsm.lobe_flux).sum(axis=0)
     texel = texels_with_flux(texel, cell, power > 0)
     if rsm.lobe_flux is None:
-        return _lights(rsm, texel, flux, None)
-    lobe = cell_sums(rsm.lobe_flux, cell, len(texel))
+        return _lights(rsm, texel, flux, None, half)
+    lobe = cell_sums(rsm.lobe_flux, cell, len(texel)) * by
     glossy = values_at(rsm.lobe_flux, texel).any(axis=0)  # others have no axis for their cell's lobes to leave along
-    return _lights(rsm, texel, flux + np.where(glossy, 0, lobe), np.where(glossy, lobe, 0))
+    return _lights(rsm, texel, flux + np.where(glossy, 0, lobe), np.where(glossy, lobe, 0), half)
 
 
-def _lights(rsm: Rsm, texel: Array, flux: Array, lobe: Array | None) -> PixelLights:
+def _lights(rsm: Rsm, texel: Array, flux: Array, lobe: Array | None, half: Array | None) -> PixelLights:
     """Gather the chosen texels, leaving out those without flux."""
     has_flux = flux.any(axis=0) if lobe is None else flux.any(axis=0) | lobe.any(axis=0)
     chosen = texel[has_flux]
@@ -303,6 +281,7 @@ def _lights(rsm: Rsm, texel: Array, flux: Array, lobe: Array | None) -> PixelLig
         None if rsm.lobe_exponent is None else values_at(rsm.lobe_exponent, chosen),
         len(texel),
         chosen.astype(np.int32),
+        half=None if half is None else half[has_flux],
     )
 
 
@@ -316,7 +295,7 @@ def _joined(parts: Sequence[PixelLights]) -> PixelLights:
         return np.concatenate([part[field] for part in parts], axis=-1)
 
     together = PixelLights(joined(0), joined(1), joined(2), None, None, None, sum(part.drawn for part in parts),
-                           joined(7), joined(8))
+                           joined(7), joined(8), None if parts[0].half is None else joined(9))
     if glossy:
         together = together._replace(lobe_flux=joined(3), lobe_axis=joined(4), lobe_exponent=joined(5))
     return together

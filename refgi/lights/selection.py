@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.diagnostics import is_due
 from refgi.lights.footprints import with_equal_solid_angles
 from refgi.lights.settings import LightSettings, MapLights, PathLights
 from refgi.stages import skip
@@ -13,6 +14,7 @@ from refgi.stages import skip
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.lights.pixel_lights import Drawn
+    from refgi.lights.shares import MapShare
     from refgi.pairs.pixel_lights import PixelLights
     from refgi.pairs.settings import PairSettings
     from refgi.rsm import Rsm
@@ -117,7 +119,8 @@ def with_openness(frame: "Frame", lights: "PixelLights", settings: LightSettings
     free = _openness(frame, lights.position, lights.normal, settings)
     if settings.openness.flux == "scale":
         scaled = scale_flux(lights, free, "sii_openness" in settings.openness.as_published)[0]
-        warn_of_loss(lost_share(power(lights).sum(), power(scaled).sum()), "openness_flux 'scale'")
+        if is_due("lights.openness_loss"):
+            warn_of_loss(lost_share(power(lights).sum(), power(scaled).sum()), "openness_flux 'scale'")
         return scaled
     return roulette(lights, free, settings.openness.floor, settings.seed)
 
@@ -183,12 +186,12 @@ def _map_lights(settings: LightSettings) -> MapLights:
     return settings.source if isinstance(settings.source, MapLights) else MapLights()
 
 
-def drawn_from_maps(rsms: "Sequence[Rsm]", settings: LightSettings) -> list[int]:
-    """Return N, how many texels the settings draw from each map."""
-    from refgi.lights.pixel_lights import map_shares
+def drawn_from_maps(rsms: "Sequence[Rsm]", settings: LightSettings) -> "list[MapShare]":
+    """Return how many texels the settings draw from each map."""
+    from refgi.lights.shares import map_shares
 
     pattern = _map_lights(settings).pattern
-    return map_shares(rsms, None if pattern == "all" else settings.count, pattern)
+    return map_shares(rsms, None if pattern == "all" else settings.count, pattern, settings.seed)
 
 
 def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: LightSettings) -> "PixelLights":
@@ -196,7 +199,8 @@ def _without_weight(lights: "PixelLights", rsms: "Sequence[Rsm]", settings: Ligh
     if _map_lights(settings).pattern == "all" or lights.map_index is None:
         return lights
     drawn = drawn_from_maps(rsms, settings)
-    share = np.array([n / rsm.texels for n, rsm in zip(drawn, rsms, strict=True)], lights.flux.dtype)
+    share = np.array([one.drawn / rsm.texels / one.gain for one, rsm in zip(drawn, rsms, strict=True)],
+                     lights.flux.dtype)
     factor = share[lights.map_index]
     lobe = None if lights.lobe_flux is None else lights.lobe_flux * factor
     return lights._replace(flux=lights.flux * factor, lobe_flux=lobe)

@@ -118,7 +118,8 @@ class LightSettings(Settings):
 
     PRINCIPAL = "count"
 
-    count: int = setting(768, "pixel lights of a map, or paths of a light", least=1, most=MOST_LIGHTS)
+    count: int = setting(768, "pixel lights, or light paths, of all lamps together, shared out by the flux they bring",
+                         least=1, most=MOST_LIGHTS)
     seed: int = setting(0, "which random numbers", least=0, most=LAST_SEED)
     source: MapLights | PathLights = setting(MapLights(), "texels of shadow maps, or ends of light paths")
     openness: OpennessSettings = setting(OpennessSettings(), "lights in the open")
@@ -156,8 +157,12 @@ def most_lights(lights: LightSettings, maps: int, texels: int) -> int:
     int
         At most.
     """
-    every = isinstance(lights.source, MapLights) and lights.source.pattern == "all"
-    return maps * (texels if every else lights.count)
+    if isinstance(lights.source, PathLights):
+        return lights.count * lights.source.bounces
+    if lights.source.pattern == "all":
+        return maps * texels
+    # a grid has a cell on each face at least, and at most 4 of 2.5 that are its share
+    return 2 * lights.count + maps if lights.source.pattern == "grid" else lights.count
 
 
 def clamped_pairs(lights: LightSettings, pairs: PairSettings) -> PairSettings:

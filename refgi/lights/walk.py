@@ -28,6 +28,7 @@ Array = npt.NDArray[Any]
 
 BASES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53)  # a pair for the light and for each bounce
 MOST_BOUNCES = len(BASES) // 2 - 1
+TRIAL = 256  # paths of each of several lamps that tell what it lights
 
 
 class PathRays(NamedTuple):
@@ -37,6 +38,7 @@ class PathRays(NamedTuple):
     direction: Array  # (n, 3) unit vectors
     power: Array  # (n, 3) what each carries, W
     numbers: Array  # (n, d) its coordinates: two for the light, two for each bounce
+    half: Array  # (n,) bool, whether it is of the second half of its lamp's paths
 
 
 class PathVertices(NamedTuple):
@@ -48,6 +50,7 @@ class PathVertices(NamedTuple):
     lobe_flux: Array  # (n, 3) W
     lobe_axis: Array  # (n, 3) mirror directions
     lobe_exponent: Array  # (n,)
+    half: Array  # (n,) bool
 
 
 @stage("lights.walk")
@@ -68,11 +71,12 @@ def walk_lights(
     lights : LightTable
         Float64.
     paths : int
-        How many to trace, over all lights, at least one a light.
+        How many to trace, over all lamps. Of several each gets its share of the flux that `TRIAL` paths of each bring
+        to surfaces; one whose trial meets nothing gets a path beyond the number, as it may light something small.
     bounces : int
         How many surfaces each path meets, up to `MOST_BOUNCES`.
     seed : int
-        Shifts the quasi-random set modulo 1; 0 leaves it as it is.
+        Shifts the quasi-random set modulo 1, 0 leaves it as it is; draws the lamps where there are fewer paths.
 
     Returns
     -------
@@ -82,28 +86,47 @@ def walk_lights(
     Raises
     ------
     InputError
-        If there are fewer paths than lights, or too many bounces.
+        If there are no paths, or too many bounces.
 
     Notes
     -----
     Paths are not ended at random: each carries on with its power times the diffuse reflectance, so the walk adds no
     noise beyond its directions. Glossy materials leave a lobe, but paths go on by diffuse reflection alone.
     """
-    from refgi.lights.pixel_lights import equal_shares
-
-    count = len(lights.kind)
-    expect(paths >= count, "lights", f"at least one path for each of {count} lights", paths)
+    expect(paths >= 1, "lights", "at least one path", paths)
     expect(1 <= bounces <= MOST_BOUNCES, "bounces", f"1 to {MOST_BOUNCES}", bounces)
     used = 2 + 2 * bounces
     shift = draws(seed, LIGHT_PATHS, used).tolist() if seed else None
     vertices: list[PathVertices] = []
-    for k, share in enumerate(equal_shares(paths, count)):
-        numbers = halton(share, BASES[:used], shift, start=1)
-        rays = _emit(lights, k, numbers, geometry)
-        # a lamp may lie in a surface
-        rays = rays._replace(origin=rays.origin + tracer.offsets(rays.origin)[:, None] * rays.direction)
-        vertices += _paths(tracer, geometry, materials, rays, bounces)
+    for k, share, gain in _shares(tracer, geometry, materials, lights, paths, seed):
+        rays = _first_rays(tracer, geometry, lights, k, halton(share, BASES[:used], shift, start=1))
+        vertices += _paths(tracer, geometry, materials, rays._replace(power=rays.power * gain), bounces)
     return _pixel_lights(vertices, paths * bounces)
+
+
+def _shares(
+    tracer: "Tracer", geometry: "Geometry", materials: "MaterialTable", lights: "LightTable", paths: int, seed: int
+) -> list[tuple[int, int, float]]:
+    """Return number, paths and gain of each lamp that has any, by the flux that a trial brings to surfaces."""
+    from refgi.lights.shares import lamp_shares
+
+    count = len(lights.kind)
+    if count == 1:
+        return [(0, paths, 1.0)]
+    numbers = halton(TRIAL, BASES[:4], draws(seed, LIGHT_PATHS, 4, 1).tolist(), start=1)
+    flux = np.zeros(count)
+    for k in range(count):
+        (met,) = _paths(tracer, geometry, materials, _first_rays(tracer, geometry, lights, k, numbers), 1)
+        flux[k] = met.flux.sum() + met.lobe_flux.sum()
+    found = [*zip(range(count), *lamp_shares(paths, flux, seed), strict=True)]
+    unmet = [(k, 1, 1.0) for k in np.flatnonzero(flux == 0).tolist()] if flux.any() else []
+    return sorted([*(one for one in found if one[1] > 0), *unmet])
+
+
+def _first_rays(tracer: "Tracer", geometry: "Geometry", lights: "LightTable", k: int, numbers: Array) -> PathRays:
+    """Return the first rays of lamp k, moved off its place: it may lie in a surface."""
+    rays = _emit(lights, k, numbers, geometry)
+    return rays._replace(origin=rays.origin + tracer.offsets(rays.origin)[:, None] * rays.direction)
 
 
 def _paths(
@@ -121,17 +144,18 @@ def _paths(
         mirror = rays.direction - 2 * (rays.direction * normal).sum(axis=1, keepdims=True) * normal
         diffuse = _diffuse(geometry, materials, hits.triangle_id[met], material, position)
         vertices.append(PathVertices(position, normal, power * diffuse,
-                                     power * materials.specular[material], mirror, materials.exponent[material]))
+                                     power * materials.specular[material], mirror, materials.exponent[material],
+                                     rays.half))
         u, v = rays.numbers[:, 2 + 2 * bounce], rays.numbers[:, 3 + 2 * bounce]
         start = position + tracer.offsets(position)[:, None] * normal
-        rays = PathRays(start, _cosine_directions(normal, u, v), vertices[-1].flux, rays.numbers)
+        rays = PathRays(start, _cosine_directions(normal, u, v), vertices[-1].flux, rays.numbers, rays.half)
     return vertices
 
 
 def _emit(lights: "LightTable", k: int, numbers: Array, geometry: "Geometry") -> PathRays:
     """Return the first rays of light k: each carries I / (density of its direction) / paths."""
     count = len(numbers)
-    direction, power = np.empty((count, 3)), np.empty((count, 3))
+    direction, power, half = np.empty((count, 3)), np.empty((count, 3)), np.arange(count) >= (count + k % 2) // 2
     if lights.kind[k] == DIRECTIONAL:
         low, high = geometry.bounds
         radius = geometry.diagonal / 2
@@ -140,9 +164,9 @@ def _emit(lights: "LightTable", k: int, numbers: Array, geometry: "Geometry") ->
         origin = (low + high) / 2 - 1.001 * radius * lights.direction[k] + disc @ across
         direction[:] = lights.direction[k]
         power[:] = lights.intensity[k] * (math.pi * radius**2 / count)
-        return PathRays(origin, direction, power, numbers)
+        return PathRays(origin, direction, power, numbers, half)
     _emit_from_point(lights, k, numbers, direction, power)
-    return PathRays(np.repeat(lights.position[k][None], count, axis=0), direction, power, numbers)
+    return PathRays(np.repeat(lights.position[k][None], count, axis=0), direction, power, numbers, half)
 
 
 @kernel
@@ -213,10 +237,11 @@ def _pixel_lights(vertices: list[PathVertices], drawn: int) -> "PixelLights":
     from refgi.pairs.pixel_lights import PixelLights
 
     joined = (np.concatenate(parts).T for parts in zip(*vertices, strict=True))
-    position, normal, flux, lobe_flux, axis, exponent = joined
+    position, normal, flux, lobe_flux, axis, exponent, half = joined
     glossy: Array = (lobe_flux != 0).any(axis=0)
     emits: Array = glossy | (flux != 0).any(axis=0)
-    lights = PixelLights(position[:, emits], normal[:, emits], flux[:, emits], None, None, None, drawn)
+    lights = PixelLights(position[:, emits], normal[:, emits], flux[:, emits], None, None, None, drawn,
+                         half=half[emits])
     if not glossy.any():
         return lights
     return lights._replace(lobe_flux=lobe_flux[:, emits], lobe_axis=axis[:, emits], lobe_exponent=exponent[emits])

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.diagnostics import is_due
 from refgi.errors import RefgiWarning
 from refgi.pairs.irradiance import Receivers, add_lights
 from refgi.pairs.packing import pack
@@ -118,7 +119,7 @@ def warn_of_clamp(
     receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None, method: str
 ) -> None:
     """Warn where the clamp of a method removes more than `LEAST_LOSS` of the light of a picture."""
-    if settings.clamp is not None and settings.clamps:
+    if settings.clamp is not None and settings.clamps and is_due("pairs.clamp_loss"):
         value = getattr(settings.clamp, "value", None)
         warn_of_loss(clamp_loss(receivers, lights, settings, footprint),
                      f"{method}: clamp {settings.clamp.name()!r}" + (f" of {value:g}" if value is not None else ""))

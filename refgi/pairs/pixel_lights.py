@@ -24,6 +24,7 @@ class PixelLights(NamedTuple):
     drawn: int  # N: those without flux included
     texel: Array | None = None  # (N',) int32: row * W + column on the stacked maps; None: not from a map
     map_index: Array | None = None  # (N',) int32: which of the maps
+    half: Array | None = None  # (N',) bool: of the second half of the draw, a sample like the first; None: no draw
 
 
 class Range(NamedTuple):

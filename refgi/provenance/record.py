@@ -14,12 +14,15 @@ from collections.abc import Mapping
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from refgi.provenance.content import geometry_digest, light_json, materials_digest, plain
 from refgi.scene import Scene
+
+if TYPE_CHECKING:
+    from refgi.diagnostics import SamplingError
 
 PACKAGES = ("refgi", "numpy", "numba", "llvmlite", "scipy", "embreex", "trimesh", "OpenEXR", "imageio", "pillow",
             "matplotlib", "click", "rich", "pydantic", "jinja2", "flip-evaluator")
@@ -156,6 +159,22 @@ def method_record(method: str, settings: Any) -> Record:
         JSON values.
     """
     return {"method": method, "settings": plain(settings)}
+
+
+def sampling_record(error: "SamplingError") -> Record:
+    """Return a method's sampling error: shares of the mean indirect light, what it is of, and a statement.
+
+    Parameters
+    ----------
+    error : SamplingError
+        As a picture has it.
+
+    Returns
+    -------
+    dict
+        JSON values.
+    """
+    return {**plain(error._asdict()), "statement": error.statement}
 
 
 def estimate_record(estimate: Any, lobes: Any = None) -> Record:

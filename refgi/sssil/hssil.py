@@ -5,10 +5,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.diagnostics import is_due
 from refgi.settings import replaced
 from refgi.sssil.blur import blur
 from refgi.sssil.cameras import join_cameras
 from refgi.sssil.crown.gather import gather
+from refgi.sssil.crown.loss import warn_of_few_samples
 from refgi.sssil.crown.reach import chosen_radius, warn_short_reach
 from refgi.sssil.pyramid.levels import pyramid, sender_pyramid
 from refgi.sssil.pyramid.view import Level
@@ -64,8 +66,10 @@ def one_view(frame: "Frame", settings: HssilSettings) -> Array:
     """
     levels = pyramid(frame, settings)  # Sec. 4, hierarchical maps
     senders = sender_pyramid(frame, levels, settings)
-    warn_short_reach(levels[0].shape, settings.sampling)
+    if is_due("sssil.reach"):
+        warn_short_reach(levels[0].shape, settings.sampling)
     settings = replaced(settings, {"sampling.radius": chosen_radius(levels[0].shape, settings.sampling)})
+    warn_of_few_samples(levels, senders, settings)
     irradiance = gather_level(frame, levels[-1], len(levels) - 1, settings, senders[-1])
     for index in reversed(range(len(levels) - 1)):  # Sec. 3.2: starting from the smallest
         added = gather_level(frame, levels[index], index, settings, senders[index])

@@ -11,10 +11,17 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from refgi.diagnostics import SamplingError, asked
+from refgi.lights.settings import LightSettings, MapLights, most_lights
 from refgi.method import Approximation, Extent, Method
+from refgi.pairs.irradiance import Receivers
+from refgi.pairs.loss import sample_pixels
+from refgi.pairs.mirrors import warn_of_mirrors
+from refgi.pairs.sampling import error_of_halves, half_of, warn_of_sampling, with_seen_light
 from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, Hidden, receivers, shadowed_sum
 from refgi.settings import Settings, setting
+from refgi.stages import stage
 from refgi.truth.imperfect import Imperfect, fill_hidden, imperfect_maps
 
 if TYPE_CHECKING:
@@ -24,7 +31,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 FLOAT32 = 4  # bytes
-MOST_LIGHTS = 1 << 24  # a map: every texel of one of 4096 x 4096
+SAMPLED = 512  # pixels of which the sampling error is estimated
+MOST_LIGHTS = 1 << 24  # every texel of one of 4096 x 4096
 Pattern = Literal["grid", "halton", "all", "random"]
 
 
@@ -34,7 +42,8 @@ class VplLights(Settings):
 
     PRINCIPAL = "count"
 
-    count: int = setting(768, "pixel lights of a map", least=1, most=MOST_LIGHTS)
+    count: int = setting(768, "pixel lights of all lamps together, shared out by the flux they bring", least=1,
+                         most=MOST_LIGHTS)
     pattern: Pattern = setting("halton", "where they lie in a map; all: every texel, whatever the count")
     filtered: bool = setting(False, "flux is averaged over each light's cell (SII Sec. 4)")
     seed: int = setting(0, "which random numbers", least=0, most=LAST_SEED)
@@ -81,7 +90,43 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     irradiance.reshape(3, -1)[:, points.pixel] = shadowed_sum(frame.tracer, points, lights,
                                                               visibility=settings.visibility, batch=settings.batch,
                                                               hidden=hidden)
+    warn_of_mirrors(frame, lights, "vpl")
+    found = asked("vpl.sampling_error")
+    if found is not None:
+        found.sampling_error = with_seen_light(vpl_sampling_error(frame, lights, settings), frame,
+                                               Receivers(*frame.gbuffer.resolve("position", "normal", "covered")),
+                                               lights)
+        warn_of_sampling(found.sampling_error, "vpl")
     return irradiance
+
+
+@stage("vpl.sampling_error")
+def vpl_sampling_error(frame: "Frame", lights: "PixelLights", settings: VplSettings) -> SamplingError | None:
+    """Return how much the light of a picture depends on which lights were drawn, from two halves of them.
+
+    Parameters
+    ----------
+    frame : Frame
+        The view of the scene.
+    lights : PixelLights
+        Its lights.
+    settings : VplSettings
+        Whether they are shadowed; imperfect maps, which shadow all lights together, are left out here.
+
+    Returns
+    -------
+    SamplingError or None
+        At sampled pixels; None where every texel is a light, or there is no light.
+    """
+    if lights.half is None:
+        return None
+    sample = sample_pixels(Receivers(*frame.gbuffer.resolve("position", "normal", "covered")), SAMPLED)
+    points = receivers(frame.scene.geometry, sample.position, sample.normal,
+                       frame.gbuffer.triangle_id.reshape(-1)[sample.place], frame.tracer.grain)
+    shadowed = settings.visibility and settings.maps is None
+    first, second = (shadowed_sum(frame.tracer, points, half_of(lights, later)[0], visibility=shadowed,
+                                  batch=settings.batch) for later in (False, True))
+    return error_of_halves(first, second, lights.drawn)
 
 
 def vpl_lobes(frame: "Frame", settings: VplSettings) -> Array:
@@ -144,8 +189,10 @@ def _map_bytes(settings: VplSettings, extent: Extent) -> int:
     """Return bytes of the maps of all lights."""
     if settings.maps is None or not settings.visibility:
         return 0
-    of_map = extent.texels if settings.lights.pattern == "all" else min(settings.lights.count, extent.texels)
-    return FLOAT32 * extent.maps * of_map * settings.maps.resolution**2
+    chosen = settings.lights
+    count = most_lights(LightSettings(count=chosen.count, source=MapLights(pattern=chosen.pattern)), extent.maps,
+                        extent.texels)
+    return FLOAT32 * count * settings.maps.resolution**2
 
 
 METHOD = Method("vpl", "the same pixel lights with visibility by rays or imperfect shadow maps", vpl, VplSettings,

@@ -309,6 +309,7 @@ def test_frames_of_a_resting_scene_are_blended_and_made_again(tmp_path):
     assert made_again(tmp_path / "cornell_box_hssil.exr") == (tmp_path / "cornell_box_hssil.exr").read_bytes()
 
 
+@pytest.mark.filterwarnings("ignore:.* of the indirect light")  # of few samples: tests/test_diagnostics
 def test_a_comparison_blends_frames_of_methods_with_a_filter(tmp_path):
     sets = [text for pair in HSSIL for text in ("--set", f"hssil.{pair}")]
     result = run("cornell_box", *TINY, "--methods", "sii,hssil", *sets, "--set", "sii.lights=16", "--set",

@@ -98,7 +98,7 @@ def test_json_is_the_only_thing_on_stdout(tmp_path):
     assert content["settings"]["lights.seed"] == 7
     assert content["files"] == [str(tmp_path / "a.exr")]
     assert content["non_finite_pixels"] == 0
-    assert content["warnings"] == []
+    assert content["warnings"] == [f"sii: {content['sampling_error']['statement']}; more pixel lights lower it"]
     assert {"rsm.gbuffer", "pairs.sum"} <= {line["name"] for line in content["stages"]}
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.lights import Warp, choose_pixel_lights, importance
-from refgi.lights.pixel_lights import map_shares
+from refgi.lights.shares import map_shares
 from refgi.rsm import reflective_shadow_map
 from refgi.scene import Material, PointLight, SpotLight, load_scene, material_table
 from refgi.stages import observe
@@ -31,6 +31,11 @@ def cube_map(resolution=10):
     light = PointLight(box.lights[0].position, (1.0, 2.0, 3.0))
     materials = material_table(box.materials, np.float64)
     return reflective_shadow_map(box.geometry, materials, light, resolution, np.float64)
+
+
+def with_flux(rsm, flux):
+    """Return the map with so much flux in all."""
+    return rsm._replace(flux=rsm.flux * (flux / rsm.flux.sum()))
 
 
 @pytest.mark.feature("SII-13")
@@ -160,10 +165,10 @@ def test_several_lights_share_the_count_and_each_keeps_its_flux():
 @pytest.mark.feature("SII-13")
 def test_a_grid_puts_n_by_n_on_each_face_as_near_to_each_share_as_can_be(faces, count, shares, evidence):
     """By hand; lights of one map are those that it draws alone, and the flux is that of the maps."""
-    rsms = [box_map() if maps == 1 else cube_map() for maps in faces]
+    rsms = [with_flux(box_map() if maps == 1 else cube_map(), 7.0) for maps in faces]
     lights = choose_pixel_lights(rsms, count=count, pattern="grid")
     assert lights.drawn == sum(shares)
-    assert map_shares(rsms, count, "grid") == shares
+    assert [one.drawn for one in map_shares(rsms, count, "grid")] == shares
     for index, (rsm, share) in enumerate(zip(rsms, shares, strict=True)):
         alone, here = choose_pixel_lights([rsm], count=share, pattern="grid"), lights.map_index == index
         np.testing.assert_array_equal(lights.texel[here], alone.texel)
@@ -178,16 +183,10 @@ def test_a_grid_puts_n_by_n_on_each_face_as_near_to_each_share_as_can_be(faces, 
 
 def test_a_grid_that_is_rounded_is_logged_with_the_number_used():
     with observe() as log:
-        choose_pixel_lights([box_map(), box_map(16)], count=32, pattern="grid")
-        choose_pixel_lights([box_map(), box_map(16)], count=256, pattern="grid")
+        choose_pixel_lights([box_map(), with_flux(box_map(16), box_map().flux.sum())], count=32, pattern="grid")
+        choose_pixel_lights([box_map(), with_flux(box_map(16), box_map().flux.sum())], count=256, pattern="grid")
     assert [run.reason for run in log.runs if run.name == "lights.grid_cells"] == [
         "242 texels for 256: n x n on each map of 2 lights"]
-
-
-@pytest.mark.parametrize("pattern", ["grid", "halton", "random"])
-def test_fewer_lights_than_maps_are_refused(pattern):
-    with pytest.raises(InputError, match="at least one for each of 2 lights"):
-        choose_pixel_lights([box_map(), box_map()], count=1, pattern=pattern)
 
 
 def test_lobes_carry_the_same_weight_as_the_diffuse_part():
@@ -308,8 +307,8 @@ def test_float32_maps_give_float32_lights():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"count": 0, "pattern": "halton"}, "at least one for each of 1 lights, got 0"),
-        ({"count": None, "pattern": "random"}, "an integer, at least one for each of 1 lights, got None"),
+        ({"count": 0, "pattern": "halton"}, "an integer, at least 1, got 0"),
+        ({"count": None, "pattern": "random"}, "an integer, at least 1, got None"),
         ({"count": 10, "pattern": "all"}, "None or 576 with pattern 'all', got 10"),
         ({"count": 10, "pattern": "hex"}, "grid or halton or all or random, got 'hex'"),
         ({"count": 625, "pattern": "grid", "filtered": True}, "at most 576 with filtering, got 625"),

@@ -124,8 +124,8 @@ def test_bad_numbers_are_refused():
 
 def test_paths_are_shared_out_among_lights():
     scene = load_scene("cornell_box")
-    lamps = (PointLight((0.278, 0.4, -0.2), (1.0, 1.0, 1.0)), PointLight((0.2, 0.3, -0.2), (1.0, 1.0, 1.0)))
+    lamps = (PointLight((0.278, 0.4, -0.2), (2.0, 2.0, 2.0)), PointLight((0.2, 0.3, -0.2), (1.0, 1.0, 1.0)))
     both = lights_of(scene.with_lights(*lamps), paths=7)
     assert both.drawn == 7
-    first, second = (lights_of(scene.with_lights(lamp), paths=n) for lamp, n in zip(lamps, (4, 3), strict=True))
+    first, second = (lights_of(scene.with_lights(lamp), paths=n) for lamp, n in zip(lamps, (5, 2), strict=True))
     np.testing.assert_array_equal(both.position, np.hstack([first.position, second.position]))

@@ -8,9 +8,11 @@ from tests.naive.draws import draw
 from tests.naive.openness import LIFT, basis, cosine_direction
 from tests.naive.pixel_lights import mirror, radical_inverse
 from tests.naive.radiometry import spot_intensity
+from tests.naive.shares import shares_of, shift_of, trial_flux
 from tests.naive.surface import hit_of, unit
 
 BASES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53)
+TRIAL = 256  # paths of each of several lamps
 LIGHT_PATHS = 1  # use 1 of the random streams
 
 
@@ -19,16 +21,31 @@ def walk(scene, paths, bounces, seed):
 
     One lamp after another, of each all first bounces, then all second ones.
     """
-    for k, lamp in enumerate(scene.lights):
-        share = paths // len(scene.lights) + (k < paths % len(scene.lights))
+    for lamp, share in zip(scene.lights, shares(scene, paths, seed), strict=True):
         followed = [list(path(scene, lamp, share, number, bounces, seed)) for number in range(1, share + 1)]
         for bounce in range(bounces):
             yield from (vertices[bounce] for vertices in followed if bounce < len(vertices))
 
 
+def shares(scene, paths, seed):
+    """Return the paths of each lamp, by the flux that the first vertices of a trial reflect."""
+    if len(scene.lights) == 1:
+        return [paths]
+    shift = shift_of(seed, LIGHT_PATHS, 4, 1)
+    flux = []
+    for lamp in scene.lights:
+        places = ([(radical_inverse(k, BASES[c]) + shift[c]) % 1 for c in range(4)] for k in range(1, TRIAL + 1))
+        flux.append(trial_flux(vertex for place in places for vertex in from_place(scene, lamp, TRIAL, place, 1)))
+    return [share or 1 for share in shares_of(paths, flux)]
+
+
 def path(scene, lamp, share, number, bounces, seed):
     """Yield the vertices of one path of `share`: it goes on with what each surface reflects diffusely."""
-    place = coordinates(number, 2 + 2 * bounces, seed)
+    yield from from_place(scene, lamp, share, coordinates(number, 2 + 2 * bounces, seed), bounces)
+
+
+def from_place(scene, lamp, share, place, bounces):
+    """Yield the vertices of the path with these coordinates."""
     origin, direction, power = emitted(scene, lamp, *place[:2])
     power = power / share
     for bounce in range(bounces):

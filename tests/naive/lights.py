@@ -14,6 +14,7 @@ from tests.naive.light_maps import maps_of
 from tests.naive.light_paths import walk
 from tests.naive.openness import openness
 from tests.naive.pixel_lights import grid_texels, radical_inverse
+from tests.naive.shares import nearest_grid, shares_of
 from tests.naive.warp import pyramid, warp
 
 PATTERN, ROULETTE = 0, 2  # uses of the random streams
@@ -39,28 +40,28 @@ def pixel_lights(frame, arriving, settings):
     if settings.source.name() == "walk":
         found = [Light(*vertex) for vertex in walk(frame.scene, settings.count, settings.source.bounces, settings.seed)]
     else:
-        found = [light for index, here in enumerate(maps_of(frame, arriving, settings.source))
-                 for light in lights_of_map(here, index, share_of(settings, index, frame.rsms), frame, settings)]
+        maps = maps_of(frame, arriving, settings.source)
+        found = [light for index, (here, share) in enumerate(zip(maps, shares_of_maps(maps, settings), strict=True))
+                 for light in lights_of_map(here, index, share, frame, settings)]
     lit = [light for light in found if any(light.flux) or any(light.lobe_flux)]
     return in_the_open(lit, frame, settings)
 
 
-def drawn(frame, settings):
+def drawn(frame, arriving, settings):
     """Return N over all lamps, draws without flux included."""
     if settings.source.name() == "walk":
         return settings.count * settings.source.bounces
-    return sum(share_of(settings, index, frame.rsms) for index in range(len(frame.rsms)))
+    return sum(shares_of_maps(maps_of(frame, arriving, settings.source), settings))
 
 
-def share_of(settings, index, rsms):
-    """Return N of one map: an equal share, the first ones one more; of the grid the nearest k n^2, all its texels."""
-    share = settings.count // len(rsms) + (index < settings.count % len(rsms))
-    _, height, width = rsms[index].flux.shape
+def shares_of_maps(maps, settings):
+    """Return N of each map: its share of the count by flux, of the grid the nearest k n^2; or all its texels."""
     if settings.source.pattern == "all":
-        return height * width
+        return [here.texels for here in maps]
+    shares = shares_of(settings.count, [float(here.flux.sum() + here.lobe_flux.sum()) for here in maps])
     if settings.source.pattern == "grid":
-        return min((height // width * n * n for n in range(1, share + 2)), key=lambda cells: abs(cells - share))
-    return share
+        return [nearest_grid(share, here.stacked) for share, here in zip(shares, maps, strict=True)]
+    return shares
 
 
 def lights_of_map(here, index, share, frame, settings):

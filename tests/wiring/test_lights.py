@@ -81,7 +81,7 @@ def by_the_twin(case, settings):
     fields = [*FIELDS, *(("texel", "map_index") if settings.source.name() == "rsm" else ()),
               *(("footprint",) if settings.has_footprints else ())]
     planes = {field: np.array([getattr(light, field) for light in lights]).T for field in fields}
-    return planes | {"drawn": np.array(drawn(frame, settings))}
+    return planes | {"drawn": np.array(drawn(frame, arriving, settings))}
 
 
 def tolerance(field, settings):

@@ -19,6 +19,7 @@ from refgi.stages import observe
 from tests.naive import clustered
 from tests.naive import multires as naive
 from tests.naive.pair_term import with_clamp
+from tests.naive.shares import nearest_grid, shares_of
 from tests.wiring.cases import Case, needed, uncovered, under
 from tests.wiring.pair_cases import PAIR_CASES
 from tests.wiring.shadow_cases import shadow_cases
@@ -169,22 +170,22 @@ def lights_of(frame, settings):
     return lights, areas
 
 
+def reflected(rsm):
+    """Return the flux that a map's surfaces reflect, W, all channels."""
+    return float(rsm.flux.sum() + (0 if rsm.lobe_flux is None else rsm.lobe_flux.sum()))
+
+
 def demo_areas(frame, settings, lights):
     """Return the demo's area of each light; N counts what was drawn from the light's own map, dark texels too."""
     areas, lamps = np.zeros(lights.flux.shape[1]), frame.scene.lights
-    for index, lamp in enumerate(lamps):
-        share = settings.lights.count // len(lamps) + (index < settings.lights.count % len(lamps))
+    shares = shares_of(settings.lights.count, [reflected(rsm) for rsm in frame.rsms])
+    for index, (lamp, share) in enumerate(zip(lamps, shares, strict=True)):
         maps = frame.rsms[index].projection.maps
         drawn = share if settings.lights.source.pattern == "halton" else nearest_grid(share, maps)
         mine = lights.map_index == index
         areas[mine] = naive.demo_areas(lights.position[:, mine], lamp.position, drawn)
         assert mine.sum() < drawn  # some draws are dark, else the case would not tell
     return areas
-
-
-def nearest_grid(share, maps):
-    """Return the k n^2 that is nearest to a share."""
-    return min((maps * n * n for n in range(1, share + 1)), key=lambda cells: (abs(cells - share), cells))
 
 
 def twin(name, settings):

@@ -98,13 +98,18 @@ def joined(one: Extent, other: Extent) -> Extent:
     return Extent(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
 
 
-def _reflecting_positions(rsm: Rsm) -> Array:
-    """Return positions of a grid of texels, (3, n): those that reflect light."""
+def texel_grid(rsm: Rsm, side: int) -> Array:
+    """Return texels of a map on a grid, `side` x `side` of each of its faces, or all where it has fewer."""
     height, width = rsm.covered.shape
     maps = max(1, height // width)
     rows, columns = ((np.arange(min(size, count)) + 0.5) * size / min(size, count)
-                     for size, count in ((height, maps * SAMPLES), (width, SAMPLES)))
-    texel = (rows.astype(np.int64)[:, None] * width + columns.astype(np.int64)).ravel()
+                     for size, count in ((height, maps * side), (width, side)))
+    return np.asarray((rows.astype(np.int64)[:, None] * width + columns.astype(np.int64)).ravel())
+
+
+def _reflecting_positions(rsm: Rsm) -> Array:
+    """Return positions of a grid of texels, (3, n): those that reflect light."""
+    texel = texel_grid(rsm, SAMPLES)
     texel = texel[rsm.covered.reshape(-1)[texel]]
     position, flux = rsm.at(texel, "position", "flux")
     reflects = flux.any(axis=0)

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.diagnostics import SamplingError, asked, is_due
 from refgi.pairs.irradiance import Receivers
-from refgi.pairs.loss import warn_of_loss
+from refgi.pairs.loss import LEAST_SAMPLED, sample_pixels, warn_of_loss
+from refgi.pairs.sampling import error_of_halves, warn_of_sampling
 from refgi.pairs.tiles import clear, receiving
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
@@ -94,8 +96,13 @@ def gather(frame: "Frame", settings: GatherSettings) -> Array:
     light = gather_counted(frame, settings).irradiance
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
     disc = settings.disc
-    warn_of_loss(disc_loss(receivers, frame.rsms, disc.radius, disc.offset),
-                 f"gather: disc.radius {disc.radius:g} of a map's width")
+    if is_due("gather.loss"):
+        warn_of_loss(disc_loss(receivers, frame.rsms, disc.radius, disc.offset),
+                     f"gather: disc.radius {disc.radius:g} of a map's width")
+    found = asked("gather.sampling_error")
+    if found is not None:
+        found.sampling_error = gather_sampling_error(receivers, frame.rsms, disc)
+        warn_of_sampling(found.sampling_error, "gather")
     return light
 
 
@@ -170,6 +177,35 @@ def gather_irradiance(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSet
         _gather_one(points, normals, rsm, disc, total)
     result.reshape(3, -1)[:, places] = total
     return result
+
+
+@stage("gather.sampling_error")
+def gather_sampling_error(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSettings) -> SamplingError | None:
+    """Return how much the light of a picture depends on where the samples of its discs lie, from two halves of them.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        The picture's points.
+    rsms : sequence of Rsm
+        Reflective shadow maps, one a light.
+    disc : DiscSettings
+        Disc and samples.
+
+    Returns
+    -------
+    SamplingError or None
+        Of the light within the discs, at sampled pixels; None where there is none.
+    """
+    sample = sample_pixels(receivers, LEAST_SAMPLED)
+    halves = np.zeros((2, *sample.position.shape), sample.position.dtype)
+    for rsm in rsms:
+        source, pattern, scale = disc_texels(rsm, disc, sample.position.dtype)
+        middle = centers(rsm.projection, sample.position)
+        # a Halton set's halves are its first and last points
+        for part, total in zip(np.array_split(pattern, 2), halves, strict=True):
+            gather_discs(sample.position, sample.normal, middle, source, part, scale, total)
+    return error_of_halves(halves[0], halves[1], disc.samples, "samples of a disc")
 
 
 def _gather_one(points: Array, normals: Array, rsm: "Rsm", disc: DiscSettings, total: Array) -> None:

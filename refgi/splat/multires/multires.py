@@ -8,12 +8,13 @@ import numpy.typing as npt
 from refgi.cluster.val import extra_bytes as bytes_of_shadows
 from refgi.jit import most_threads
 from refgi.lights.footprints import demo_footprints
-from refgi.lights.selection import choose_lights, drawn_from_maps, footprints
-from refgi.lights.settings import most_lights
+from refgi.lights.selection import choose_lights, drawn_from_maps, footprints, light_maps
+from refgi.lights.settings import MapLights, most_lights
 from refgi.method import Extent
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.lightcuts.tree import tree_bytes
 from refgi.pairs.loss import thinned, warn_of_clamp
+from refgi.pairs.sampling import report_sampling
 from refgi.splat.multires.error_target.error_driven import MANY, clusters, error_driven
 from refgi.splat.multires.error_target.pixel_sum import PixelSum, shadowed_by_clusters, shadowed_by_rays
 from refgi.splat.multires.light_lists.per_light import per_light
@@ -72,7 +73,9 @@ def _irradiance(
     _resolve_channels(buffer, subsplats)
     few = isinstance(subsplats, ByError) and subsplats.visibility is None and clusters(lights, settings.lightcuts)
     some = thinned(lights, footprint) if few or settings.bounded is not None else (lights, footprint)
-    warn_of_clamp(Receivers(buffer.position, buffer.normal, buffer.covered), some[0], pairs, some[1], "multires")
+    receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
+    warn_of_clamp(receivers, some[0], pairs, some[1], "multires")
+    report_sampling(frame, receivers, lights, pairs, footprint, "multires", all_summed=some[0] is lights)
     if isinstance(subsplats, ByError):
         irradiance = error_driven(buffer, lights, subsplats, pairs, footprint, settings.lights.seed,
                                   settings.lightcuts, _shadowed(frame, buffer, lights, footprint, settings)).irradiance
@@ -168,7 +171,10 @@ def light_areas(frame: "Frame", lights: "PixelLights", settings: MultiresSetting
     """
     if "ams_disc" not in settings.as_published:
         return footprints(frame, settings.lights, settings.effective_pairs)
-    return demo_footprints(lights, frame.scene.lights, drawn_from_maps(frame.rsms, settings.lights))
+    source = settings.lights.source
+    maps = light_maps(frame, source) if isinstance(source, MapLights) else frame.rsms
+    shares = [one.drawn for one in drawn_from_maps(maps, settings.lights)]
+    return demo_footprints(lights, frame.scene.lights, shares)
 
 
 def doubled(frame: "Frame") -> "GBuffer":

@@ -19,6 +19,7 @@ from refgi.pairs.irradiance import Receivers, checked, irradiance, over_receiver
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.loss import thinned, warn_of_clamp
 from refgi.pairs.ranged_sum import LANES, sum_pairs_in_range, sum_weighted_pairs
+from refgi.pairs.sampling import report_sampling
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.splat.sii.half_resolution import half_resolution
 from refgi.splat.sii.reach.lists import EVERY, LightLists, Some, listed_pairs
@@ -64,6 +65,8 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     some = (lights, footprint) if settings.lightcuts is None else thinned(lights, footprint)
     warn_of_clamp(receivers, some[0], settings.pairs, some[1], "sii")
     warn_of_cut(light, receivers, lights, resolved, footprint)
+    report_sampling(frame, receivers, lights, settings.pairs, footprint, "sii",
+                    all_summed=settings.lightcuts is None)
     return light
 
 

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy.typing as npt
 
+from refgi.diagnostics import FrameSession
 from refgi.errors import expect
 from refgi.frame import Frame
 from refgi.scene.model import Scene
@@ -97,9 +98,10 @@ class Sequence:
         Step
             Each frame.
         """
+        session = FrameSession()
         for number, scene in enumerate(scenes, first):
             expect(isinstance(scene, Scene), f"scene of frame {number}", "a Scene", type(scene).__name__)
-            with reusing(self.memory):
+            with reusing(self.memory), session.frame(scene):
                 step, history = self._step(scene, number, history)
             yield step
             del step  # whoever took it may let go of it before the next is made

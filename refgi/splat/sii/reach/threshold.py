@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.diagnostics import is_due
 from refgi.draws import RANGE, draws
 from refgi.errors import expect
 from refgi.pairs.irradiance import Receivers
@@ -132,7 +133,7 @@ def warn_of_cut(
     A stochastic cut removes none in the mean and gives no warning.
     """
     cut = settings.reach.cut
-    if cut is None or settings.reach.stochastic:
+    if cut is None or settings.reach.stochastic or not is_due("sii.cut_loss"):
         return
     said = (f"irradiance {cut.irradiance:g} W/m^2" if isinstance(cut, AbsoluteCut) else
             f"share {cut.share:g} with reference_length {cut.reference_length:.3g} m")

@@ -1,0 +1,95 @@
+"""Diagnostics of a picture: what its method says of its own errors, and whether it is asked to.
+
+They cost a few of 100 of a picture. A picture by itself has them; of frames of one scene the first one has, and those
+with other objects, materials or another number of lamps. Camera and lamps may move without.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any, NamedTuple
+
+from refgi.stages import skip
+
+
+class SamplingError(NamedTuple):
+    """How far pictures of one method differ by the lights or samples that were drawn; shares of the mean light."""
+
+    pixel: float  # RMS over sampled pixels and channels of the error, over their mean
+    mean: float  # of that mean; of one difference alone, so rather a hint
+    samples: int  # lights, or samples of a pixel, that it is of
+    of: str = "pixel lights"
+
+    @property
+    def statement(self) -> str:
+        """In a line."""
+        percent = f"{100 * self.pixel:.{1 if self.pixel < 0.1 else 0}f}"
+        return (f"sampling error: {percent} % of the indirect light (RMS over sampled pixels, by two halves of "
+                f"{self.samples:,} {self.of})")
+
+
+class Diagnosis:
+    """What a method found of the picture that it is making."""
+
+    def __init__(self, due: bool) -> None:
+        self.due = due
+        self.sampling_error: SamplingError | None = None
+
+
+_open: ContextVar[Diagnosis | None] = ContextVar("refgi_diagnosis", default=None)
+
+
+@contextmanager
+def diagnosing(due: bool | None = None) -> Iterator[Diagnosis]:
+    """Collect what methods find of a picture that is made inside the block.
+
+    Parameters
+    ----------
+    due : bool, optional
+        Whether they are to look; as for the block around where absent, and if there is none they are.
+
+    Yields
+    ------
+    Diagnosis
+        Filled while the block runs.
+    """
+    around = _open.get()
+    found = Diagnosis(due if due is not None else around is None or around.due)
+    token = _open.set(found)
+    try:
+        yield found
+    finally:
+        _open.reset(token)
+
+
+def is_due(name: str) -> bool:
+    """Return whether the diagnostic stage `name` is to run: also where nobody collects; logs why it does not."""
+    found = _open.get()
+    if found is None or found.due:
+        return True
+    skip(name, "estimated on an earlier frame")
+    return False
+
+
+def asked(name: str) -> Diagnosis | None:
+    """Return who collects what the diagnostic stage `name` finds; None where nobody does, or it is not due."""
+    return _open.get() if is_due(name) else None
+
+
+class FrameSession:
+    """Frames of one scene: whose diagnostics are due."""
+
+    def __init__(self) -> None:
+        self._scene: tuple[Any, Any, int] | None = None
+
+    @contextmanager
+    def frame(self, scene: Any) -> Iterator[bool]:
+        """Let diagnostics run inside the block, a frame, where its scene is another than the last frame's; yield that.
+
+        Another one has other objects or materials, or another number of lamps.
+        """
+        now = (scene.geometry, scene.materials, len(scene.lights))
+        last = self._scene
+        with diagnosing(last is None or now[0] is not last[0] or now[1:] != last[1:]) as found:
+            yield found.due
+        self._scene = now

@@ -1,0 +1,185 @@
+"""Sampling error of a sum of pixel lights, estimated from two halves of the lights at some pixels of the picture.
+
+Each half, doubled, is an estimate of the picture of its own, so half of their difference is one of the error of both
+together: of independent draws its mean square is the variance. A light so near that it decides the error of a picture
+without a clamp is seen only where a sampled pixel is near it: the estimate is then too low.
+
+Where all lights are far from what is seen halves agree on too little. What lit pixels send to each other is part of
+the light, so that a sum of lights below it is off by the difference at least.
+"""
+
+import math
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.diagnostics import SamplingError, asked
+from refgi.errors import RefgiWarning
+from refgi.pairs.irradiance import Receivers, add_lights
+from refgi.pairs.loss import LEAST_SAMPLED, Sample, light_at, sample_for, sample_pixels
+from refgi.pairs.mirrors import warn_of_mirrors
+from refgi.pairs.packing import pack
+from refgi.pairs.settings import DiscClamp, PairSettings
+from refgi.stages import stage
+
+if TYPE_CHECKING:
+    from refgi.frame import Frame
+    from refgi.pairs.pixel_lights import PixelLights
+
+Array = npt.NDArray[Any]
+
+LEAST_ERROR = 0.2  # share of the light from which a sampling error gives a warning
+SENDERS = 1024  # pixels that send light to each other
+GRAZING = 0.02  # least cosine of a pixel's surface
+FEW_SAMPLED = 128  # pixels, where a picture does not sum all of its lights
+
+
+def half_of(lights: "PixelLights", second: bool) -> tuple["PixelLights", Array]:
+    """Return the lights of one half of the draw, and which they are, (N,) bool."""
+    assert lights.half is not None
+    chosen = lights.half == second
+    parts: dict[str, Any] = {name: values[..., chosen] for name, values in lights._asdict().items()
+                             if isinstance(values, np.ndarray)}
+    return lights._replace(**parts), chosen
+
+
+@stage("pairs.sampling_error")
+def sampling_error(
+    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None,
+    least: int = LEAST_SAMPLED,
+) -> SamplingError | None:
+    """Return how much a picture's light depends on which lights were drawn.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        The picture's points.
+    lights : PixelLights
+        Its lights.
+    settings : PairSettings
+        How one light lights one receiver.
+    footprint : (N,) ndarray, optional
+        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+    least : int
+        Pixels to sample at least.
+
+    Returns
+    -------
+    SamplingError or None
+        Of the light without visibility; None where every texel is a light, or there is no light.
+    """
+    if lights.half is None:
+        return None
+    sample = sample_for(receivers, lights, least=least)
+    halves = []
+    for second in (False, True):
+        some, chosen = half_of(lights, second)
+        sums = np.zeros_like(sample.position)
+        add_lights(sample.position, sample.normal,
+                   pack(some, settings, None if footprint is None else footprint[chosen], sums.dtype), sums)
+        halves.append(sums)
+    return error_of_halves(halves[0], halves[1], lights.drawn)
+
+
+def error_of_halves(first: Array, second: Array, samples: int, of: str = "pixel lights") -> SamplingError | None:
+    """Return the error of the sum of two halves (3, n) of a picture's light; None where there is none.
+
+    Parameters
+    ----------
+    first, second : (3, n) ndarray
+        What each half of the samples gives, not doubled.
+    samples : int
+        Of both.
+    of : str
+        What they are.
+
+    Returns
+    -------
+    SamplingError or None
+        |2 first - 2 second| / 2 over the mean of first + second.
+
+    Examples
+    --------
+    >>> error_of_halves(np.array([[1.0, 2.0]]), np.array([[2.0, 1.0]]), 8)[:2]
+    (0.3333333333333333, 0.0)
+    """
+    whole = float((first + second).mean(dtype=np.float64)) if first.size else 0.0
+    if whole <= 0:
+        return None
+    off = np.subtract(first, second, dtype=np.float64)
+    return SamplingError(float(np.sqrt((off**2).mean())) / whole, abs(float(off.mean())) / whole, samples, of)
+
+
+@stage("pairs.seen_light")
+def seen_light(frame: "Frame", receivers: Receivers, lights: "PixelLights") -> float:
+    """Return the light that visible surfaces under direct light send to each other, over that of all pixel lights.
+
+    Parameters
+    ----------
+    frame : Frame
+        The view, with its direct light.
+    receivers : Receivers
+        Its points.
+    lights : PixelLights
+        All pixel lights.
+
+    Returns
+    -------
+    float
+        Both without visibility and at the same sampled pixels; 0 without any light. Pixels send as discs, which
+        rather lowers their light.
+    """
+    sample = sample_pixels(receivers, SENDERS)
+    whole = light_at(sample, lights, PairSettings(clamp=None))
+    if whole <= 0:
+        return 0.0
+    area = _areas(frame, sample) * (np.count_nonzero(receivers.covered) / max(1, len(sample.place)))
+    reflected = [plane.reshape(3, -1)[:, sample.place] for plane in (frame.gbuffer.albedo, frame.direct)]
+    sent = lights._replace(position=sample.position, normal=sample.normal, flux=reflected[0] * reflected[1] * area,
+                           lobe_flux=None, lobe_axis=None, lobe_exponent=None, texel=None, map_index=None, half=None)
+    return light_at(sample, sent, PairSettings(clamp=DiscClamp()), area) / whole
+
+
+def _areas(frame: "Frame", sample: Sample) -> Array:
+    """Return the surface (n,), m^2, that each pixel shows."""
+    camera = frame.scene.camera
+    ahead = np.subtract(camera.target, camera.eye)
+    ray = sample.position - np.asarray(camera.eye, sample.position.dtype)[:, None]
+    depth = (ray.T @ (ahead / np.linalg.norm(ahead))).astype(ray.dtype)
+    cosine = np.maximum(np.abs((ray * sample.normal).sum(axis=0)) / depth, GRAZING)
+    pixel = (2 * math.tan(camera.vfov / 2) / frame.height) ** 2
+    return np.asarray(depth**2 * ray.dtype.type(pixel) / cosine)
+
+
+def report_sampling(
+    frame: "Frame", receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None,
+    method: str, *, all_summed: bool = True,
+) -> None:
+    """Tell whoever collects diagnostics of a method's sampling error, and warn where it is more than `LEAST_ERROR`.
+
+    Also warn of lobes that no receiver meets.
+    """
+    warn_of_mirrors(frame, lights, method)
+    found = asked("pairs.sampling_error")
+    if found is not None:
+        stated = sampling_error(receivers, lights, settings, footprint, LEAST_SAMPLED if all_summed else FEW_SAMPLED)
+        found.sampling_error = with_seen_light(stated, frame, receivers, lights)
+        warn_of_sampling(found.sampling_error, method)
+
+
+def with_seen_light(
+    stated: SamplingError | None, frame: "Frame", receivers: Receivers, lights: "PixelLights"
+) -> SamplingError | None:
+    """Return a sampling error that is no less than what lights lack of the light of visible surfaces."""
+    if stated is None:
+        return None
+    lacking = seen_light(frame, receivers, lights) - 1
+    return stated._replace(pixel=max(stated.pixel, lacking), mean=max(stated.mean, lacking))
+
+
+def warn_of_sampling(error: SamplingError | None, method: str) -> None:
+    """Warn where a method's sampling error is more than `LEAST_ERROR`."""
+    if error is not None and error.pixel > LEAST_ERROR:
+        warnings.warn(RefgiWarning(f"{method}: {error.statement}; more {error.of} lower it"), stacklevel=3)

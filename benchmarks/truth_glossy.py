@@ -2,7 +2,9 @@
 
 Runs of one number of passes, which take about SECONDS, with seeds of their own; deviations are from the oracle that
 tests/truth/glossy_references.npz holds. Each of its pixels stands REPEAT x REPEAT times: what a pass costs beside its
-pixels counts as in a picture of 96 x 72. relMSE = mean over pixels and channels of (x - r)^2 / (r^2 + (0.1 mean r)^2),
+pixels counts as in a picture of 96 x 72. Photons that count for a pixel's footprint land in finer pixels than those of
+the reference: what they are off by holds that too.
+relMSE = mean over pixels and channels of (x - r)^2 / (r^2 + (0.1 mean r)^2),
 and falls as 1 / time. What is claimed is summed with the same weights. Before and after a change:
 
     REFGI_PACKAGE=OTHER_CHECKOUT python -m benchmarks truth_glossy --out before

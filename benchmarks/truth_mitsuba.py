@@ -10,7 +10,6 @@ whose own stated variance is taken out of what both are off by. A row's note say
 """
 
 import dataclasses
-import math
 import os
 import subprocess
 import tempfile
@@ -114,7 +113,7 @@ def ways_of(scene: Scene) -> list[str]:
 def rows(quick: bool) -> Iterator[Row]:
     python = os.environ.get("REFGI_MITSUBA", "")
     if not python or subprocess.run([python, "-c", "import mitsuba"], capture_output=True, check=False).returncode:
-        yield Row("left out: REFGI_MITSUBA names no Python that has Mitsuba", math.nan, "")
+        yield Row("left out: REFGI_MITSUBA names no Python that has Mitsuba", 0.0, "")
         return
     warnings.simplefilter("ignore", RefgiWarning)
     width, height = QUICK_SIZE if quick else SIZE

@@ -41,7 +41,7 @@ def add_cells(task: Task, seed: int, sums: Array) -> None:
             hidden = hidden_from_camera(task, paths)
             if hidden is not None:
                 shadows.reach[hidden] = 0
-            add_unblocked(task, shadows, first, each, sums, True)
+            add_unblocked(task, shadows, first, each, sums, visibility or task.counts.mirrors > 0)
             if visibility:
                 break
             paths.reach[from_lights] = 0  # what light reaches is what it meets first

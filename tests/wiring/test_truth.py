@@ -16,6 +16,8 @@ from refgi.frame import Frame
 from refgi.scene import SpotLight
 from refgi.settings import of
 from refgi.truth import TruthSettings, trace_truth
+from refgi.truth.lobe_cells import lobe_cells
+from refgi.truth.surfaces import lights_of, surfaces
 from tests.naive import light_tracing
 from tests.naive.crossings import face_normals
 from tests.truth.test_caustics import mirror_over_floor
@@ -160,26 +162,46 @@ class Counting:
         return tuple(sum(len(reach) for *_, reach in rays) for rays in (self.closest, self.occluded))
 
 
-def counted(case, **changes):
+def without_lobes(frame):
+    """Return a frame of the scene with diffuse materials: what the bound speaks of."""
+    materials = tuple(dataclasses.replace(material, specular=(0.0, 0.0, 0.0)) for material in frame.scene.materials)
+    return Frame(dataclasses.replace(frame.scene, materials=materials), width=frame.width, height=frame.height,
+                 dtype=frame.dtype)
+
+
+def counted(case, change=lambda frame: frame, **changes):
     """Return the rays of two passes, the settings, and the result."""
-    frame = case.seen()
+    frame = change(case.seen())
     vars(frame)["tracer"] = tracer = Counting(frame.tracer)
     settings = dataclasses.replace(case.settings(TruthSettings, BASE), samples=1, **changes)
     return tracer, settings, trace_truth(frame, settings)
 
 
-def rays_of(settings, receivers, lamps, passes=2):
-    """Return how many rays to nearest hits and how many shadow rays passes and pilot take: docs/truth."""
+@functools.cache
+def cell_rays(scene):
+    """Return how many rays it takes to cut the lights of a scene into cells; its materials have lobes."""
+    frame = frame_of(scene)
+    tracer = Counting(frame.tracer)
+    lobe_cells(frame.scene, tracer, surfaces(frame.scene), lights_of(frame.scene))
+    return tracer.counts[0]
+
+
+def rays_of(settings, receivers, lamps, passes=2, scene="lamps"):
+    """Return how many rays to nearest hits and how many shadow rays passes and pilot take: docs/truth.
+
+    Each of the picks has another one for lobes of senders.
+    """
     picks = 0 if settings.estimator == "hemisphere" else settings.picks
     directions = {"light": 0, "hemisphere": settings.directions or 16}.get(settings.estimator, settings.directions or 8)
-    closest = receivers * directions * settings.bounces
-    shadow = receivers * (picks + lamps * directions * settings.bounces)
+    closest = receivers * (directions * settings.bounces + picks)
+    shadow = receivers * (2 * picks + lamps * directions * settings.bounces)
     closest += lamps * settings.light_grid**2 * settings.interleave**2 if picks else 0
+    cells = cell_rays(scene) if picks else 0
     if not picks or settings.uniform_share == 1:
-        return passes * closest, passes * shadow
+        return passes * closest + cells, passes * shadow
     sampled = min(receivers, PILOT_RECEIVERS)
     pilot = sampled * max(picks, -(-PILOT_PICKS // sampled))
-    return passes * closest + lamps * PILOT_CELLS**2, passes * shadow + pilot
+    return passes * closest + cells + lamps * PILOT_CELLS**2, passes * shadow + pilot
 
 
 IN_ONE_GO = [name for name, case in CASES.items() if not {"visibility", "emitters"} & {*case.values, *case.over}]
@@ -190,7 +212,7 @@ def test_as_many_rays_as_the_settings_say(name):
     case = CASES[name]
     tracer, settings, result = counted(case)
     assert result.passes == 2
-    assert tracer.counts == rays_of(settings, int((result.samples > 0).sum()), 3)
+    assert tracer.counts == rays_of(settings, int((result.samples > 0).sum()), 3, scene=case.scene)
 
 
 def test_no_more_rays_at_a_time_than_a_batch():
@@ -204,7 +226,7 @@ def test_without_visibility_no_shadow_ray_leaves_a_receiver():
     tracer, settings, result = counted(CASES["not blocked"], estimator="light")
     assert tracer.counts[1] == 0
     through, settings, _ = counted(CASES["not blocked"], estimator="hemisphere")
-    assert through.counts[0] > rays_of(settings, int((result.samples > 0).sum()), 3)[0]
+    assert through.counts[0] > rays_of(settings, int((result.samples > 0).sum()), 3, scene="tilted")[0]
 
 
 @pytest.mark.parametrize("share", [0.2, 0.6])
@@ -212,10 +234,10 @@ def test_rays_that_light_nothing_are_uniform_alone(share):
     """Upwards a point light meets nothing: there the density is the uniform share, to the jitter of cells."""
     case = dataclasses.replace(CASES["light"], scene="lamps")
     tracer, settings, _ = counted(case, uniform_share=share, light_grid=40)
-    _, directions, _ = next(rays for rays in tracer.closest[3:] if np.allclose(rays[0], LAMP, atol=1e-3))
+    _, directions, _ = next(rays for rays in tracer.closest[3:] if np.allclose(rays[0], LAMP, atol=1e-3)
+                            and len(rays[0]) == settings.light_grid**2 * settings.interleave**2)
     upward, expected_share = (directions[:, 1] > UPWARD).mean(), share * (1 - UPWARD) / 2
     assert abs(upward / expected_share - 1) < 0.05
-    assert len(directions) == settings.light_grid**2 * settings.interleave**2
 
 
 LAMP, UPWARD = (0.2, 0.9, 0.3), 0.85  # the point light; beyond 32 degrees off the vertical no wall is in its way
@@ -223,8 +245,8 @@ LAMP, UPWARD = (0.2, 0.9, 0.3), 0.85  # the point light; beyond 32 degrees off t
 
 def test_the_bound_says_how_far_hemisphere_rays_look():
     """b r^2 over what a sender gives at most is constant: four times the bound, half of the reach."""
-    reach = [max(reach.max() for *_, reach in counted(CASES["a small bound"], bound=bound, picks=1, light_grid=8,
-                                                      interleave=1)[0].closest if np.isfinite(reach).all())
+    reach = [max(reach.max() for *_, reach in counted(CASES["a small bound"], without_lobes, bound=bound, picks=1,
+                                                      light_grid=8, interleave=1)[0].closest if np.isfinite(reach).all())
              for bound in (0.5, 2.0)]
     assert reach[0] / reach[1] == pytest.approx(2, rel=1e-6)
 
@@ -233,14 +255,14 @@ def test_the_bound_says_how_far_hemisphere_rays_look():
 
 
 def test_an_infinite_bound_leaves_all_to_the_light_side():
-    frame = frame_of("tilted")
+    frame = without_lobes(frame_of("tilted"))
     both = trace_truth(frame, TruthSettings(samples=24 * 2, bound=1e30))
     light = trace_truth(frame, TruthSettings(samples=16 * 2, estimator="light"))
     np.testing.assert_array_equal(both.mean, light.mean)
 
 
 def test_a_vanishing_bound_leaves_all_to_the_hemisphere():
-    frame = frame_of("tilted")
+    frame = without_lobes(frame_of("tilted"))
     both = trace_truth(frame, TruthSettings(samples=24 * 2, bound=1e-12))
     hemisphere = trace_truth(frame, TruthSettings(samples=8 * 2, directions=8, estimator="hemisphere"))
     assert np.abs(both.mean - hemisphere.mean).max() < 1e-6 * both.mean.max()

@@ -1,0 +1,148 @@
+"""Cells of light: maps of a light's directions, chances of cells, and contributions that lobes cannot raise."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from refgi.frame import Frame
+from refgi.rays import Tracer
+from refgi.scene import DirectionalLight, Material, PointLight, SpotLight, load_scene
+from refgi.truth import TruthSettings, trace_truth
+from refgi.truth.cell_pass import beside_of
+from refgi.truth.cell_rays import even_density, pick_cells, picks_for
+from refgi.truth.cell_walk import cell_at, column, fill_tops, found_up
+from refgi.truth.light_square import fill_rays, light_squares, place_of
+from refgi.truth.passes import one_pass
+from refgi.truth.truth import task_of
+from tests.truth.scenes import rectangle
+from tests.truth.scenes import scene as by_hand
+
+LIGHTS = {"spot": SpotLight((0.1, 0.5, 0.2), (0.3, -1.0, 0.1), 0.4, 0.7, (2.0, 1.0, 1.0)),
+          "wide spot": SpotLight((0.1, 0.5, 0.2), (0.0, -1.0, 0.0), 1.5, math.pi / 2, (2.0, 1.0, 1.0)),
+          "point": PointLight((0.1, 0.5, 0.2), (1.0, 1.0, 1.0)), "sun": DirectionalLight((-0.3, -1.0, -0.4), (1, 1, 1))}
+CERTAIN = 1e-5  # chance of a false alarm
+
+
+def shiny(scene, exponent, *lights):
+    """Return a scene of which every material has a lobe."""
+    materials = tuple(dataclasses.replace(material, specular=(0.4,) * 3, exponent=exponent,
+                                          diffuse=tuple(0.5 * c for c in material.diffuse))
+                      for material in scene.materials)
+    return dataclasses.replace(scene, materials=materials, lights=lights or scene.lights)
+
+
+def task_for(scene, size=12, **settings):
+    frame = Frame(scene, width=size, height=size)
+    buffer = frame.gbuffer
+    return task_of(frame.scene, frame.tracer, buffer.position, buffer.normal, buffer.triangle_id,
+                   TruthSettings(**settings))
+
+
+def rays_of(light, points):
+    squares = light_squares((light,), load_scene("cornell_box").geometry)
+    origins, directions = np.empty((len(points), 3)), np.empty((len(points), 3))
+    fill_rays(squares, 0, points, origins, directions)
+    return squares, origins, directions
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+def test_a_point_on_a_ray_has_the_ray_s_place(light):
+    points = np.random.default_rng(1).random((2000, 2))
+    squares, origins, directions = rays_of(LIGHTS[light], points)
+    found = np.array([place_of(squares, 0, tuple(at)) for at in origins + 0.7 * directions])
+    np.testing.assert_allclose(found, points, atol=1e-11)
+
+
+@pytest.mark.parametrize("light", ["spot", "wide spot", "point"])
+def test_equal_parts_of_the_square_are_equal_solid_angles(light):
+    """Uniform places: 1 - cos to the axis is uniform, as is the turn around it."""
+    lamp, points = LIGHTS[light], np.random.default_rng(2).random((40000, 2))
+    squares, _, directions = rays_of(lamp, points)
+    axis = np.asarray(lamp.direction) / np.linalg.norm(lamp.direction) if light != "point" else np.array([0.0, 0, 1])
+    gap = 1 - directions @ axis
+    assert gap.max() <= squares.height[0] * (1 + 1e-12)
+    counts = np.histogram(gap, bins=20, range=(0, squares.height[0]))[0]
+    assert ((counts - 2000) ** 2 / 2000).sum() < chi2.isf(CERTAIN, 19)
+    across = np.cross(axis, (0.3, 0.5, 0.9))
+    across /= np.linalg.norm(across)
+    turn = np.arctan2(directions @ np.cross(axis, across), directions @ across)
+    counts = np.histogram(turn, bins=20, range=(-math.pi, math.pi))[0]
+    assert ((counts - 2000) ** 2 / 2000).sum() < chi2.isf(CERTAIN, 19)
+
+
+@pytest.mark.parametrize("lamps", [("point",), ("spot", "sun", "point")])
+def test_rays_fall_as_densely_as_their_weights_say(lamps, evidence):
+    """n_b integrates to the picks, and picks of many passes fall into 6 x 6 parts of each square as it says."""
+    task = task_for(shiny(load_scene("cornell_box"), 60.0, *(LIGHTS[lamp] for lamp in lamps)), estimator="light")
+    beside, receivers, r, picks = beside_of(task, 0), task.receivers, len(task.receivers.pixel) // 3, task.counts.cells
+    cells, x, n = task.cells, column(task.receivers.position, r), column(task.receivers.normal, r)
+    found, sums = np.empty(len(cells.tree.top), np.float32), np.empty(len(cells.tree.top) + 1)
+    fill_tops(cells.tree, x, n, found, sums)
+    grid, places = 6, np.random.default_rng(3).random((20000, 2))
+    part, expected = np.floor(places * grid).astype(int) @ [grid, 1], []
+    for k in range(len(lamps)):
+        cell = [cell_at(cells, k, *place) for place in places]
+        density = np.array([even_density(cells, k, at, found_up(cells, at, x, n, sums).chance, picks) for at in cell])
+        expected.append(np.bincount(part, density, grid * grid) * cells.squares.measure[k] / len(places))
+    assert np.sum(expected) == pytest.approx(picks, rel=0.05)  # by 20,000 places: a percent or two
+    passes, got = 400, np.zeros((len(lamps), grid * grid))
+    for seed in range(passes):
+        rays = picks_for(len(receivers.pixel) * picks)
+        pick_cells(beside, (0, len(receivers.pixel)), seed, task.tracer.grain, rays)
+        mine = slice(r * picks, (r + 1) * picks)
+        assert (rays.paths.reach[mine] > 0).all()
+        for k, start, way in zip(rays.light[mine], rays.paths.origin[mine], rays.paths.direction[mine], strict=True):
+            a, b = place_of(cells.squares, k, tuple(start.astype(float) + 0.3 * way))
+            got[k, int(a * grid) * grid + int(b * grid)] += 1
+    expected = np.array(expected) * passes
+    off = np.abs(got - expected) / np.sqrt(expected + (0.05 * expected) ** 2 + 1)
+    evidence(f"{len(lamps)} lamps: parts off by {off.max():.1f} at most")
+    assert off.max() < 5
+
+
+def test_cells_are_split_where_mirrors_bend():
+    flat, bent = (task_for(shiny(load_scene(scene), 400.0)).cells for scene in
+                  ("cornell_box", "cornell_sphere:faces=320"))
+    deepest = {tuple(corner[2:]) for corner in bent.corner}
+    assert max(deepest) > max({tuple(corner[2:]) for corner in flat.corner})
+    assert len(np.unique(flat.tree.plane[:, 0])) < 200  # walls and sides of blocks, not single cells
+
+
+@pytest.mark.parametrize("distance", [0.005, 0.3])
+@pytest.mark.parametrize("exponent", [1.0, 20.0, 200.0, 900.0, 1e4, 29999.0])
+def test_no_exponent_makes_a_pass_burst(exponent, distance, evidence):
+    """A floor before a wall with a lobe: a pass of a pixel never brings more than a few times its mean."""
+    wall = rectangle((0, 0, -1), (0, 2, 0), (0, 0, 2), Material("wall", (0.0,) * 3, (0.8,) * 3, exponent))
+    floor = rectangle((distance, 0, -0.5), (0, 0, 1), (0.4, 0, 0), Material("floor", (0.5,) * 3))
+    seen = by_hand([wall, floor], PointLight((1.0, 1.0, 0.0), (3.0, 2.0, 1.0)))
+    task = Tracer(seen.geometry)
+    places = np.random.default_rng(4).random((64, 2)) * (0.02, 0.4) + (distance, -0.2)
+    position = np.stack([places[:, 0], np.zeros(64), places[:, 1]]).reshape(3, 8, 8)
+    normal = np.broadcast_to(np.array([0.0, 1.0, 0.0])[:, None, None], (3, 8, 8)).copy()
+    found = task_of(seen, task, position.astype(np.float32), normal.astype(np.float32), np.full((8, 8), 2, np.int32),
+                    TruthSettings())
+    passes = np.array([one_pass(found, number)[0] for number in range(40)])
+    mean = passes.mean(axis=0)
+    worst = float((passes / mean).max())
+    evidence(f"P = {exponent:g} at {distance} m: {worst:.1f} times the mean of a pixel")
+    assert (mean > 0).all()
+    assert worst < 12
+    # the image of the lamp, of full reflectance, bounds what a sharp lobe sends
+    image = 0.8 * 3.0 * 1.0 / ((places[:, 0] + 1.0) ** 2 + 1.0 + places[:, 1] ** 2) ** 1.5
+    if exponent >= 900:
+        np.testing.assert_allclose(mean.mean(), image.mean(), rtol=0.05)
+
+
+def test_without_lobes_nothing_is_cut_into_cells():
+    assert task_for(load_scene("cornell_box")).cells is None
+    assert task_for(shiny(load_scene("cornell_box"), 20.0), estimator="hemisphere").cells is None
+
+
+def test_the_same_bits_for_any_batch():
+    scene = shiny(load_scene("cornell_box"), 200.0)
+    frame = Frame(scene, width=16, height=12)
+    results = [trace_truth(frame, TruthSettings(samples=48, batch=batch)).mean for batch in (1 << 18, 500)]
+    np.testing.assert_array_equal(*results)

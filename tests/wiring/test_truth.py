@@ -245,8 +245,9 @@ LAMP, UPWARD = (0.2, 0.9, 0.3), 0.85  # the point light; beyond 32 degrees off t
 
 def test_the_bound_says_how_far_hemisphere_rays_look():
     """b r^2 over what a sender gives at most is constant: four times the bound, half of the reach."""
-    reach = [max(reach.max() for *_, reach in counted(CASES["a small bound"], without_lobes, bound=bound, picks=1,
-                                                      light_grid=8, interleave=1)[0].closest if np.isfinite(reach).all())
+    few = {"picks": 1, "light_grid": 8, "interleave": 1}
+    reach = [max(reach.max() for *_, reach in counted(CASES["a small bound"], without_lobes, bound=bound,
+                                                      **few)[0].closest if np.isfinite(reach).all())
              for bound in (0.5, 2.0)]
     assert reach[0] / reach[1] == pytest.approx(2, rel=1e-6)
 

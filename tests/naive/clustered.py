@@ -266,16 +266,20 @@ def ahead_of(view, area):
 
 
 def visible_members(view, members):
-    """Return the share of a cluster's flux that rays reach, of lights that face the receiver and lie above it."""
+    """Return the share of a cluster's flux that rays reach, of lights that face the receiver and lie above it.
+
+    Those above the horizon of a receiver's normal and below its face are there, and the face hides them.
+    """
     starts = view.position + LIFT * view.facing
     reached, whole = np.zeros((2, len(starts)))
     for i in members:
         place, up = view.lights.position[:, i].astype(float), view.lights.normal[:, i].astype(float)
         toward = place - view.position
         flux = sum(float(part[:, i].sum()) for part in (view.lights.flux, view.lights.lobe_flux) if part is not None)
-        counts = flux * (((toward * view.facing).sum(axis=1) > 0) & (toward @ up < 0))
+        counts = flux * (((toward * view.normal).sum(axis=1) > 0) & (toward @ up < 0))
         whole += counts
-        reached += counts * free(view.corners, starts, place + LIFT * up)
+        above = (toward * view.facing).sum(axis=1) > 0
+        reached += counts * (above & free(view.corners, starts, place + LIFT * up))
     return np.divide(reached, whole, out=np.ones_like(whole), where=whole > 0)
 
 
@@ -323,14 +327,15 @@ def on_rectangle(area, on_square):
 
 
 def free_points(view, area, points, up, ball, corners, asked):
-    """Return the share of points above a receiver's surface that its rays reach, with nothing in a ball to block."""
+    """Return the share of points above a receiver's horizon that its rays reach, with nothing in a ball to block."""
     shares = np.ones(len(view.pixels))
     for p in np.flatnonzero(asked & view.light[area.members].any(axis=(0, 2))):
         x, facing = view.position[p], view.facing[p]
-        above = points[(points - x) @ facing > 0]
+        above = points[(points - x) @ view.normal[p] > 0]
         if len(above):
             most = way_to_ball(x, above - x, area.center, ball)
-            shares[p] = free(corners, x + LIFT * facing, above + LIFT * up, most).mean()
+            reached = free(corners, x + LIFT * facing, above + LIFT * up, most)
+            shares[p] = (reached & ((above - x) @ facing > 0)).mean()  # the face hides what lies below it
     return shares
 
 

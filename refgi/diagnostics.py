@@ -86,10 +86,13 @@ class FrameSession:
     def frame(self, scene: Any) -> Iterator[bool]:
         """Let diagnostics run inside the block, a frame, where its scene is another than the last frame's; yield that.
 
-        Another one has other objects or materials, or another number of lamps.
+        Another one has other objects or materials, or another number of lamps. Inside a block that asks for none there
+        are none.
         """
+        around = _open.get()
         now = (scene.geometry, scene.materials, len(scene.lights))
         last = self._scene
-        with diagnosing(last is None or now[0] is not last[0] or now[1:] != last[1:]) as found:
+        changed = last is None or now[0] is not last[0] or now[1:] != last[1:]
+        with diagnosing(changed and (around is None or around.due)) as found:
             yield found.due
         self._scene = now

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from refgi.diagnostics import diagnosing
 from refgi.scene import Scene, SpotLight
 from refgi.settings import of, replaced
 from refgi.sssil.settings import PRESETS, HssilSettings, TemporalSettings
@@ -68,12 +69,13 @@ def screen_space(id: str, what: str, scene: Scene, size: tuple[int, int], shadow
 def coherent(id: str, what: str) -> Case:
     """Return the temporal filter of the last of some frames; light and count of the frames before are given."""
     scenes = frames_of(id)
-    filtered = list(sequence(id, scenes[:-1]))
+    with diagnosing(False):  # few samples are what the case is made of
+        filtered = list(sequence(id, scenes[:-1]))
+        new = next(iter(sequence(id, scenes[-1:], None).over(scenes[-1:], FRAMES - 1)))
     recipe = Recipe(id, "hssil", what)
     give_scene(recipe, scenes[-1])
     add_gbuffer(recipe, scenes[-1], *TEMPORAL_SIZE)
     before = filtered[-1]
-    new = next(iter(sequence(id, scenes[-1:], None).over(scenes[-1:], FRAMES - 1)))
     counts = np.ones(before.irradiance.shape[1:]) if before.frames is None else before.frames
     add_temporal(recipe, scenes[-1], scenes[-2], TEMPORAL_SIZE, TEMPORAL[id],
                  (before.irradiance, counts, new.irradiance))

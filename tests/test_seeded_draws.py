@@ -10,6 +10,7 @@ import pytest
 from refgi.frame import Frame
 from refgi.lights import choose_pixel_lights
 from refgi.lights.openness_flux import roulette
+from refgi.lights.shares import map_shares
 from refgi.rays import Tracer
 from refgi.rays.openness import openness
 from refgi.rsm import reflective_shadow_map
@@ -78,8 +79,10 @@ def test_halton_lights_start_at_index_0_and_are_shifted_by_the_draws(seed):
 def test_random_lights_are_pairs_of_draws(seed):
     rsms = [first_map(light=POINT, resolution=8), first_map()]
     got = texels(rsms, count=61, pattern="random", seed=seed)
+    counts = [share.drawn for share in map_shares(rsms, 61, "random", seed)]
+    assert sum(counts) == 61
     for m, rsm in enumerate(rsms):
-        points = [(draw(seed, 256 * m, 2 * k), draw(seed, 256 * m, 2 * k + 1)) for k in range(31 - m)]
+        points = [(draw(seed, 256 * m, 2 * k), draw(seed, 256 * m, 2 * k + 1)) for k in range(counts[m])]
         assert got[m] == at(rsm, points)
 
 

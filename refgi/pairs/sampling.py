@@ -27,6 +27,7 @@ from refgi.stages import stage
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.pairs.pixel_lights import PixelLights
+    from refgi.scene import Camera
 
 Array = npt.NDArray[Any]
 
@@ -113,15 +114,17 @@ def error_of_halves(first: Array, second: Array, samples: int, of: str = "pixel 
 
 
 @stage("pairs.seen_light")
-def seen_light(frame: "Frame", receivers: Receivers, lights: "PixelLights") -> float:
+def seen_light(camera: "Camera", albedo: Array, direct: Array, receivers: Receivers, lights: "PixelLights") -> float:
     """Return the light that visible surfaces under direct light send to each other, over that of all pixel lights.
 
     Parameters
     ----------
-    frame : Frame
-        The view, with its direct light.
+    camera : Camera
+        Of the view.
+    albedo, direct : (3, h, w) ndarray
+        Reflectance, and direct irradiance, W/m^2.
     receivers : Receivers
-        Its points.
+        The points seen.
     lights : PixelLights
         All pixel lights.
 
@@ -135,21 +138,20 @@ def seen_light(frame: "Frame", receivers: Receivers, lights: "PixelLights") -> f
     whole = light_at(sample, lights, PairSettings(clamp=None))
     if whole <= 0:
         return 0.0
-    area = _areas(frame, sample) * (np.count_nonzero(receivers.covered) / max(1, len(sample.place)))
-    reflected = [plane.reshape(3, -1)[:, sample.place] for plane in (frame.gbuffer.albedo, frame.direct)]
+    area = _areas(camera, direct.shape[1], sample) * (np.count_nonzero(receivers.covered) / max(1, len(sample.place)))
+    reflected = [plane.reshape(3, -1)[:, sample.place] for plane in (albedo, direct)]
     sent = lights._replace(position=sample.position, normal=sample.normal, flux=reflected[0] * reflected[1] * area,
                            lobe_flux=None, lobe_axis=None, lobe_exponent=None, texel=None, map_index=None, half=None)
     return light_at(sample, sent, PairSettings(clamp=DiscClamp()), area) / whole
 
 
-def _areas(frame: "Frame", sample: Sample) -> Array:
-    """Return the surface (n,), m^2, that each pixel shows."""
-    camera = frame.scene.camera
+def _areas(camera: "Camera", rows: int, sample: Sample) -> Array:
+    """Return the surface (n,), m^2, that each pixel of a picture of so many rows shows."""
     ahead = np.subtract(camera.target, camera.eye)
     ray = sample.position - np.asarray(camera.eye, sample.position.dtype)[:, None]
     depth = (ray.T @ (ahead / np.linalg.norm(ahead))).astype(ray.dtype)
     cosine = np.maximum(np.abs((ray * sample.normal).sum(axis=0)) / depth, GRAZING)
-    pixel = (2 * math.tan(camera.vfov / 2) / frame.height) ** 2
+    pixel = (2 * math.tan(camera.vfov / 2) / rows) ** 2
     return np.asarray(depth**2 * ray.dtype.type(pixel) / cosine)
 
 
@@ -175,7 +177,7 @@ def with_seen_light(
     """Return a sampling error that is no less than what lights lack of the light of visible surfaces."""
     if stated is None:
         return None
-    lacking = seen_light(frame, receivers, lights) - 1
+    lacking = seen_light(frame.scene.camera, frame.gbuffer.albedo, frame.direct, receivers, lights) - 1
     return stated._replace(pixel=max(stated.pixel, lacking), mean=max(stated.mean, lacking))
 
 

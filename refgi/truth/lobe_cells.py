@@ -64,8 +64,11 @@ class _Level(NamedTuple):
     split: Array  # (m,) bool
 
 
-def lobe_cells(scene: Scene, tracer: Tracer, surfaces: Surfaces, lights: LightTable) -> LobeCells:
-    """Cut the squares of all lights, of which there is at least one; `surfaces` with the lobes that count."""
+def lobe_cells(scene: Scene, tracer: Tracer, surfaces: Surfaces, lights: LightTable) -> LobeCells | None:
+    """Cut the squares of all lights, of which there is at least one; None where no ray finds a lobe.
+
+    `surfaces`: with the lobes that count.
+    """
     source = _Source(scene, tracer, surfaces, lights)
     levels = [(k, level) for k in range(len(scene.lights)) for level in _grown(source, k)]
     levels.sort(key=lambda found: int(found[1].corner[0, 2]))  # roots first
@@ -82,6 +85,8 @@ def lobe_cells(scene: Scene, tracer: Tracer, surfaces: Surfaces, lights: LightTa
     child[parents] = below + 4 * within
     lobes = Lobe(*(np.concatenate(fields) for fields in zip(*(level.lobe for _, level in levels), strict=True)))
     lit = np.flatnonzero(~split & (lobes.power > 0))
+    if not len(lit):
+        return None
     order, tree = tree_of(Lobe(*(field[lit] for field in lobes)))
     node = lit[order]
     rank = np.full(len(split), -1, np.int32)

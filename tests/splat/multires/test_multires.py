@@ -11,6 +11,7 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.shares import map_shares
 from refgi.method import Extent
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, PointLight, load_scene
@@ -191,13 +192,15 @@ def test_the_default_clamp_keeps_subsplats_near_the_full_sum():
 
 
 def test_the_demos_disc_counts_the_lights_of_each_map(box):
-    """By hand: pi L^2 / (1.5 N) with the 121 and 150 lights that 256 are on a spot's and a point light's map."""
+    """By hand: pi L^2 / (1.5 N) with the lights that each map has of 256, in proportion to its flux."""
     spot = box.scene.lights[0]
     at = Frame(box.scene.with_lights(spot, PointLight((0.3, 0.3, 0.2), (1.0, 1.0, 1.0))), width=8, height=8,
                rsm_resolution=32)
     settings = of(MultiresSettings, lights=256, as_published={"ams_disc"})
     lights = choose_lights(at, settings.lights)
-    for index, (source, count) in enumerate(zip(at.scene.lights, (121, 150), strict=True)):
+    counts = [share.drawn for share in map_shares(at.rsms, 256, "grid")]
+    assert counts[0] != counts[1]
+    for index, (source, count) in enumerate(zip(at.scene.lights, counts, strict=True)):
         here = lights.map_index == index
         square = ((lights.position[:, here].T - np.asarray(source.position)) ** 2).sum(axis=1)
         np.testing.assert_allclose(light_areas(at, lights, settings)[here], math.pi * square / (1.5 * count), rtol=1e-6)

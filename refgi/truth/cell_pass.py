@@ -6,7 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.truth.camera_visibility import hidden_from_camera
-from refgi.truth.cell_rays import Beside, connect, pick_cells, picks_for
+from refgi.truth.cell_connect import connect
+from refgi.truth.cell_densities import Beside
+from refgi.truth.cell_rays import pick_cells, picks_for
 from refgi.truth.lobe_cells import lobe_cells
 from refgi.truth.paths import pass_through
 from refgi.truth.task import Task, add_unblocked, shadow_batch, spans

@@ -3,7 +3,7 @@
 A direction of density cos/pi that finds radiance L contributes pi L. Both estimators are combined by multiple
 importance sampling (MIS) at a bounded geometry term G: the light side has min(G, b), weight min(1, b / G); here the
 rest remains, weight max(0, (G - b) / G) of diffuse radiance (Kollig & Keller 2004). Without bound the weight is 1.
-Lobes are weighted by how densely both estimators sample a point instead (`refgi.truth.cell_rays`).
+Lobes are weighted by how densely both estimators sample a point instead (`refgi.truth.cell_densities`).
 Directions are points of a low-discrepancy set that is scrambled anew in every pass and shifted by a random word per
 pixel.
 """
@@ -20,7 +20,7 @@ from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS, ray_offset
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.scene import LightTable
-from refgi.truth.cell_rays import Beside, Tops, found_for, near_density, rays_beside, tops_for
+from refgi.truth.cell_densities import Beside, Tops, found_for, near_density, rays_beside, tops_for
 from refgi.truth.next_event import aim_at_light, toward_light
 from refgi.truth.paths import CHUNK, Paths, Shadows, Sides, dot, hit_point, leaves, row
 from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_pattern, shading_normal

@@ -15,8 +15,8 @@ from refgi.rays import MISS
 from refgi.sampling import hash_bits
 from refgi.truth.camera_visibility import hidden_from_camera
 from refgi.truth.caustics import photon_pass
+from refgi.truth.cell_densities import Beside
 from refgi.truth.cell_pass import add_cells, beside_of
-from refgi.truth.cell_rays import Beside
 from refgi.truth.hemisphere import cosine_direction, gather, scrambled_points, send
 from refgi.truth.light_grid import footprint
 from refgi.truth.light_pass import add_light_side

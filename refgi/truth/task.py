@@ -11,7 +11,7 @@ from refgi.rays import Tracer
 from refgi.rsm.raster.projection import Projection
 from refgi.scene import LightTable, Scene
 from refgi.truth.caustics import Film
-from refgi.truth.cell_rays import Counts
+from refgi.truth.cell_densities import Counts
 from refgi.truth.light_grid import Density
 from refgi.truth.lobe_cells import LobeCells
 from refgi.truth.lobe_receivers import Lobes

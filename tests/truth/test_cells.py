@@ -11,8 +11,9 @@ from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.scene import DirectionalLight, Material, PointLight, SpotLight, load_scene
 from refgi.truth import TruthSettings, trace_truth
+from refgi.truth.cell_densities import even_density
 from refgi.truth.cell_pass import beside_of
-from refgi.truth.cell_rays import even_density, pick_cells, picks_for
+from refgi.truth.cell_rays import pick_cells, picks_for
 from refgi.truth.cell_walk import cell_at, column, fill_tops, found_up
 from refgi.truth.light_square import fill_rays, light_squares, place_of
 from refgi.truth.passes import one_pass

@@ -22,6 +22,7 @@ from refgi.cluster.visibility.kernel_size import (
 )
 from refgi.lights.importance import importance
 from refgi.lights.selection import choose_lights
+from refgi.lights.shares import map_shares
 from refgi.methods import METHODS
 from refgi.scene import Material
 from refgi.settings import of, replaced
@@ -83,8 +84,10 @@ def no_pi():
 
 
 def no_tn():
-    """N/T of each lamp's own map: 16 of 16^2, of 6 x 16^2 and of 16^2 texels."""
-    frame, factor = lamps.corner(), np.array([16 / 256, 16 / 1536, 16 / 256])[:, None, None]
+    """N/T of each lamp's own map, of 16^2, 6 x 16^2 and 16^2 texels; its N of the 48 by its flux."""
+    frame = lamps.corner()
+    drawn = np.array([share.drawn for share in map_shares(frame.rsms, 48, "halton")])
+    factor = (drawn / (256, 1536, 256))[:, None, None]
     cases = ((sii, of(SiiSettings, lights=48)), (multires, of(MultiresSettings, lights=48, pattern="halton")),
              (val, SMALL_VAL))
     return joined(*(times(method, frame, settings, "sii_no_tn", factor) for method, settings in cases))
@@ -143,10 +146,11 @@ def per_light_ilow():
 
 
 def demo_disc():
-    """cos cos / (r^2 + L^2 / 1.5 N), L the way from each light's own lamp, N = 4 the lights of one lamp."""
+    """cos cos / (r^2 + L^2 / 1.5 N), L the way from each light's own lamp, N its lights of the 8."""
     frame = lamps.corner(lamps.RED, lamps.GREEN)
     settings = of(MultiresSettings, lights=8, pattern="halton", clamp="disc", coarsest=4096)
     lights, normal, covered = choose_lights(frame, settings.lights), frame.gbuffer.normal, frame.gbuffer.covered
+    drawn = [share.drawn for share in map_shares(frame.rsms, 8, "halton")]
     source = np.array([lamps.RED.position, lamps.GREEN.position])[lights.map_index].T
     expected = np.zeros((3, *covered.shape))
     for k in range(lights.flux.shape[1]):
@@ -154,7 +158,7 @@ def demo_disc():
         square, reach = (away**2).sum(axis=0), ((lights.position[:, k] - source[:, k]) ** 2).sum()
         emitted, received = np.tensordot(lights.normal[:, k], away, 1), -(normal * away).sum(axis=0)
         cosines = np.maximum(emitted, 0) * np.maximum(received, 0)
-        form = cosines / square / (square + reach / (1.5 * 4))
+        form = cosines / square / (square + reach / (1.5 * drawn[lights.map_index[k]]))
         expected += lights.flux[:, k, None, None] / math.pi * form * covered
     printed, _ = pair_of(multires, frame, settings, "ams_disc")
     return (printed / expected.max()).ravel(), (expected / expected.max()).ravel()

@@ -139,6 +139,8 @@ def test_near_light_is_the_excess_of_each_light(name, share):
                                    for name, array in lights._asdict().items() if name != "drawn"})
         through = shadowed_sum(frame.tracer, points, alone)
         strongest = shadowed_sum(frame.tracer, points, alone, visibility=False).max(axis=0)
+        toward = np.asarray(alone.position, np.float64)[:, :1] - points.position
+        strongest[(points.facing * toward).sum(axis=0) <= 0] = 0  # by rays, what lies below a face is hidden
         beyond = strongest > most
         expected[:, pixel[beyond]] += (through * (1 - most / np.maximum(strongest, 1e-300)))[:, beyond]
         count += int(beyond.sum())

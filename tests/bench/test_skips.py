@@ -7,6 +7,7 @@ from refgi import frame as frames
 from refgi import skips
 from refgi.bench.skips import UNMEASURED, measure_skips
 from refgi.bench.trades import TRADES
+from refgi.diagnostics import diagnosing
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
@@ -87,7 +88,7 @@ def test_counts_are_those_of_the_buffers(wedge):
 
 def test_rays_left_out_are_those_of_pairs_that_face_away():
     scene, settings = load_scene(BOX), settings_of("vpl", "lights=32")
-    with skips.count_skips() as counts:
+    with diagnosing(False), skips.count_skips() as counts:
         frame = render(scene, "vpl", settings, **OPTIONS).frame
     from refgi.lights import choose_pixel_lights
 
@@ -104,7 +105,7 @@ def test_rays_left_out_are_those_of_pairs_that_face_away():
 def test_tiles_left_out_have_no_light_of_theirs():
     """No more than the pairs of tile and light of which no receiver has any light."""
     scene, settings = load_scene(SPHERE), settings_of("sii", "lights=100", "pairs.clamp=none")
-    with skips.count_skips() as counts:
+    with diagnosing(False), skips.count_skips() as counts:
         frame = render(scene, "sii", settings, **LARGER).frame
     from refgi.lights.selection import choose_lights
     from refgi.pairs.tiles import block_by_block

@@ -8,7 +8,7 @@ from refgi.settings import of
 from refgi.splat.multires.settings import ByIrradiance, MultiresSettings
 from refgi.vectors.cases.plan import Plan, Plans, cases_of
 from refgi.vectors.cases.scenes import AWAY, DOWN, FLOOR, SPOT, SUN, WALL, quad, room, stored_scene
-from refgi.vectors.cases.sii import add_lit
+from refgi.vectors.cases.sii import add_lit, drawn
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
 from refgi.vectors.stages.multires import add_multires
@@ -27,7 +27,8 @@ def multiresolution(id: str, plan: Plan) -> Case:
     """Return `multires` as planned: buffers, lights, refinement, light, picture."""
     recipe, settings, lamps = Recipe(id, "multires", plan.what), settings_of(plan), len(plan.scene.lights)
     columns, rows = (side * (2 if settings.supersampled else 1) for side in plan.size)
-    add_lit(recipe, plan.scene, (columns, rows), plan.maps, (plan.lights,) * lamps, pattern="grid")
+    add_lit(recipe, plan.scene, (columns, rows), plan.maps,
+            drawn(plan.scene, plan.maps, plan.lights * lamps, "grid"), pattern="grid")
     if settings.effective_pairs.needs_footprints:
         add_footprints(recipe, lamps)
     add_multires(recipe, settings, plan.scene, (columns, rows))

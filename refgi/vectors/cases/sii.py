@@ -2,6 +2,10 @@
 
 from typing import Any
 
+import numpy as np
+
+from refgi.frame import Frame
+from refgi.lights.shares import Pattern, map_shares
 from refgi.lights.warp import Warp
 from refgi.pairs.settings import PairSettings
 from refgi.scene import Scene
@@ -37,6 +41,12 @@ def add_lit(
     for index in range(len(scene.lights)):
         add_rsm(recipe, scene, index, maps)
     add_lights(recipe, scene, maps, counts, **options)
+
+
+def drawn(scene: Scene, maps: int, total: int, pattern: Pattern = "halton", seed: int = 0) -> tuple[int, ...]:
+    """Return how many lights each lamp has of a total, as the methods share them out; `maps` texels along a side."""
+    rsms = Frame(scene, width=1, height=1, dtype=np.float64, rsm_resolution=maps).rsms
+    return tuple(share.drawn for share in map_shares(rsms, total, pattern, seed))
 
 
 A3 = Warp("A", 3)

@@ -8,7 +8,7 @@ from refgi.draws import PIXEL_LIGHTS, draws
 from refgi.scene import Camera, Scene, SpotLight
 from refgi.settings import of
 from refgi.vectors.cases.scenes import BULB, SPOT, far_away, kerbs, room, stacked
-from refgi.vectors.cases.sii import add_lit
+from refgi.vectors.cases.sii import add_lit, drawn
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
 from refgi.vectors.stages.pairs import add_footprints
@@ -25,7 +25,7 @@ class Setup:
         **settings: Any,
     ) -> None:
         self.id, self.what, self.scene, self.size, self.maps = id, what, scene, size, maps
-        self.counts = [lights // len(scene.lights)] * len(scene.lights)
+        self.counts = list(drawn(scene, maps, lights, seed=SEED))
         plain = {"lights": lights, "seed": SEED, "clamp": "none", "maps_resolution": 15}
         self.settings = of(ValSettings, **plain | settings)
 

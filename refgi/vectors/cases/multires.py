@@ -75,7 +75,7 @@ QUICK_PLANS: Plans = {
 }
 FULL_PLANS: Plans = {
     "multires-large": lambda: Plan("64 x 48 pixels, 2 x 64 lights, 6 levels", room(SPOT, DOWN, smooth=True), (64, 48),
-                                   24, 64, {"coarsest": 2}),
+                                   25, 64, {"coarsest": 2}),
     "multires-rate": lambda: Plan(
         "Eq. 1 over the distance, thresholds of depth that fall with the level; levels interpolated one by one",
         room(SPOT, smooth=True), (45, 31), 12, 16, {

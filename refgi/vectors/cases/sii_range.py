@@ -4,7 +4,7 @@ from refgi.settings import of
 from refgi.splat.sii.settings import RelativeCut, SiiSettings
 from refgi.vectors.cases.plan import Plan, Plans, cases_of
 from refgi.vectors.cases.scenes import AWAY, DOWN, SPOT, SUN, room
-from refgi.vectors.cases.sii import add_lit
+from refgi.vectors.cases.sii import add_lit, drawn
 from refgi.vectors.cases.vpl import default_shifts
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
@@ -22,7 +22,8 @@ def settings_of(plan: Plan) -> SiiSettings:
 def ranged(id: str, plan: Plan) -> Case:
     """Return `sii` with a cut as planned: buffers, lights, ranges, sum."""
     recipe, lamps, settings = Recipe(id, "sii", plan.what), len(plan.scene.lights), settings_of(plan)
-    add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.lights,) * lamps, shifts=default_shifts(lamps))
+    add_lit(recipe, plan.scene, plan.size, plan.maps, drawn(plan.scene, plan.maps, plan.lights * lamps),
+            shifts=default_shifts(lamps))
     if settings.pairs.needs_footprints:
         add_footprints(recipe, lamps)
     cut = settings.reach.cut

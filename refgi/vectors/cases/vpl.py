@@ -5,7 +5,7 @@ from refgi.settings import of
 from refgi.truth.vpl import VplSettings
 from refgi.vectors.cases.plan import Plan, Plans, cases_of
 from refgi.vectors.cases.scenes import AWAY, DOWN, SPOT, SUN, room
-from refgi.vectors.cases.sii import add_lit
+from refgi.vectors.cases.sii import add_lit, drawn
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
 from refgi.vectors.stages.vpl import add_vpl
@@ -15,7 +15,8 @@ def shadowed(id: str, plan: Plan) -> Case:
     """Return `vpl` as planned: buffers, lights, visibility by rays or maps, sum."""
     recipe = Recipe(id, "vpl", plan.what)
     lamps = len(plan.scene.lights)
-    add_lit(recipe, plan.scene, plan.size, plan.maps, (plan.lights,) * lamps, shifts=default_shifts(lamps))
+    add_lit(recipe, plan.scene, plan.size, plan.maps, drawn(plan.scene, plan.maps, plan.lights * lamps),
+            shifts=default_shifts(lamps))
     add_vpl(recipe, plan.scene, of(VplSettings, **plan.choices))
     return recipe.case()
 

@@ -48,7 +48,7 @@ FLOOR_LAMP = SpotLight((0.3, 1.6, 0.35), (-0.2, -1.0, -0.25), 0.2, 0.42, (4.0, 2
 
 SETUPS = {setup.id: setup for setup in (
     Setup("val-csm", "convolution shadow maps by the defaults, maps of an odd side; two lamps, a cluster of one light, "
-          "an area light that nothing occludes", room(SPOT, BULB, matte=True, camera=CLOSE), (17, 13), 16, 48,
+          "an area light that nothing occludes", room(SPOT, BULB, matte=True, camera=CLOSE), (17, 13), 16, 64,
           clusters=8, interleaving=1, clamp="disc"),
     Setup("val-pcss", "blockers texel by texel, interpolated normals, glossy lights",
           room(SPOT, smooth=True, camera=CLOSE), (17, 13), 13, 30, clusters=4, interleaving=1, visibility="pcss"),
@@ -76,7 +76,7 @@ FULL_SETUPS = {setup.id: setup for setup in (
           room(SPOT, matte=True, camera=CLOSE), (17, 13), 13, 24, clusters=4, interleaving=1,
           quantisation="published"),
     Setup("val-dual", "a second map behind each area light, PCF of 3 x 3 texels; a slab below the table that is lit",
-          stacked(SPOT, BULB, camera=BESIDE), (20, 14), 13, 24, clusters=4, interleaving=1, visibility="pcf", texels=3,
+          stacked(SPOT, BULB, camera=BESIDE), (20, 14), 13, 36, clusters=4, interleaving=1, visibility="pcf", texels=3,
           behind="dual_paraboloid"),
     Setup("val-projected", "texels of the map projected back onto the rectangle", kerbs(FLOOR_LAMP, camera=CLOSE),
           (15, 11), 13, 18, clusters=3, interleaving=1, visibility="back_projection"),

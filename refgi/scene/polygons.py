@@ -15,14 +15,14 @@ def triangles_of(vertices: Array, corners: Array, counts: Array) -> tuple[Array,
     corners of each polygon, 3 or more. Returns (m, 3) int64: positions in `corners`. Result: number of polygons that
     have no ears (they cross themselves) or too many corners; they are fans from their first corner, as convex ones are.
     """
+    if (counts == 3).all():
+        return np.arange(len(corners)).reshape(-1, 3), 0
     counts = np.asarray(counts, np.int64)
     first = np.cumsum(counts) - counts
     of_polygon = np.repeat(np.arange(len(counts)), counts - 2)
     step = np.arange(len(of_polygon)) - np.repeat(np.cumsum(counts - 2) - (counts - 2), counts - 2)
     start = first[of_polygon]
     triangles = np.stack([start, start + step + 1, start + step + 2], axis=1)
-    if (counts == 3).all():
-        return triangles, 0
     left = 0
     for number in _turned_over(vertices, corners, triangles, of_polygon, counts).tolist():
         chosen = slice(first[number], first[number] + counts[number])

@@ -229,8 +229,8 @@ def test_very_many_runs_take_time_in_proportion(folder: Folder) -> None:
 
 
 RICH = (b"\xef\xbb\xbfmtllib a.mtl b.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.4 0.5 0\nvn 0 0 1\nvn 0 1 0\n"
-        b"vt 0 0\nvt 1 0\nvt 1 1\nusemtl red\nf 1/1/1 2/2/1 3/3/2\nf 1 2 5 4\nusemtl Material #25\nf 1//1 3//1 -2//9\nusemtl red\n"
-        b"f -5/-1 -4/-2 -3/-3\nf 4 1 5 2 3\nl 1 2\n")
+        b"vt 0 0\nvt 1 0\nvt 1 1\nusemtl red\nf 1/1/1 2/2/1 3/3/2\nf 1 2 5 4\n"
+        b"usemtl Material #25\nf 1//1 3//1 -2//9\nusemtl red\nf -5/-1 -4/-2 -3/-3\nf 4 1 5 2 3\nl 1 2\n")
 LIBRARY = (b"newmtl red\nKd 0.3\nKs 0.1\nNs 9\nmap_Kd gone.png\nnewmtl Material #25\nKd 0.1 0.2 0.3\nd 0.5\n"
            b"map_d -o 1 1 gone.png\n")
 

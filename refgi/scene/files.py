@@ -1,7 +1,6 @@
 """File access of the readers, and `Contents`, the common result of all mesh formats."""
 
 import codecs
-import difflib
 import itertools
 import tomllib
 import warnings
@@ -9,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from refgi.errors import InputError, RefgiWarning, first_faults, shortened
+from refgi.errors import InputError, RefgiWarning, first_faults, nearest, shortened
 from refgi.scene.mesh import physical_memory
 from refgi.scene.model import Camera, Light, Mesh
 from refgi.scene.source import record_file
@@ -152,8 +151,8 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     """
     if len(word) > LONGEST_WORD:
         return ""
-    near = difflib.get_close_matches(word, list(itertools.islice(known, MOST_CANDIDATES)), n=1, cutoff=0.5)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    near = nearest(word, itertools.islice(known, MOST_CANDIDATES))
+    return f"; did you mean {near!r}?" if near else ""
 
 
 def _near(path: Path) -> str:

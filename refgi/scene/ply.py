@@ -65,7 +65,7 @@ def _faces(ply: Ply, vertices: Array, path: Path) -> tuple[Array, Array | None, 
         if crossed:
             text = f"{crossed:,} polygon(s) that cross themselves or have very many corners are fans of their first"
             warnings.warn(RefgiWarning(f"{path}: {text}"), stacklevel=4)
-        triangles = corners.reshape(-1, 3) if len(within) * 3 == len(corners) else corners[within]
+        triangles = (corners if len(within) * 3 == len(corners) else corners[within]).reshape(-1, 3).astype(np.int64)
         texture_of = np.zeros(len(within), np.int64)
         uv = _corner_coordinates(ply.columns["face"].get("texcoord"), parts[0], within, chosen, path)
         number = ply.columns["face"].get("texnumber")

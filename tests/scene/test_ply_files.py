@@ -110,6 +110,11 @@ def test_strips_start_anew_and_turn_every_other_triangle(tmp_path: Path, form: s
     assert (np.cross(b - a, c - a)[:, 2] > 0).all()
 
 
+def test_each_row_is_a_strip_of_its_own(tmp_path: Path) -> None:
+    strips = ("tristrips", "list int int vertex_indices", [([0, 1, 3],), ([1, 2, 3],), ([2, 4, 3],)])
+    assert read(tmp_path, ply("ascii", vertices(), strips)).faces.tolist() == [[0, 1, 3], [1, 2, 3], [2, 4, 3]]
+
+
 def test_strips_beside_faces_and_joined_by_empty_triangles(tmp_path: Path) -> None:
     strips = ("tristrips", "list int int vertex_indices", [([0, 1, 2, 2, 3, 2, 4],)])
     mesh = read(tmp_path, ply("binary_little_endian", vertices(), faces([0, 1, 2]), strips))

@@ -53,9 +53,12 @@ def test_convex_polygons_are_fans_in_their_order() -> None:
 
 
 def test_ears_lie_where_their_polygon_was() -> None:
-    points = np.array([*SHAPES["square"], *SHAPES["L"], *SHAPES["dart"], (0, 0), (1, 0), (0, 1)], np.float64)
+    bent = np.concatenate([np.roll(SHAPES[name], -1, axis=0) for name in ("L", "dart")])  # of which no fan holds
+    points = np.array([*SHAPES["square"], *bent, (0, 0), (1, 0), (0, 1)], np.float64)
     solid = np.column_stack([points, np.zeros(len(points))])
     triangles, _ = triangles_of(solid, np.arange(len(points)), np.array([4, 6, 4, 3]))
+    assert len({tuple(one) for one in triangles.tolist()}) == 9
+    assert np.isclose(sum(shoelace(points[one]) for one in triangles), 1 + 3 + 1 + 0.5)
     owner = np.repeat(np.arange(4), [4, 6, 4, 3])[triangles]
     assert owner.tolist() == [[k] * 3 for k in (0, 0, 1, 1, 1, 1, 2, 2, 3)]
 

@@ -19,7 +19,7 @@ LIGHT_DISTANCE = 4.0  # radii of the bounding sphere
 # From the middle of the mesh towards the eye: front right, and where that shows little, the other corners and sides.
 VIEWS = ((0.55, 0.4, 1.0), (-0.55, 0.4, 1.0), (0.55, 0.4, -1.0), (-0.55, 0.4, -1.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0),
          (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.3, 1.0, 0.5), (0.3, -1.0, 0.5))
-LIGHT_DIRECTION = (-0.8, 1.1, 0.7)  # from the middle towards the lamp; left of the eye and above it
+LIGHT_DIRECTION = (-0.8, 1.1, 0.7)  # from the middle towards the lamp: front left, above
 MUCH_MORE = 1.2  # of the mesh that another view must show to be taken
 ENOUGH_LIT, LEAST_LIT = 0.33, 0.1  # of what the camera sees: to take a place at once, and at all
 POINTS, CELLS = 2048, 24  # on the mesh; a side of the coarse picture
@@ -80,10 +80,9 @@ def default_light(geometry: Geometry, camera: Camera | None = None) -> SpotLight
     seen = _seen(points, eye)
     if ((eye > low) & (eye < high)).all():
         return _at_the_eye(camera, points, seen)
-    # the usual place, turned with the eye; then places nearer and nearer to the eye's own direction
+    # the usual place, then others nearer and nearer to the eye's direction
     towards = _unit(eye - middle) if np.any(eye != middle) else _unit(VIEWS[0])
-    turned = _turned(np.array(LIGHT_DIRECTION), towards)
-    places = [middle + _unit((1 - share) * _unit(turned) + share * towards) * (LIGHT_DISTANCE * radius)
+    places = [middle + _unit((1 - share) * _unit(LIGHT_DIRECTION) + share * towards) * (LIGHT_DISTANCE * radius)
               for share in (0.0, 0.4, 0.7, 0.9)]
     lit: list[float] = []
     for place in places:
@@ -106,16 +105,6 @@ def _at_the_eye(camera: Camera, points: Points, seen: Array) -> SpotLight:
 def _spot(place: Array, target: Array, outer: float) -> SpotLight:
     power = FULL_IRRADIANCE * float(np.sum((target - place) ** 2))
     return SpotLight(_vector(place), _vector(target - place), outer / 1.2, outer, (power, power, power))
-
-
-def _turned(direction: Array, towards: Array) -> Array:
-    """Return the usual direction of the lamp, turned about the vertical as the eye is from its usual place."""
-    flat, usual = towards[[0, 2]], np.array((VIEWS[0][0], VIEWS[0][2]))
-    if np.linalg.norm(flat) < 1e-3 or np.allclose(_unit(flat), _unit(usual), atol=1e-9):
-        return direction
-    angle = math.atan2(flat[0], flat[1]) - math.atan2(usual[0], usual[1])
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array((c * direction[0] + s * direction[2], direction[1], c * direction[2] - s * direction[0]))
 
 
 def _points(geometry: Geometry) -> Points:

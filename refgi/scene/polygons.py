@@ -66,18 +66,21 @@ def _ears(points: Array) -> list[tuple[int, int, int]] | None:
     """
     if len(points) > MOST_CORNERS:
         return None
-    ring, ears = np.arange(len(points)), []
+    ring, ears, last = np.arange(len(points)), [], 0
     while len(ring) > 3:
         a, b, c = points[np.roll(ring, 1)], points[ring], points[np.roll(ring, -1)]
         angle = _cross(b - a, c - b)
-        chosen = next((k for k in np.flatnonzero(angle > 0).tolist() if _is_ear(a[k], b[k], c[k], b[angle <= 0])), None)
+        convex, others = np.flatnonzero(angle > 0), b[angle <= 0]
+        # the next ear is often beside the last one
+        beside = np.roll(convex, -int(np.searchsorted(convex, last - 1))).tolist()
+        chosen = next((k for k in beside if _is_ear(a[k], b[k], c[k], others)), None)
         if chosen is None:
             flat = np.flatnonzero(angle == 0)
             if not len(flat):
                 return None
             chosen = int(flat[0])
         ears.append((int(ring[chosen - 1]), int(ring[chosen]), int(ring[(chosen + 1) % len(ring)])))
-        ring = np.delete(ring, chosen)
+        ring, last = np.delete(ring, chosen), chosen
     return [*ears, (int(ring[0]), int(ring[1]), int(ring[2]))]
 
 

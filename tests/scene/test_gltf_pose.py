@@ -260,6 +260,25 @@ def test_a_dense_accessor_with_replaced_elements(tmp_path: Path) -> None:
     assert mesh.normals.tolist() == [[0, 0, 0]] * 3 + [[0, 0, 1]]
 
 
+def test_a_scale_of_zero_hides_a_node_and_what_is_below_it(tmp_path: Path) -> None:
+    file = File()
+    file.tree["nodes"] = [{"mesh": 0, "scale": [0, 0, 0], "children": [1]}, {"mesh": 0, "translation": [1, 0, 0]},
+                          {"mesh": 0, "translation": [0, 0, 5]}]
+    file.tree |= {"scene": 0, "scenes": [{"nodes": [0, 2]}]}
+    assert file.vertices(tmp_path)[:, 2].tolist() == [5] * 4
+    file.tree["nodes"][1]["camera"] = 0
+    file.tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}]
+    with pytest.warns(RefgiWarning, match=r"1 camera\(s\) or light\(s\) of zero scale passed over"):
+        file.vertices(tmp_path)
+
+
+def test_a_joint_of_scale_zero_draws_its_vertices_together(tmp_path: Path) -> None:
+    file = File()
+    joints = np.array([[0] * 4, [0] * 4, [0] * 4, [1] * 4], np.uint8)
+    file.skin(joints, np.full((4, 4), 0.25, np.float32), [{}, {"scale": [0, 0, 0], "translation": [7, 7, 7]}])
+    assert file.vertices(tmp_path).tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [7, 7, 7]]
+
+
 def broken(change: Any) -> File:
     """Return a file with a skin, a morph target, instances and a sparse accessor, changed."""
     file = File()

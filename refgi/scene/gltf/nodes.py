@@ -52,12 +52,16 @@ def _placed(document: Document, roots: list[int]) -> Nodes:
     nodes = document.items("nodes")
     world = np.tile(np.eye(4), (len(numbers), 1, 1))
     keys = [_fill_local(world[k], document, nodes[number], f"nodes[{number}]") for k, number in enumerate(numbers)]
-    expect_affine(world, lambda k: f"{document.path}: nodes[{numbers[k]}]{keys[k]}")
+    # a scale of 0, 0, 0 hides the meshes of a node and of all below it
+    hidden = np.asarray(~world[:, :3, :3].any(axis=(1, 2)) & (world[:, 3] == (0, 0, 0, 1)).all(axis=1))
+    shown = np.flatnonzero(~hidden)
+    expect_affine(world[shown], lambda k: f"{document.path}: nodes[{numbers[shown[k]]}]{keys[shown[k]]}")
     with np.errstate(over="ignore", invalid="ignore"):  # judged below, with the node's name
         for k, above in enumerate(parent):
             if above >= 0:
                 world[k] = world[above] @ world[k] if keys[k] else world[above]
-    for k in np.flatnonzero(~invertible(world))[:1].tolist():
+                hidden[k] |= hidden[above]
+    for k in np.flatnonzero(~(hidden | invertible(world)))[:1].tolist():
         expect(False, f"{document.path}: nodes[{numbers[k]}]",
                "a finite, invertible product with its parents' matrices", world[k].ravel().tolist())
     return Nodes(numbers, parent, world)

@@ -95,6 +95,8 @@ class _Reader:
             self._pass_over("skinned mesh(es)' instances", int(placed is not None))
             return (IDENTITY,)
         self._pass_over("skin(s) of meshes without joints", int("skin" in node))
+        if not matrix[:3, :3].any():
+            return ()
         if placed is None:
             return (matrix,)
         good = invertible(placed)
@@ -110,6 +112,9 @@ class _Reader:
         return found
 
     def _view_and_light(self, node: dict[str, Any], matrix: Array, where: str) -> None:
+        if not matrix[:3, :3].any():
+            self._pass_over("camera(s) or light(s) of zero scale", int("camera" in node or "extensions" in node))
+            return
         if camera := node_camera(self.document, node, matrix, where):
             self.cameras.append(camera)
         elif "camera" in node:

@@ -1,7 +1,7 @@
 """Terms of the energy ledger on the lights' side: what the first surface does with a light's power.
 
-What a light emits has a closed form: 2 pi I (1 - (cos inner + cos outer) / 2) for a spot, whose falloff in the cosine
-is even about its middle, 4 pi I for a point, and E_perp times the area of the map that encloses the scene for a
+What a light emits has a closed form: 2 pi I (1 - cos inner + m (cos inner - cos outer)) for a spot, whose falloff is m
+in the mean over the cosine, 4 pi I for a point, and E_perp times the area of the map that encloses the scene for a
 directional light, which has no power of its own. The lines are sums over the texels of its reflective shadow map, each
 by itself, so that they give the closed form again only where solid angles, falloff, albedo and lobes are all right.
 """
@@ -62,8 +62,9 @@ def emitted_power(light: "Light", projection: "Projection") -> Array:
         share = 4.0 * float(np.prod(projection.half))
     elif isinstance(light, SpotLight):
         # 1 - cos a = 2 sin^2(a / 2), which keeps the digits of narrow cones
-        squares = (math.sin(angle / 2) ** 2 for angle in (light.inner_half_angle, light.outer_half_angle))
-        share = 2.0 * math.pi * sum(squares)
+        inner, outer = (2.0 * math.sin(angle / 2) ** 2 for angle in (light.inner_half_angle, light.outer_half_angle))
+        mean = 1 / 2 if light.falloff == "smoothstep" else 1 / 3  # of what lies between the cones
+        share = 2.0 * math.pi * (inner + mean * (outer - inner))
     else:
         share = 4.0 * math.pi
     return share * _strength(light)

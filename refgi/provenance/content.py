@@ -116,10 +116,12 @@ def light_json(light: Light) -> dict[str, Any]:
     Returns
     -------
     dict
-        Its type and all its fields; angles in rad, so that no bit is lost.
+        Its type and its fields, a spot's falloff where it is not the smoothstep; angles in rad, so that no bit is lost.
     """
     kind = next(name for name, one in LIGHTS.items() if isinstance(light, one))
     fields: dict[str, Any] = plain(light)
+    if isinstance(light, SpotLight) and light.falloff == SpotLight.falloff:  # as in earlier versions
+        del fields["falloff"]
     return {"type": kind} | fields
 
 
@@ -141,8 +143,9 @@ def light_from(content: Mapping[str, Any]) -> Light:
     InputError
         If the content is not a light's.
     """
-    made: Light = _made(LIGHTS.get(str(content.get("type")), PointLight),
-                        {key: value for key, value in content.items() if key != "type"}, "light")
+    kind = LIGHTS.get(str(content.get("type")), PointLight)
+    usual = {"falloff": SpotLight.falloff} if kind is SpotLight else {}
+    made: Light = _made(kind, usual | {key: value for key, value in content.items() if key != "type"}, "light")
     return made
 
 

@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError, RefgiWarning
-from refgi.scene import DirectionalLight, PointLight, SpotLight, load_scene
+from refgi.frame import Frame
+from refgi.rsm import direct_irradiance
+from refgi.scene import Camera, DirectionalLight, PointLight, SpotLight, load_scene
 from refgi.scene.gltf import read_gltf
 from tests.scene.samples import BUFFER, FACES, TRIANGLES, glb_bytes, gltf_tree
 
@@ -41,6 +43,31 @@ def test_mesh_material_camera_and_light(tmp_path: Path) -> None:
     assert (light.position, light.direction) == ((0, 0, 4), (0, 0, -1))
     assert (light.inner_half_angle, light.outer_half_angle) == (0.2, 0.5)
     assert light.intensity == (1.0, 0.5, 0.25)  # 683 cd are 1 W/sr
+
+
+def test_a_spot_falls_off_as_the_extension_says(tmp_path: Path) -> None:
+    """KHR_lights_punctual: saturate((cos a - cos o) / (cos i - cos o)) squared, here 2 m above a floor and 683 cd."""
+    path, out = tmp_path / "spot.gltf", math.pi / 4
+    corners = np.array([[-3, 0, -3], [-3, 0, 3], [3, 0, 3], [3, 0, -3]], "<f4")
+    uri = "data:;base64," + base64.b64encode(corners.tobytes() + FACES.tobytes()).decode()
+    lamp = {"type": "spot", "intensity": 683.0, "spot": {}}
+    tree = gltf_tree() | {"materials": [{}], "buffers": [{"byteLength": 60, "uri": uri}],
+                          "nodes": [{"mesh": 0}, {"camera": 0, "translation": [0, 0, 5]}, {
+                              "translation": [0, 2, 0], "rotation": [-math.sqrt(0.5), 0, 0, math.sqrt(0.5)],
+                              "extensions": {"KHR_lights_punctual": {"light": 0}}}],
+                          "extensions": {"KHR_lights_punctual": {"lights": [lamp]}}}
+    path.write_text(json.dumps(tree))
+    light, = load_scene(path).lights
+    assert isinstance(light, SpotLight)
+    assert (light.inner_half_angle, light.outer_half_angle, light.intensity) == (0, out, (1, 1, 1))
+    camera = Camera((0, 1.9, 0), (0, 0, 0), (0, 0, -1), math.radians(90), 33, 33)
+    buffer = Frame(load_scene(path, camera=camera), dtype=np.float64).gbuffer
+    got = direct_irradiance(buffer, light)[0][buffer.covered]
+    r = np.hypot(buffer.position[0], buffer.position[2])[buffer.covered]
+    cosine = 2 / np.hypot(r, 2)
+    falloff = np.clip((cosine - math.cos(out)) / (1 - math.cos(out)), 0, 1) ** 2
+    assert r.min() < 1 < 2 < r.max()
+    np.testing.assert_allclose(got, falloff * cosine / (r * r + 4), atol=1e-15)
 
 
 def test_geometry_equals_trimesh(tmp_path: Path) -> None:

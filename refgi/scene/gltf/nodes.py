@@ -4,8 +4,7 @@ KHR_lights_punctual lights and cameras of a glTF document, placed by their node.
 
 glTF measures spot and point lights in candela (lm/sr) and directional lights in lux (lm/m^2). They become W/sr and
 W/m^2 by the luminous efficacy that defines the candela, 683 lm/W, the factor that exporters use as well. `range` is
-ignored (light falls with the square of the distance). Between its two cone angles a glTF spot falls with the square of
-a linear ramp in the cosine, ours with the smoothstep of `SpotLight`; inside and outside they agree.
+ignored (light falls with the square of the distance). Between its cone angles a spot has the extension's falloff.
 """
 
 import math
@@ -155,7 +154,7 @@ def _light(document: Document, entry: dict[str, Any], matrix: Array, where: str)
     cone = document.member(entry, "spot", where)
     inner = document.number(cone, "innerConeAngle", f"{where}.spot", 0.0)
     outer = document.number(cone, "outerConeAngle", f"{where}.spot", math.pi / 4)
-    return SpotLight(position, direction, _not_over_flat(inner), _not_over_flat(outer), intensity)
+    return SpotLight(position, direction, _not_over_flat(inner), _not_over_flat(outer), intensity, "squared_ramp")
 
 
 def _not_over_flat(angle: float) -> float:

@@ -41,7 +41,7 @@ def light_terms(rsm: "Rsm", geometry: "Geometry", materials: "MaterialTable") ->
     absorption = 1.0 - np.asarray(materials.diffuse, np.float64) - materials.specular
     met, missed = _shares(rsm, geometry, len(glass))
     absorbed = met[~glass] @ absorption[~glass]
-    if materials.textures is not None:
+    if materials.textures is not None or geometry.colours is not None:
         absorbed = _absorbed_by_texels(rsm, geometry, materials)
     refracted, reflected = _refracted_and_reflected(rsm, geometry, glass)
     return LightTerms(

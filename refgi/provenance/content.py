@@ -69,9 +69,10 @@ def geometry_digest(scene: Scene) -> str:
                         (shape.vertex_normals, "<f8")):
         plane = np.zeros(0, kind) if array is None else np.ascontiguousarray(array, kind)
         digest.update(f"{plane.shape}\0".encode() + plane.tobytes())
-    if shape.uv is not None:  # absent, the digest is that of earlier versions
-        uv = np.ascontiguousarray(shape.uv, "<f8")
-        digest.update(f"uv {uv.shape}\0".encode() + uv.tobytes())
+    for key in ("uv", "colours"):
+        if getattr(shape, key) is not None:  # absent, the digest is that of earlier versions
+            plane = np.ascontiguousarray(getattr(shape, key), "<f8")
+            digest.update(f"{key} {plane.shape}\0".encode() + plane.tobytes())
     return digest.hexdigest()
 
 

@@ -13,11 +13,12 @@ import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, blame, first_faults, shortened
 from refgi.scene.builtin import SCENES, build_named
-from refgi.scene.files import did_you_mean, is_there, text_of
+from refgi.scene.files import did_you_mean, is_there, text_of, warn_of_undefined
 from refgi.scene.model import Array, Camera, Geometry, Light, Scene, SpotLight, Vector, merge
 from refgi.scene.repair import lights_with_power, repaired_all, warn_of_flat_faces, warn_of_unit
 from refgi.scene.scenefile import READERS, read_mesh_file, read_scene_file
 from refgi.scene.source import reading, source_of
+from refgi.scene.strictness import strictness
 from refgi.stages import stage
 
 VIEW_DIRECTION = np.array([0.55, 0.4, 1.0])  # from the middle of the mesh towards the eye
@@ -79,7 +80,7 @@ def _vector(values: Array) -> Vector:
 
 @stage("scene.load")
 def load_scene(
-    source: str | Path, *, camera: Camera | None = None, lights: Sequence[Light] | None = None
+    source: str | Path, *, camera: Camera | None = None, lights: Sequence[Light] | None = None, strict: bool = False
 ) -> Scene:
     """Load a built-in scene, a scene file or a mesh file.
 
@@ -92,6 +93,9 @@ def load_scene(
         Replaces the scene's own camera.
     lights : sequence of Light, optional
         Replace the scene's own lights.
+    strict : bool
+        Refuse what is else passed over with a warning: absent material files and textures of meshes, faces of fewer
+        than three corners, indices of normals and texture coordinates that are not there.
 
     Returns
     -------
@@ -113,7 +117,7 @@ def load_scene(
     30
     """
     try:
-        with reading() as files:
+        with reading() as files, strictness(strict):
             scene = _found(source, camera, lights)
     except MemoryError as error:
         raise InputError(f"{shortened(str(source))}: does not fit in memory", file=str(source)) from error
@@ -149,6 +153,7 @@ def _with(scene: Scene, camera: Camera | None, lights: Sequence[Light] | None) -
 
 def _from_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
     found = read_mesh_file(path)
+    warn_of_undefined(found.undefined, str(path))
     faults: list[str] = []
     meshes, dropped = repaired_all(found.meshes, lambda number: f"{path}: {found.meshes[number].name}", faults)
     if faults:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from refgi.errors import InputError, expect, shortened
-from refgi.scene.files import read_bytes
+from refgi.scene.files import expect_utf8, read_bytes
 from refgi.scene.gltf.extensions import MESHOPT, READABLE, packed
 
 MAGIC = b"glTF"
@@ -37,7 +37,7 @@ class Document:
     def __init__(self, path: Path) -> None:
         self.path = path
         content = read_bytes(path)
-        text, self._chunk = _chunks(content, path) if content[:4] == MAGIC else (content, None)
+        text, self._chunk = _chunks(content, path) if content[:4] == MAGIC else (expect_utf8(content, path), None)
         self.tree = _parsed(text, path)
         self._buffers: dict[int, bytes] = {}
         self._items: dict[str, list[dict[str, Any]]] = {}

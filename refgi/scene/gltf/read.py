@@ -26,8 +26,10 @@ from refgi.scene.gltf.textures import Look, base_colour, emissive, transformed
 from refgi.scene.mesh import as_float64, expect_memory
 from refgi.scene.model import Array, Camera, Light, Material, Mesh
 from refgi.scene.transform import IDENTITY, invertible, transformed_all
+from refgi.scene.vertexcolours import factors
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
+COLOURS = "COLOR_0"
 
 
 def read_gltf(path: Path) -> Contents:
@@ -137,8 +139,8 @@ class _Reader:
                 "accessors", attributes["POSITION"], f"{where}.attributes.POSITION"):
             raise packed(f"{self.path}: {where}", "Draco-compressed meshes", DRACO)
         vertices = accessor(self.document, attributes["POSITION"], "VEC3", f"{where}.attributes.POSITION")
-        if any(key.startswith("COLOR_") for key in attributes):
-            self._pass_over("primitive(s)' vertex colours")
+        if any(key.startswith("COLOR_") and key != COLOURS for key in attributes):
+            self._pass_over("primitive(s)' further vertex colours (COLOR_1 ...)")
         normals = None
         if "NORMAL" in attributes:
             normals = accessor(self.document, attributes["NORMAL"], "VEC3", f"{where}.attributes.NORMAL")
@@ -152,7 +154,23 @@ class _Reader:
         material, look = self._material_of(entry, where)
         mesh = Mesh(vertices, _triangles(corners, mode, f"{self.path}: {where}"), normals, material, name)
         mesh.expect_sound(f"{self.path}: {where}")
+        if COLOURS in attributes:
+            mesh = dataclasses.replace(mesh, colours=self._colours(mesh, attributes[COLOURS], where))
         return self._with_coordinates(mesh, attributes, look, where)
+
+    def _colours(self, mesh: Mesh, index: Any, where: str) -> Array | None:
+        """Return the colours of a mesh's corners, linear as the file has them; alpha counts for nothing."""
+        where = f"{where}.attributes.{COLOURS}"
+        kind = self.document.item("accessors", index, where).get("type")
+        values = accessor(self.document, index, kind if kind in ("VEC3", "VEC4") else "VEC3", where)
+        if values.dtype.kind in "iu":  # whole numbers without `normalized`
+            values = values / np.iinfo(values.dtype).max
+        expect(len(values) == len(mesh.vertices), f"{self.path}: {where}",
+               f"{len(mesh.vertices)} elements as POSITION", len(values))
+        if mesh.material.cutoff is not None and values.shape[1] == 4 and values[:, 3].min(initial=1) < 1:
+            self._pass_over("primitive(s)' alpha of vertex colours")
+        found = factors(values[:, :3], f"{self.path}: {where}")
+        return None if found is None else found[mesh.faces]
 
     def _with_coordinates(self, mesh: Mesh, attributes: dict[str, Any], look: Look | None, where: str) -> Mesh:
         """Return the mesh with the texture coordinates that its material asks for, or without texture."""

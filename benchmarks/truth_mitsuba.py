@@ -101,7 +101,7 @@ def described(view: View) -> dict[str, Any]:
             "specular": np.array([m.specular for m in scene.materials]) * opaque, "exponent": exponent,
             "share": np.where(cosine >= 0, 1 - half, half), "kind": lamps.kind, "position": lamps.position,
             "direction": lamps.direction, "intensity": lamps.intensity, "cos_inner": np.cos(spots),
-            "cos_outer": np.cos(wide), "bend": lamps.cone[:, BEND], "middle": middle,
+            "cos_outer": np.cos(wide), "shape": lamps.cone[:, BEND:], "middle": middle,
             "radius": geometry.diagonal / 2 * 1.001,
             "origin": to.origin, "normal": to.normal, "facing": to.facing, "methods": np.array(ways_of(view.scene))}
 

@@ -48,6 +48,21 @@ class Triple(click.ParamType[tuple[float, float, float]]):
         return x, y, z
 
 
+class Exposure(click.ParamType[float | str]):
+    """A factor, or "auto"."""
+
+    name = "FACTOR|auto"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | str:
+        """Read one factor."""
+        if value == "auto":
+            return "auto"
+        try:
+            return float(value)
+        except ValueError:
+            self.fail(f"expected a number or auto, got {value!r}", param, ctx)
+
+
 def speech(function: F) -> F:
     """Add --json and --debug.
 
@@ -130,6 +145,10 @@ def seen(function: F) -> F:
                      help="A light instead of the scene's own; repeatable. spot:position=0,2,0:target=0,0,0:"
                           "outer_deg=35:intensity=20, point:position=0,2,0:intensity=20 (W/sr) or "
                           "directional:direction=0,-1,0:irradiance=3 (W/m^2)."),
+        click.option("--light-unit", type=click.Choice(["cd", "lm", "W/sr"]), default="cd", show_default=True,
+                     help="What glTF's lights are in; exporters write cd (the format's), lm or W/sr."),
+        click.option("--emissive", type=click.Choice(["seen", "lamps"]), default="seen", show_default=True,
+                     help="Emissive surfaces are seen and light nothing, or each part gets a lamp, an approximation."),
     )):
         function = decorate(function)
     return function

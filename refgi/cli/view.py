@@ -118,6 +118,8 @@ class View:
     up: tuple[float, float, float] | None
     vfov_deg: float | None
     lights: tuple[str, ...]
+    light_unit: str = "cd"
+    emissive: str = "seen"
 
     def load(self) -> Scene:
         """Return the scene with its camera and lights changed as asked.
@@ -134,10 +136,11 @@ class View:
         """
         changes = self._camera_changes()
         lights = read_lights(self.lights)
+        how: dict[str, Any] = {"light_unit": self.light_unit, "emissive": self.emissive}
         whole = "eye" in changes and "target" in changes
         if whole and Path(self.scene).suffix.lower() in (".glb", ".gltf", ".obj", ".ply"):
-            return load_scene(self.scene, camera=Camera(**changes), lights=lights)
-        scene = load_scene(self.scene, lights=lights)
+            return load_scene(self.scene, camera=Camera(**changes), lights=lights, **how)
+        scene = load_scene(self.scene, lights=lights, **how)
         return scene.with_camera(**changes) if changes else scene
 
     def _camera_changes(self) -> dict[str, Any]:

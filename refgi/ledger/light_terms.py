@@ -57,14 +57,14 @@ def light_terms(rsm: "Rsm", geometry: "Geometry", materials: "MaterialTable") ->
 def emitted_power(light: "Light", projection: "Projection") -> Array:
     """Return the power of a light in closed form, (3,) W; a directional light's is that through its map's area."""
     from refgi.scene import DirectionalLight, SpotLight
+    from refgi.scene.light import MEANS
 
     if isinstance(light, DirectionalLight):
         share = 4.0 * float(np.prod(projection.half))
     elif isinstance(light, SpotLight):
         # 1 - cos a = 2 sin^2(a / 2), which keeps the digits of narrow cones
         inner, outer = (2.0 * math.sin(angle / 2) ** 2 for angle in (light.inner_half_angle, light.outer_half_angle))
-        mean = 1 / 2 if light.falloff == "smoothstep" else 1 / 3  # of what lies between the cones
-        share = 2.0 * math.pi * (inner + mean * (outer - inner))
+        share = 2.0 * math.pi * (inner + MEANS[light.falloff] * (outer - inner))
     else:
         share = 4.0 * math.pi
     return share * _strength(light)

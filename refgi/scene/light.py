@@ -28,13 +28,15 @@ from refgi.scene.values import (
 )
 
 # places in a row of `cone_row`; sine and cosine of the outer half-angle come in two parts, the second the rest
-SINE, SINE_REST, COSINE, COSINE_REST, SPAN, CAP, BEND = range(7)
+SINE, SINE_REST, COSINE, COSINE_REST, SPAN, CAP, BEND, LINEAR = range(8)
 SPOT, POINT, DIRECTIONAL = 0, 1, 2  # kinds of light in a LightTable
 NARROWEST = math.radians(1e-5)  # half-angle; rays in float32 tell directions apart down to a third of it
 
 
-Falloff = Literal["smoothstep", "squared_ramp"]  # of a spot between its cones; the second is glTF's
-BENDS: dict[Falloff, float] = {"smoothstep": 1.0, "squared_ramp": 0.0}  # b of t t (1 + 2 b - 2 b t)
+Falloff = Literal["smoothstep", "squared_ramp", "ramp"]  # of a spot between its cones; the second is glTF's
+# b and l of t (l + (1 - l) t) (1 + 2 b - 2 b t)
+SHAPES: dict[Falloff, tuple[float, float]] = {"smoothstep": (1.0, 0.0), "squared_ramp": (0.0, 0.0), "ramp": (0.0, 1.0)}
+MEANS: dict[Falloff, float] = {"smoothstep": 1 / 2, "squared_ramp": 1 / 3, "ramp": 1 / 2}  # over the cosine
 
 
 def cone_row(inner: float, outer: float, falloff: Falloff = "smoothstep") -> Array:
@@ -49,14 +51,14 @@ def cone_row(inner: float, outer: float, falloff: Falloff = "smoothstep") -> Arr
 
     Returns
     -------
-    (7,) ndarray of float64
-        sin outer and cos outer, each a float64 and the rest; cos inner - cos outer; 1 - cos outer; `BENDS`.
+    (8,) ndarray of float64
+        sin outer and cos outer, each a float64 and the rest; cos inner - cos outer; 1 - cos outer; two of `SHAPES`.
     """
     sine, cosine = sine_cosine_digits(outer)
     _, cosine_inner = sine_cosine_digits(inner)
     with decimal.localcontext(prec=DIGITS):
         return np.array([*twofold(sine), *twofold(cosine), float(cosine_inner - cosine), float(1 - cosine),
-                         BENDS[falloff]])
+                         *SHAPES[falloff]])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,7 +67,7 @@ class SpotLight:
 
     On-axis radiant intensity `intensity` (W/sr), half-angles rad. With t = clamp((cos a - cos outer) / (cos inner -
     cos outer), 0, 1) the intensity at angle a off the axis is I0 t t (3 - 2t) where `falloff` is "smoothstep", I0 t t
-    where it is "squared_ramp", and nothing outside `outer`.
+    where it is "squared_ramp", I0 t where it is "ramp", and nothing outside `outer`.
     """
 
     position: Vector
@@ -125,7 +127,7 @@ class LightTable(NamedTuple):
     kind: Array  # (k,) int32: 0 spot, 1 point, 2 directional
     position: Array  # (k, 3) m; zero for a directional light
     direction: Array  # (k, 3) unit vector the light travels along; zero for a point light
-    cone: Array  # (k, 7) `cone_row` of a spot; zero for others
+    cone: Array  # (k, 8) `cone_row` of a spot; zero for others
     intensity: Array  # (k, 3) W/sr on the axis; perpendicular irradiance W/m^2 for a directional light
 
 
@@ -143,7 +145,7 @@ def light_table(lights: Sequence[Light]) -> LightTable:
         One row a light.
     """
     count = len(lights)
-    table = LightTable(np.zeros(count, np.int32), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 7)),
+    table = LightTable(np.zeros(count, np.int32), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 8)),
                        np.zeros((count, 3)))
     for row, light in enumerate(lights):
         if isinstance(light, DirectionalLight):

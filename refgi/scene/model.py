@@ -189,6 +189,7 @@ class Scene:
     description: str = ""
     exposure: float = 1.0  # factor before the sRGB curve in PNG pictures; of no other meaning
     source: Source | None = None  # where `load_scene` had it from; None: it was made in Python
+    emissive_lamps: int = 0  # the last of `lights`, which stand for emissive surfaces
 
     def __post_init__(self) -> None:
         expect(is_number(self.exposure) and self.exposure > 0, "exposure", "a finite number > 0", self.exposure)
@@ -209,7 +210,7 @@ class Scene:
 
     def with_lights(self, *lights: Light) -> "Scene":
         """Return the scene with other lights, sharing everything else."""
-        return dataclasses.replace(self, lights=lights)
+        return dataclasses.replace(self, lights=lights, emissive_lamps=0)
 
     @property
     def face_count(self) -> int:

@@ -16,6 +16,7 @@ from refgi.frame import Frame
 from refgi.rsm import direct_irradiance
 from refgi.scene import Camera, DirectionalLight, PointLight, SpotLight, load_scene
 from refgi.scene.gltf import read_gltf
+from refgi.scene.reading import LightUnit
 from tests.scene.samples import BUFFER, FACES, TRIANGLES, glb_bytes, gltf_tree
 
 Edit = Callable[[dict[str, Any]], Any]
@@ -35,7 +36,6 @@ def test_mesh_material_camera_and_light(tmp_path: Path) -> None:
     assert np.array_equal(scene.geometry.vertices, TRIANGLES.astype(np.float64) + np.array([1, 2, 3]))
     assert np.array_equal(scene.geometry.faces, FACES)
     assert scene.materials[0].diffuse == (0.1, 0.2, 0.3)  # as decimal digits in the JSON, not rounded to 8 bits
-    assert scene.materials[0].emission == (4.0, 2.0, 0.0)
     assert (scene.camera.eye, scene.camera.target, scene.camera.vfov) == ((0, 0, 5), (0, 0, 4), 0.7)
     assert (scene.camera.width, scene.camera.height) == (768, 512)
     light = scene.lights[0]
@@ -69,6 +69,31 @@ def test_a_spot_falls_off_as_the_extension_says(tmp_path: Path) -> None:
     falloff = np.clip((cosine - math.cos(out)) / (1 - math.cos(out)), 0, 1) ** 2
     assert r.min() < 1 < 2 < r.max()
     np.testing.assert_allclose(got, falloff * cosine / (r * r + 4), atol=1e-15)
+
+
+@pytest.mark.parametrize(("unit", "per_watt", "lux"), [
+    ("cd", 683.0, 683.0), ("lm", 683.0 * 4 * math.pi, 683.0), ("W/sr", 1.0, 1.0)])
+def test_the_unit_of_lights_may_be_another(tmp_path: Path, unit: LightUnit, per_watt: float, lux: float) -> None:
+    """1000 W of an isotropic source are 79.577 W/sr; a directional light is in lux or W/m^2."""
+    def edit(tree: dict[str, Any]) -> None:
+        tree["extensions"]["KHR_lights_punctual"]["lights"] = [
+            {"type": "point", "intensity": 79.577}, {"type": "spot", "intensity": 5, "spot": {}},
+            {"type": "directional", "intensity": 3}]
+        tree["nodes"][2]["children"] = [3, 4]
+        tree["nodes"] += [{"extensions": {"KHR_lights_punctual": {"light": k}}} for k in (1, 2)]
+
+    point, spot, sun = load_scene(written(tmp_path, edit), light_unit=unit).lights
+    assert isinstance(point, PointLight)
+    assert isinstance(spot, SpotLight)
+    assert isinstance(sun, DirectionalLight)
+    assert point.intensity[0] == pytest.approx(79.577 / per_watt)
+    assert spot.intensity[0] == pytest.approx(5 / per_watt)
+    assert sun.irradiance[0] == pytest.approx(3 / lux)
+
+
+def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="light_unit: expected cd or lm or W/sr, got 'W'"):
+        load_scene(written(tmp_path), light_unit="W")  # type: ignore[arg-type]
 
 
 def test_geometry_equals_trimesh(tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 """glTF: what materials and extensions say is honoured, or one warning names it with its count."""
 
 import json
-import math
 import warnings
 from pathlib import Path
 from typing import Any
@@ -160,5 +159,4 @@ def test_the_strength_of_emission_multiplies(tmp_path: Path) -> None:
     (material,), said = loaded(tmp_path, extended(KHR_materials_emissive_strength={"emissiveStrength": 5}) | {
         "emissiveFactor": [1, 0.5, 0]})
     assert material.emission == (5, 2.5, 0)
-    assert said == []
-    assert math.isclose(sum(material.diffuse), 3)
+    assert [text.partition(",")[0] for text in said] == ["1 emissive surface lights nothing here"]

@@ -26,7 +26,7 @@ from refgi.radiometry import (
     spot_falloff,
 )
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
-from refgi.scene.light import BENDS, Falloff, cone_row
+from refgi.scene.light import SHAPES, Falloff, cone_row
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
@@ -49,7 +49,8 @@ class Circles(NamedTuple):
     inner: float  # radius of full intensity
     outer: float  # radius beyond which there is none
     span: float  # cosine of the inner half-angle minus that of the outer
-    bend: float = 1.0  # of `smooth_edge`
+    bend: float = 1.0  # of `smooth_edge`, as `linear`
+    linear: float = 0.0
 
 
 def texel_solid_angles(projection: Projection) -> Array:
@@ -82,7 +83,7 @@ def spot_power(projection: Projection, inner: float, outer: float, falloff: Fall
 
     `projection`: a perspective or paraboloid map. `inner`, `outer`: the spot's half-angles, rad. Returns (H, W): sr,
     float64: the texel's power is this times the on-axis intensity. When the map encloses the cone, it sums to
-    2 pi (1 - cos inner + m (cos inner - cos outer)), where m is 1/2 for the smoothstep and 1/3 for the squared ramp.
+    2 pi (1 - cos inner + m (cos inner - cos outer)), m of `refgi.scene.light.MEANS`.
     """
     circles = _circles(projection.kind, inner, outer, falloff)
     return _stacked(projection, _texel_integrals(_intrinsics(projection), circles))
@@ -115,7 +116,7 @@ def _intrinsics(projection: Projection) -> Projection:
 def _circles(kind: int, inner: float, outer: float, falloff: Falloff) -> Circles:
     part = 0.5 if kind == PARABOLOID else 1.0
     span = 2.0 * math.sin((outer + inner) / 2) * math.sin((outer - inner) / 2)
-    return Circles(math.tan(part * inner), math.tan(part * outer), span, BENDS[falloff])
+    return Circles(math.tan(part * inner), math.tan(part * outer), span, *SHAPES[falloff])
 
 
 def _stacked(projection: Projection, one: Array) -> Array:
@@ -283,7 +284,7 @@ def _falloff_strip(kind: int, x: float, y0: float, y1: float, spot: Circles) -> 
             else:
                 root = math.sqrt(square)
                 density, above = 1.0 / (root * square), inside / (root * root_edge * (root + root_edge))
-            total += FEW_WEIGHTS[node] * density * smooth_edge(above, spot.span, spot.bend)
+            total += FEW_WEIGHTS[node] * density * smooth_edge(above, spot.span, spot.bend, spot.linear)
     return total * (y1 - y0)
 
 

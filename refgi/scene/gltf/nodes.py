@@ -3,7 +3,8 @@
 KHR_lights_punctual lights and cameras of a glTF document, placed by their node.
 
 glTF measures spot and point lights in candela (lm/sr) and directional lights in lux (lm/m^2). They become W/sr and
-W/m^2 by the luminous efficacy that defines the candela, 683 lm/W, the factor that exporters use as well. `range` is
+W/m^2 by the luminous efficacy that defines the candela, 683 lm/W, the factor that exporters use as well, unless another
+unit is asked for. `range` is
 ignored (light falls with the square of the distance). Between its cone angles a spot has the extension's falloff.
 """
 
@@ -15,11 +16,11 @@ import numpy as np
 from refgi.errors import InputError, expect
 from refgi.scene.gltf.container import Document
 from refgi.scene.model import Camera, DirectionalLight, Light, PointLight, SpotLight
+from refgi.scene.reading import per_watt
 from refgi.scene.transform import expect_affine, invertible
 from refgi.scene.values import Array, Vector
 
 NO_MATRIX = tuple(np.eye(4).ravel().tolist())
-LUMEN_PER_WATT = 683.0
 EXTENSION = "KHR_lights_punctual"
 ROUNDING = 1e-6  # rad; a float32 near pi / 2 is within 6e-8, and written with 7 digits within 5e-7
 PICTURE_HEIGHT = 512  # pixels; a glTF camera has an aspect ratio only
@@ -160,10 +161,10 @@ def node_light(document: Document, node: dict[str, Any], matrix: Array, where: s
 
 def _light(document: Document, entry: dict[str, Any], matrix: Array, where: str) -> Light:
     colour = document.numbers(entry, "color", where, (1.0, 1.0, 1.0))
-    power = document.number(entry, "intensity", where, 1.0) / LUMEN_PER_WATT
+    kind = entry.get("type")
+    power = document.number(entry, "intensity", where, 1.0) / per_watt(directional=kind == "directional")
     intensity = (colour[0] * power, colour[1] * power, colour[2] * power)
     position, direction = _vector(matrix[:3, 3]), _vector(-_unit(matrix[:3, 2]))
-    kind = entry.get("type")
     if kind == "directional":
         return DirectionalLight(direction, intensity)
     if kind == "point":

@@ -43,7 +43,12 @@ def squared(t: Array, cosine: Array, inner: float, outer: float) -> Array:  # no
     return np.asarray(clamped(t) ** 2)
 
 
-OWN: Mapping[str, Falloff] = MappingProxyType({"smoothstep": smooth, "squared_ramp": squared})
+def ramp(t: Array, cosine: Array, inner: float, outer: float) -> Array:  # noqa: ARG001
+    """Return the falloff of a cosine lobe as it should be."""
+    return clamped(t)
+
+
+OWN: Mapping[str, Falloff] = MappingProxyType({"smoothstep": smooth, "squared_ramp": squared, "ramp": ramp})
 
 
 def own_falloff(light: Light) -> Falloff:

@@ -26,7 +26,7 @@ SHARES = (0.0, 0.3, 0.8, 0.99, 0.9999, 1.0)  # of the outer half-angle that the 
 
 
 def exact_falloff(d, axis, inner, outer, falloff="smoothstep"):
-    """t t (3 - 2 t) or t t, t = clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1), to 60 digits."""
+    """t t (3 - 2 t), t t or t, t = clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1), to 60 digits."""
     with mpmath.workdps(60):
         d, axis = (mpmath.matrix([mpmath.mpf(float(c)) for c in vector]) for vector in (d, axis))
         dot = sum(d[i] * axis[i] for i in range(3))
@@ -35,7 +35,7 @@ def exact_falloff(d, axis, inner, outer, falloff="smoothstep"):
         if cosine >= high or cosine <= low:
             return mpmath.mpf(int(cosine >= high))
         t = (cosine - low) / (high - low)
-        return t * t * (3 - 2 * t if falloff == "smoothstep" else 1)
+        return {"smoothstep": t * t * (3 - 2 * t), "squared_ramp": t * t, "ramp": t}[falloff]
 
 
 def directions_about(axis, outer, inner, count, rng):
@@ -49,7 +49,7 @@ def directions_about(axis, outer, inner, count, rng):
     return unit * 10 ** rng.uniform(-3, 3, (count, 1))
 
 
-@pytest.mark.parametrize("falloff", ["smoothstep", "squared_ramp"])
+@pytest.mark.parametrize("falloff", ["smoothstep", "squared_ramp", "ramp"])
 @pytest.mark.parametrize("real", [np.float32, np.float64])
 @pytest.mark.parametrize("degrees", DEGREES)
 def test_the_falloff_is_exact_to_a_few_units_in_the_last_place(real, degrees, falloff):

@@ -36,7 +36,7 @@ def in_a_ball(light, resolution=32, materials=(DIFFUSE,), dtype=np.float64, **op
 
 @pytest.mark.feature("SII-01")
 @pytest.mark.parametrize("resolution", [17, 33, 128])
-@pytest.mark.parametrize(("falloff", "mean"), [("smoothstep", 1 / 2), ("squared_ramp", 1 / 3)])
+@pytest.mark.parametrize(("falloff", "mean"), [("smoothstep", 1 / 2), ("squared_ramp", 1 / 3), ("ramp", 1 / 2)])
 @pytest.mark.parametrize(("inner", "outer"), [(30, 50), (40, 40), (0, 70), (60, 80), (85, 85)])
 def test_spot_flux_sums_to_albedo_times_its_power(resolution, inner, outer, falloff, mean, evidence):
     light = SpotLight((0.3, 0.2, -0.4), (1, -2, 0.5), math.radians(inner), math.radians(outer), (3, 2, 1), falloff)

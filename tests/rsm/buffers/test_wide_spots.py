@@ -32,7 +32,7 @@ def room():
     return load_scene("cornell_box").with_camera(width=24, height=24)
 
 
-@pytest.mark.parametrize(("falloff", "mean"), [("smoothstep", 1 / 2), ("squared_ramp", 1 / 3)])
+@pytest.mark.parametrize(("falloff", "mean"), [("smoothstep", 1 / 2), ("squared_ramp", 1 / 3), ("ramp", 1 / 2)])
 @pytest.mark.parametrize("inner", [0.0, 0.4, ALMOST, RIGHT])
 @pytest.mark.parametrize(("shape", "tolerance"), [("auto", INTEGRATED), ("paraboloid", INTEGRATED), ("cube", SAMPLED)])
 def test_all_of_the_power_falls_into_the_map(room, inner, shape, tolerance, falloff, mean):

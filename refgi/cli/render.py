@@ -11,6 +11,7 @@ from refgi.cli.session import DONE, FAILED, Session, say
 from refgi.cli.settings import preset
 
 DARKEST, BRIGHTEST = 1e-3, 1e3  # radiance times exposure that a picture's brightest pixel usually has
+DARKEST_OF_GLTF = 1e-2  # whose lights may be in W/sr, 683 times as strong as the format says
 
 if TYPE_CHECKING:
     from refgi.cli.destination import Pictures
@@ -182,13 +183,14 @@ def _say_aloud(session: Session, content: dict[str, Any], exposure: float) -> No
     elif content["mean_indirect_irradiance"] == 0:
         say("there is no indirect light in the picture")
     shown = content["brightest_radiance"] * exposure
-    if 0 < shown < DARKEST or shown > BRIGHTEST:
+    gltf = str(content["provenance"]["scene"]["source"]).lower().endswith((".gltf", ".glb"))
+    if 0 < shown < (DARKEST_OF_GLTF if gltf else DARKEST) or shown > BRIGHTEST:
         from refgi.errors import RefgiWarning
 
         text = f"the brightest radiance is {content['brightest_radiance']:.3g} W/m^2/sr"
         text += f" ({shown:.3g} at the exposure of {exposure:.3g})" if exposure != 1 else ""
         text += f": a PNG of it is {'nearly black' if shown < 1 else 'nearly white'}; --exposure auto fits it"
-        if str(content["provenance"]["scene"]["source"]).lower().endswith((".gltf", ".glb")):
+        if gltf:
             text += ", --light-unit says what the file's lights are in"
         session.warn(text, RefgiWarning)
 

@@ -67,6 +67,23 @@ def test_emissive_lamps_are_in_the_record_and_made_again(tmp_path):
     assert read_exr(tmp_path / "b.exr")[1]["scene"] == record["scene"]
 
 
+def test_a_gltf_lamp_of_1000_w_that_is_taken_for_cd_is_named(tmp_path):
+    """79.577 is 1000 W / 4 pi; 2 m above a white square E = 79.577 / 683 / 4 and L = E / pi = 0.0093 at most."""
+    from tests.scene.samples import glb_bytes, gltf_tree
+
+    tree = gltf_tree()
+    tree["extensions"]["KHR_lights_punctual"]["lights"] = [{"type": "point", "intensity": 79.577}]
+    del tree["meshes"][0]["primitives"][0]["material"]
+    tree["nodes"][2]["translation"] = [1.5, 2.5, 5]
+    (tmp_path / "a.glb").write_bytes(glb_bytes(tree))
+    view = ["--vfov-deg", "30", "--eye", "1.5,2.5,6", "--target", "1.5,2.5,3"]
+    for unit, said in (("cd", True), ("W/sr", False)):
+        result = run(tmp_path / "a.glb", *TINY, *view, "--light-unit", unit, "--json", "--out",
+                     tmp_path / f"{unit[0]}.png")
+        texts = json.loads(result.stdout)["warnings"]
+        assert any("--light-unit says what the file's lights are in" in text for text in texts) == said
+
+
 def test_the_light_unit_of_gltf_scales_the_picture(tmp_path):
     from tests.scene.samples import glb_bytes, gltf_tree
 

@@ -187,7 +187,8 @@ def _intensity(given, k, w):
     inner, outer = float(given["cos_inner"][k]), float(given["cos_outer"][k])
     cosine = dr.dot(w, mi.Vector3f(given["direction"][k].tolist()))
     t = dr.clip((cosine - outer) / (inner - outer), 0, 1) if inner > outer else dr.select(cosine > outer, 1.0, 0.0)
-    return peak * (t * t * (3 - 2 * t))
+    bend, linear = map(float, given["shape"][k])
+    return peak * (t * (linear + (1 - linear) * t) * (1 + 2 * bend - 2 * bend * t))
 
 
 def _pattern(lookup, hit, g, toward, v):

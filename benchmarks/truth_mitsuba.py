@@ -30,6 +30,7 @@ from refgi.frame import Frame
 from refgi.pairs.shadow_rays import receivers
 from refgi.radiometry import POINT
 from refgi.scene import Scene, light_table, load_scene
+from refgi.scene.light import BEND
 from refgi.truth import TruthSettings
 from tests.truth.glossy_scenes import SCENES, frame, reference
 
@@ -100,7 +101,8 @@ def described(view: View) -> dict[str, Any]:
             "specular": np.array([m.specular for m in scene.materials]) * opaque, "exponent": exponent,
             "share": np.where(cosine >= 0, 1 - half, half), "kind": lamps.kind, "position": lamps.position,
             "direction": lamps.direction, "intensity": lamps.intensity, "cos_inner": np.cos(spots),
-            "cos_outer": np.cos(wide), "middle": middle, "radius": geometry.diagonal / 2 * 1.001,
+            "cos_outer": np.cos(wide), "shape": lamps.cone[:, BEND:], "middle": middle,
+            "radius": geometry.diagonal / 2 * 1.001,
             "origin": to.origin, "normal": to.normal, "facing": to.facing, "methods": np.array(ways_of(view.scene))}
 
 

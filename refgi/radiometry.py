@@ -22,8 +22,8 @@ FOR_FLOAT32 = 1e-7  # from here on it is less than 1e-7 of the cosine over that 
 
 
 @kernel
-def smooth_edge(above: Any, span: Any) -> Any:
-    """Return t t (3 - 2 t) of t = above / span, moved into [0, 1].
+def smooth_edge(above: Any, span: Any, bend: Any, linear: Any) -> Any:
+    """Return t (l + (1 - l) t) (1 + 2 b - 2 b t) of t = above / span, moved into [0, 1]: smoothstep, t t or t.
 
     Parameters
     ----------
@@ -31,6 +31,8 @@ def smooth_edge(above: Any, span: Any) -> Any:
         How much the cosine of an angle off a spot's axis exceeds that of the outer half-angle.
     span : float
         How much that of the inner half-angle does, 0 or more; 0 makes a step.
+    bend, linear : float
+        b and l of `refgi.scene.light.SHAPES`.
 
     Returns
     -------
@@ -43,7 +45,8 @@ def smooth_edge(above: Any, span: Any) -> Any:
     if above <= real(0.0):
         return real(0.0)
     t = above / span
-    return real(t * t * (real(3.0) - t - t))
+    b, straight = real(bend), real(linear)
+    return real(t * (straight + (real(1.0) - straight) * t) * (real(1.0) + b + b - b * t - b * t))
 
 
 @kernel
@@ -56,7 +59,7 @@ def falloff_in_float64(d: Any, axis: Any, cone: Any, plain: float) -> tuple[floa
         Direction away from the spot, of any length above 0; float64.
     axis : tuple of 3 floats
         Direction the spot shines in, of any length; float64.
-    cone : (6,) ndarray of float64
+    cone : (8,) ndarray of float64
         Of `refgi.scene.light.cone_row`.
     plain : float
         Sine of the angle inside the cone from which on float64 alone will do: `FOR_FLOAT32`, or inf for nowhere.
@@ -81,7 +84,8 @@ def falloff_in_float64(d: Any, axis: Any, cone: Any, plain: float) -> tuple[floa
     t = t if t < 1.0 else 1.0
     t = t if edge > slack else 0.0
     whole = (edge > slack) & (above * (edge - slack) > cone[4] * edge)
-    return t * t * (3.0 - t - t), (edge < -slack) | whole | (edge > plain * length)
+    bent, share = cone[6] * t, t * (cone[7] + (1.0 - cone[7]) * t)
+    return share * (1.0 + cone[6] + cone[6] - bent - bent), (edge < -slack) | whole | (edge > plain * length)
 
 
 @kernel
@@ -94,7 +98,7 @@ def spot_falloff(d: Any, axis: Any, cone: Any, plain: float) -> Any:
         Direction away from the spot, of any length above 0; float64.
     axis : tuple of 3 floats
         Direction the spot shines in, of any length; float64.
-    cone : (6,) ndarray of float64
+    cone : (8,) ndarray of float64
         Of `refgi.scene.light.cone_row`.
     plain : float
         Sine of the angle inside the cone from which on float64 alone will do: `FOR_FLOAT32`, or inf for nowhere.
@@ -109,7 +113,7 @@ def spot_falloff(d: Any, axis: Any, cone: Any, plain: float) -> Any:
     What sin(b - a) cancels is known to twice the precision where it matters.
     """
     share, certain = falloff_in_float64(d, axis, cone, plain)
-    return share if certain else smooth_edge(_above_the_edge(d, axis, cone), cone[4])
+    return share if certain else smooth_edge(_above_the_edge(d, axis, cone), cone[4], cone[6], cone[7])
 
 
 @kernel

@@ -75,7 +75,7 @@ LONG = {
     "tests/truth/test_closed_forms.py": (
         "test_estimators_agree[several]",
         "test_integrating_sphere[combined]",
-        "test_the_naive_twin[True]",
+        "test_the_naive_twin[True-smoothstep]",
     ),
     "tests/truth/test_error.py": ("test_pixels_lie_within_their_standard_error[light]",),
     "tests/truth/test_faces_and_lobes.py": (

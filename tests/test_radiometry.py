@@ -31,11 +31,12 @@ def rectangle(corner, x0, x1, y0, y1):
     return corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0)
 
 
-def test_spot_falloff_is_the_smoothstep():
-    cone = cone_row(math.acos(0.9), math.acos(0.5))
+@pytest.mark.parametrize("falloff", ["smoothstep", "squared_ramp", "ramp"])
+def test_spot_falloff_is_the_smoothstep_or_a_ramp(falloff):
+    cone = cone_row(math.acos(0.9), math.acos(0.5), falloff)
     for cos_angle in np.linspace(-1.0, 1.0, 81):
         got = spot_falloff((0.0, math.sqrt(1 - cos_angle**2), cos_angle), (0.0, 0.0, 1.0), cone, math.inf)
-        assert got == pytest.approx(naive.spot_intensity(1.0, cos_angle, 0.9, 0.5), abs=ROUNDING[np.float64])
+        assert got == pytest.approx(naive.spot_intensity(1.0, cos_angle, 0.9, 0.5, falloff), abs=ROUNDING[np.float64])
 
 
 def test_spot_with_equal_cones_is_a_step():
@@ -49,7 +50,10 @@ def test_spot_with_equal_cones_is_a_step():
 def test_smooth_edge(real):
     for above, span, expected in ((0.5, 1, 0.5), (0.25, 1, 0.15625), (1, 1, 1), (2, 1, 1), (0, 1, 0), (-1, 1, 0),
                                   (0, 0, 1), (-1, 0, 0)):
-        assert smooth_edge(real(above), real(span)) == expected
+        assert smooth_edge(real(above), real(span), 1.0, 0.0) == expected
+    for above, span, expected in ((0.5, 1, 0.25), (0.25, 1, 0.0625), (1, 1, 1), (2, 1, 1), (0, 1, 0), (-1, 1, 0),
+                                  (0, 0, 1), (-1, 0, 0)):
+        assert smooth_edge(real(above), real(span), 0.0, 0.0) == expected
 
 
 @pytest.mark.parametrize("real", [np.float32, np.float64])

@@ -36,7 +36,7 @@ OUTER, INNER = 6, 7  # rows of the drawn half-angles
 @kernel
 def _edges(x: Array, out: Array) -> None:
     for i in range(x.shape[1]):
-        out[0, i] = smooth_edge(x[0, i], x[1, i])
+        out[0, i] = smooth_edge(x[0, i], x[1, i], 1.0, 0.0)
 
 
 @kernel

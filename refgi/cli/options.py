@@ -48,6 +48,21 @@ class Triple(click.ParamType[tuple[float, float, float]]):
         return x, y, z
 
 
+class Exposure(click.ParamType[float | str]):
+    """A factor, or "auto"."""
+
+    name = "FACTOR|auto"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float | str:
+        """Read one factor."""
+        if value == "auto":
+            return "auto"
+        try:
+            return float(value)
+        except ValueError:
+            self.fail(f"expected a number or auto, got {value!r}", param, ctx)
+
+
 def speech(function: F) -> F:
     """Add --json and --debug.
 
@@ -132,6 +147,10 @@ def seen(function: F) -> F:
                           "directional:direction=0,-1,0:irradiance=3 (W/m^2)."),
         click.option("--strict", is_flag=True,
                      help="Refuse a mesh that lacks material files, images or normals that it names."),
+        click.option("--light-unit", type=click.Choice(["cd", "lm", "W/sr"]), default="cd", show_default=True,
+                     help="What glTF's lights are in; exporters write cd (the format's), lm or W/sr."),
+        click.option("--emissive", type=click.Choice(["seen", "lamps"]), default="seen", show_default=True,
+                     help="Emissive surfaces are seen and light nothing, or each part gets a lamp, an approximation."),
     )):
         function = decorate(function)
     return function

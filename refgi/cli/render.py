@@ -6,15 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from refgi.cli.options import machine, seen, shadows, speech, still, writing
+from refgi.cli.options import Exposure, machine, seen, shadows, speech, still, writing
 from refgi.cli.session import DONE, FAILED, Session, say
 from refgi.cli.settings import preset
+
+DARKEST, BRIGHTEST = 1e-3, 1e3  # radiance times exposure that a picture's brightest pixel usually has
+DARKEST_OF_GLTF = 1e-2  # whose lights may be in W/sr, 683 times as strong as the format says
 
 if TYPE_CHECKING:
     from refgi.cli.destination import Pictures
     from refgi.methods import Picture
     from refgi.provenance import Job, Record
-    from refgi.scene import Scene
 
 
 @click.command("render")
@@ -28,7 +30,8 @@ if TYPE_CHECKING:
 @shadows("auto")
 @click.option("--again", metavar="FILE.exr", help="Make this picture again, and say whether it is the same to the bit.")
 @click.option("--scene", "scene_path", metavar="PATH", help="Where the scene of --again is now, if it was moved.")
-@click.option("--exposure", type=float, help="Factor before the sRGB curve of a PNG; the scene's where absent.")
+@click.option("--exposure", type=Exposure(), help="Factor before the sRGB curve of a PNG, the scene's where absent; "
+              "auto makes the 98th percentile white.")
 @click.option("--allow-empty", is_flag=True, help="Write a black picture where the camera sees no surface.")
 @click.option("--out", help="out.exr (linear), out.png (tone-mapped), or a folder for both.")
 @writing
@@ -51,9 +54,11 @@ def _render(ctx: click.Context, /, **options: Any) -> int:
 
     require_either(ctx)
     exposure, again, out = options["exposure"], options["again"], options["out"]
-    expect(exposure is None or 0 < exposure < float("inf"), "--exposure", "a finite number > 0", exposure)
+    auto = exposure == "auto"
+    fits = exposure is None or auto or 0 < exposure < float("inf")
+    expect(fits, "--exposure", "auto or a finite number > 0", exposure)
     job = asked(options) if again is None else recorded(again, options["scene_path"])
-    job = job if exposure is None else job._replace(exposure=exposure)
+    job = job if exposure is None or auto else job._replace(exposure=exposure)
     permission = Permission(options["parents"], options["force"])
     name = stem(options["scene"] if job.scene.source is None else job.scene.source.name)
     files = Pictures() if out is None else picture_files(out, f"{name}_{job.method}", permission)
@@ -71,6 +76,7 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     from refgi.cli.options import on_threads
     from refgi.cli.session import progress
     from refgi.cli.warm import warm_up
+    from refgi.compare.pictures import EXPOSED, auto_exposure
     from refgi.methods import render
 
     with progress() as tell:
@@ -90,10 +96,13 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
             picture = render_frame(job.scene, job.method, job.settings, job.frame, job.options)
     seconds = time.perf_counter() - started
     require_view(bool(picture.frame.gbuffer.covered.any()), job.scene.name, options["allow_empty"] or again is not None)
-    record = _record(job, picture)
+    auto = options["exposure"] == "auto"
+    if auto:
+        job = job._replace(exposure=auto_exposure(picture.radiance))
+    record = _record(job, picture) | ({"auto_exposure": {"percentile": EXPOSED}} if auto else {})
     content = _content(picture, job, seconds, record) | {"stages": [_run(run) for run in log.runs]}
     planes = _write(picture, files, record)
-    _say_aloud(content, job.scene)
+    _say_aloud(session, content, job)
     content["files"] = [str(file) for file in files.files]
     size = "x".join(map(str, content["size"]))
     text = f"{job.scene.name} by {job.method}: {size} in {seconds:.2f} s"
@@ -165,10 +174,10 @@ def _write(picture: "Picture", files: "Pictures", record: "Record") -> dict[str,
     return planes
 
 
-def _say_aloud(content: dict[str, Any], scene: "Scene") -> None:
+def _say_aloud(session: Session, content: dict[str, Any], job: "Job") -> None:
     from refgi.scene.repair import faintest_irradiance
 
-    least = faintest_irradiance(scene.lights, scene.geometry)
+    least = faintest_irradiance(job.scene.lights, job.scene.geometry)
     if bad := content["non_finite_pixels"]:
         say(f"{bad} pixels of the picture are NaN or infinite")
     elif content["brightest_radiance"] <= least:
@@ -176,6 +185,18 @@ def _say_aloud(content: dict[str, Any], scene: "Scene") -> None:
         say(f"the picture is wholly black: the camera sees {seen}")
     elif content["mean_indirect_irradiance"] <= least:
         say("there is no indirect light in the picture")
+    exposure = job.exposure
+    shown = content["brightest_radiance"] * exposure
+    gltf = str(content["provenance"]["scene"]["source"]).lower().endswith((".gltf", ".glb"))
+    if 0 < shown < (DARKEST_OF_GLTF if gltf else DARKEST) or shown > BRIGHTEST:
+        from refgi.errors import RefgiWarning
+
+        text = f"the brightest radiance is {content['brightest_radiance']:.3g} W/m^2/sr"
+        text += f" ({shown:.3g} at the exposure of {exposure:.3g})" if exposure != 1 else ""
+        text += f": a PNG of it is {'nearly black' if shown < 1 else 'nearly white'}; --exposure auto fits it"
+        if gltf:
+            text += ", --light-unit says what the file's lights are in"
+        session.warn(text, RefgiWarning)
 
 
 def _run(run: Any) -> dict[str, Any]:

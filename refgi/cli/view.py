@@ -14,7 +14,7 @@ from refgi.scene import Camera, DirectionalLight, Light, PointLight, Scene, Spot
 from refgi.scene.files import did_you_mean
 
 KEYS = {
-    "spot": ("position", "direction", "target", "inner_deg", "outer_deg", "intensity"),
+    "spot": ("position", "direction", "target", "inner_deg", "outer_deg", "falloff", "intensity"),
     "point": ("position", "intensity"),
     "directional": ("direction", "irradiance"),
 }
@@ -60,7 +60,8 @@ def _values(kind: str, rest: str) -> dict[str, Any]:
         if key not in KEYS[kind]:
             raise InputError(f"{key!r} is not a key of {kind} ({', '.join(KEYS[kind])})"
                              + did_you_mean(key, KEYS[kind]))
-        values[key] = _number(key, value) if key.endswith("_deg") else _triple(key, value)
+        read = _number if key.endswith("_deg") else _triple
+        values[key] = value if key == "falloff" else read(key, value)
     return values
 
 
@@ -80,7 +81,8 @@ def _build(kind: str, values: dict[str, Any]) -> Light:
     outer = values.get("outer_deg", DEFAULT_OUTER_DEG)
     inner = values.get("inner_deg", INNER_SHARE * outer)
     position, direction, intensity = given
-    return SpotLight(position, direction, math.radians(inner), math.radians(outer), intensity)
+    return SpotLight(position, direction, math.radians(inner), math.radians(outer), intensity,
+                     values.get("falloff", SpotLight.falloff))
 
 
 def _needed(values: dict[str, Any], key: str) -> Any:
@@ -117,6 +119,8 @@ class View:
     vfov_deg: float | None
     lights: tuple[str, ...]
     strict: bool = False
+    light_unit: str = "cd"
+    emissive: str = "seen"
 
     def load(self) -> Scene:
         """Return the scene with its camera and lights changed as asked.
@@ -133,10 +137,11 @@ class View:
         """
         changes = self._camera_changes()
         lights = read_lights(self.lights)
+        how: dict[str, Any] = {"light_unit": self.light_unit, "emissive": self.emissive, "strict": self.strict}
         whole = "eye" in changes and "target" in changes
         if whole and Path(self.scene).suffix.lower() in (".glb", ".gltf", ".obj", ".ply"):
-            return load_scene(self.scene, camera=Camera(**changes), lights=lights, strict=self.strict)
-        scene = load_scene(self.scene, lights=lights, strict=self.strict)
+            return load_scene(self.scene, camera=Camera(**changes), lights=lights, **how)
+        scene = load_scene(self.scene, lights=lights, **how)
         return scene.with_camera(**changes) if changes else scene
 
     def _camera_changes(self) -> dict[str, Any]:

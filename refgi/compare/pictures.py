@@ -11,6 +11,8 @@ from refgi.provenance import Record
 
 Array = npt.NDArray[Any]
 
+EXPOSED = 98  # percentile that --exposure auto makes white
+
 
 def linear_planes(radiance: Array, irradiance: Array, variance: Array | None = None,
                   samples: Array | None = None, frames: Array | None = None, lobes: Array | None = None,
@@ -71,6 +73,24 @@ def write_preview(path: Path, radiance: Array, record: Record) -> None:
         If the file cannot be written.
     """
     write_png(path, np.moveaxis(radiance, 0, -1), record["exposure"], record)
+
+
+def auto_exposure(radiance: Array) -> float:
+    """Return the factor that makes a percentile of a picture white: of the largest channel of all that is not black.
+
+    Parameters
+    ----------
+    radiance : (3, h, w) ndarray
+        What the camera receives, W/m^2/sr.
+
+    Returns
+    -------
+    float
+        Above 0; 1 where the picture is black.
+    """
+    brightest = radiance.max(axis=0)
+    lit = brightest[np.isfinite(brightest) & (brightest > 0)]
+    return float(1.0 / np.percentile(lit.astype(np.float64), EXPOSED)) if len(lit) else 1.0
 
 
 def rgb_planes(prefix: str, rgb: Array) -> dict[str, Array]:

@@ -1,7 +1,7 @@
 """Terms of the energy ledger on the lights' side: what the first surface does with a light's power.
 
-What a light emits has a closed form: 2 pi I (1 - (cos inner + cos outer) / 2) for a spot, whose falloff in the cosine
-is even about its middle, 4 pi I for a point, and E_perp times the area of the map that encloses the scene for a
+What a light emits has a closed form: 2 pi I (1 - cos inner + m (cos inner - cos outer)) for a spot, whose falloff is m
+in the mean over the cosine, 4 pi I for a point, and E_perp times the area of the map that encloses the scene for a
 directional light, which has no power of its own. The lines are sums over the texels of its reflective shadow map, each
 by itself, so that they give the closed form again only where solid angles, falloff, albedo and lobes are all right.
 """
@@ -41,7 +41,7 @@ def light_terms(rsm: "Rsm", geometry: "Geometry", materials: "MaterialTable") ->
     absorption = 1.0 - np.asarray(materials.diffuse, np.float64) - materials.specular
     met, missed = _shares(rsm, geometry, len(glass))
     absorbed = met[~glass] @ absorption[~glass]
-    if materials.textures is not None:
+    if materials.textures is not None or geometry.colours is not None:
         absorbed = _absorbed_by_texels(rsm, geometry, materials)
     refracted, reflected = _refracted_and_reflected(rsm, geometry, glass)
     return LightTerms(
@@ -57,13 +57,14 @@ def light_terms(rsm: "Rsm", geometry: "Geometry", materials: "MaterialTable") ->
 def emitted_power(light: "Light", projection: "Projection") -> Array:
     """Return the power of a light in closed form, (3,) W; a directional light's is that through its map's area."""
     from refgi.scene import DirectionalLight, SpotLight
+    from refgi.scene.light import MEANS
 
     if isinstance(light, DirectionalLight):
         share = 4.0 * float(np.prod(projection.half))
     elif isinstance(light, SpotLight):
         # 1 - cos a = 2 sin^2(a / 2), which keeps the digits of narrow cones
-        squares = (math.sin(angle / 2) ** 2 for angle in (light.inner_half_angle, light.outer_half_angle))
-        share = 2.0 * math.pi * sum(squares)
+        inner, outer = (2.0 * math.sin(angle / 2) ** 2 for angle in (light.inner_half_angle, light.outer_half_angle))
+        share = 2.0 * math.pi * (inner + MEANS[light.falloff] * (outer - inner))
     else:
         share = 4.0 * math.pi
     return share * _strength(light)

@@ -222,7 +222,7 @@ def _surface(geometry: "Geometry", triangle: Array, distance: Array, rays: PathR
 
 def _diffuse(geometry: "Geometry", materials: "MaterialTable", triangle: Array, material: Array,
              position: Array) -> Array:
-    """Return the diffuse reflectance of each hit: its material's, times the texture at that very point."""
+    """Return the diffuse reflectance of each hit: its material's, times texture and vertex colours there."""
     diffuse = materials.diffuse[material]
     if materials.textures is not None and geometry.uv is not None:
         from refgi.scene.texture.lookup import multiply_at
@@ -230,6 +230,11 @@ def _diffuse(geometry: "Geometry", materials: "MaterialTable", triangle: Array, 
         diffuse = np.array(diffuse)
         multiply_at(materials.textures.table, geometry.vertices, geometry.faces, geometry.uv, triangle,
                     material, position, diffuse)
+    if geometry.colours is not None:
+        from refgi.scene.texture.lookup import multiply_by_colours
+
+        diffuse = np.array(diffuse)
+        multiply_by_colours(geometry.vertices, geometry.faces, geometry.colours, triangle, position, diffuse)
     return diffuse
 
 

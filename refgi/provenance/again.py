@@ -120,7 +120,7 @@ def _same_scene(record: Mapping[str, Any], path: Path, moved: str | None) -> Sce
         raise InputError(f"{path}: scene {name}: expected the scene of the picture, got other "
                          f"{' and '.join(changed)}" + (f" (changed: {', '.join(files)})" if files else ""),
                          key="scene")
-    return scene
+    return dataclasses.replace(scene, emissive_lamps=record.get("emissive_lamps", {}).get("count", 0))
 
 
 def _found(source: str | None, path: Path) -> str:

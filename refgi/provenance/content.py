@@ -69,9 +69,10 @@ def geometry_digest(scene: Scene) -> str:
                         (shape.vertex_normals, "<f8")):
         plane = np.zeros(0, kind) if array is None else np.ascontiguousarray(array, kind)
         digest.update(f"{plane.shape}\0".encode() + plane.tobytes())
-    if shape.uv is not None:  # absent, the digest is that of earlier versions
-        uv = np.ascontiguousarray(shape.uv, "<f8")
-        digest.update(f"uv {uv.shape}\0".encode() + uv.tobytes())
+    for key in ("uv", "colours"):
+        if getattr(shape, key) is not None:  # absent, the digest is that of earlier versions
+            plane = np.ascontiguousarray(getattr(shape, key), "<f8")
+            digest.update(f"{key} {plane.shape}\0".encode() + plane.tobytes())
     return digest.hexdigest()
 
 
@@ -116,10 +117,12 @@ def light_json(light: Light) -> dict[str, Any]:
     Returns
     -------
     dict
-        Its type and all its fields; angles in rad, so that no bit is lost.
+        Its type and its fields, a spot's falloff where it is not the smoothstep; angles in rad, so that no bit is lost.
     """
     kind = next(name for name, one in LIGHTS.items() if isinstance(light, one))
     fields: dict[str, Any] = plain(light)
+    if isinstance(light, SpotLight) and light.falloff == SpotLight.falloff:  # as in earlier versions
+        del fields["falloff"]
     return {"type": kind} | fields
 
 
@@ -141,8 +144,9 @@ def light_from(content: Mapping[str, Any]) -> Light:
     InputError
         If the content is not a light's.
     """
-    made: Light = _made(LIGHTS.get(str(content.get("type")), PointLight),
-                        {key: value for key, value in content.items() if key != "type"}, "light")
+    kind = LIGHTS.get(str(content.get("type")), PointLight)
+    usual = {"falloff": SpotLight.falloff} if kind is SpotLight else {}
+    made: Light = _made(kind, usual | {key: value for key, value in content.items() if key != "type"}, "light")
     return made
 
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from refgi.provenance.content import geometry_digest, light_json, materials_digest, plain
 from refgi.scene import Scene
+from refgi.scene.emissive import APPROXIMATION
 
 if TYPE_CHECKING:
     from refgi.diagnostics import SamplingError
@@ -131,6 +132,8 @@ def scene_record(
             "name": scene.name, "faces": scene.face_count, "geometry_sha256": geometry_digest(scene),
             "materials_sha256": materials_digest(scene), "camera": plain(camera),
             "lights": [light_json(light) for light in scene.lights],
+            **({"emissive_lamps": {"count": scene.emissive_lamps, "approximation": APPROXIMATION}}
+               if scene.emissive_lamps else {}),
         },
         "options": plain(options), "exposure": scene.exposure if exposure is None else exposure,
         **({"units": UNITS | LOBE_UNITS, "content": LOBE_CONTENT} if _reflects_by_lobes(scene) else

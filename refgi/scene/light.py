@@ -7,7 +7,7 @@ import dataclasses
 import decimal
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -28,28 +28,37 @@ from refgi.scene.values import (
 )
 
 # places in a row of `cone_row`; sine and cosine of the outer half-angle come in two parts, the second the rest
-SINE, SINE_REST, COSINE, COSINE_REST, SPAN, CAP = range(6)
+SINE, SINE_REST, COSINE, COSINE_REST, SPAN, CAP, BEND, LINEAR = range(8)
 SPOT, POINT, DIRECTIONAL = 0, 1, 2  # kinds of light in a LightTable
 NARROWEST = math.radians(1e-5)  # half-angle; rays in float32 tell directions apart down to a third of it
 
 
-def cone_row(inner: float, outer: float) -> Array:
-    """Return what kernels need of a spot's half-angles.
+Falloff = Literal["smoothstep", "squared_ramp", "ramp"]  # of a spot between its cones; the second is glTF's
+# b and l of t (l + (1 - l) t) (1 + 2 b - 2 b t)
+SHAPES: dict[Falloff, tuple[float, float]] = {"smoothstep": (1.0, 0.0), "squared_ramp": (0.0, 0.0), "ramp": (0.0, 1.0)}
+MEANS: dict[Falloff, float] = {"smoothstep": 1 / 2, "squared_ramp": 1 / 3, "ramp": 1 / 2}  # over the cosine
+
+
+def cone_row(inner: float, outer: float, falloff: Falloff = "smoothstep") -> Array:
+    """Return what kernels need of a spot's half-angles and falloff.
 
     Parameters
     ----------
     inner, outer : float
         Half-angles, rad, 0 <= inner <= outer < pi/2.
+    falloff : str
+        What the intensity is between them.
 
     Returns
     -------
-    (6,) ndarray of float64
-        sin outer and cos outer, each a float64 and the rest; cos inner - cos outer; 1 - cos outer.
+    (8,) ndarray of float64
+        sin outer and cos outer, each a float64 and the rest; cos inner - cos outer; 1 - cos outer; two of `SHAPES`.
     """
     sine, cosine = sine_cosine_digits(outer)
     _, cosine_inner = sine_cosine_digits(inner)
     with decimal.localcontext(prec=DIGITS):
-        return np.array([*twofold(sine), *twofold(cosine), float(cosine_inner - cosine), float(1 - cosine)])
+        return np.array([*twofold(sine), *twofold(cosine), float(cosine_inner - cosine), float(1 - cosine),
+                         *SHAPES[falloff]])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,7 +66,8 @@ class SpotLight:
     """A point that shines into a cone.
 
     On-axis radiant intensity `intensity` (W/sr), half-angles rad. With t = clamp((cos a - cos outer) / (cos inner -
-    cos outer), 0, 1) the intensity at angle a off the axis is I0 t t (3 - 2t), and nothing outside `outer`.
+    cos outer), 0, 1) the intensity at angle a off the axis is I0 t t (3 - 2t) where `falloff` is "smoothstep", I0 t t
+    where it is "squared_ramp", I0 t where it is "ramp", and nothing outside `outer`.
     """
 
     position: Vector
@@ -65,6 +75,7 @@ class SpotLight:
     inner_half_angle: float
     outer_half_angle: float
     intensity: Rgb
+    falloff: Falloff = "smoothstep"
 
     def __post_init__(self) -> None:
         expect(is_place(self.position), "light: position", f"three finite numbers up to {LARGEST:g} m", self.position)
@@ -75,6 +86,7 @@ class SpotLight:
                math.degrees(self.outer_half_angle) if is_number(self.outer_half_angle) else self.outer_half_angle)
         expect(0 <= self.inner_half_angle <= self.outer_half_angle, "light: inner_half_angle_deg",
                "0 to outer_half_angle_deg", degrees(self.inner_half_angle))
+        expect(self.falloff in get_args(Falloff), "light: falloff", " or ".join(get_args(Falloff)), self.falloff)
         _expect_power(self.intensity, "intensity_w_per_sr")
         as_float_tuples(self, "position", "direction", "intensity")
 
@@ -115,7 +127,7 @@ class LightTable(NamedTuple):
     kind: Array  # (k,) int32: 0 spot, 1 point, 2 directional
     position: Array  # (k, 3) m; zero for a directional light
     direction: Array  # (k, 3) unit vector the light travels along; zero for a point light
-    cone: Array  # (k, 6) `cone_row` of a spot; zero for others
+    cone: Array  # (k, 8) `cone_row` of a spot; zero for others
     intensity: Array  # (k, 3) W/sr on the axis; perpendicular irradiance W/m^2 for a directional light
 
 
@@ -133,7 +145,7 @@ def light_table(lights: Sequence[Light]) -> LightTable:
         One row a light.
     """
     count = len(lights)
-    table = LightTable(np.zeros(count, np.int32), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 6)),
+    table = LightTable(np.zeros(count, np.int32), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 8)),
                        np.zeros((count, 3)))
     for row, light in enumerate(lights):
         if isinstance(light, DirectionalLight):
@@ -146,7 +158,7 @@ def light_table(lights: Sequence[Light]) -> LightTable:
         if not isinstance(light, PointLight):
             table.direction[row] = np.asarray(light.direction) / np.linalg.norm(light.direction)
         if isinstance(light, SpotLight):
-            table.cone[row] = cone_row(light.inner_half_angle, light.outer_half_angle)
+            table.cone[row] = cone_row(light.inner_half_angle, light.outer_half_angle, light.falloff)
     return table
 
 

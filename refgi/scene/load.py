@@ -7,9 +7,11 @@ from pathlib import Path
 
 from refgi.errors import InputError, RefgiWarning, blame, first_faults, shortened
 from refgi.scene.builtin import SCENES, build_named
+from refgi.scene.emissive import lamps_where_asked
 from refgi.scene.files import did_you_mean, is_there, text_of, warn_of_undefined
 from refgi.scene.model import Camera, Light, Scene, merge
 from refgi.scene.placed import default_camera, default_light
+from refgi.scene.reading import Emissive, LightUnit, reading_as
 from refgi.scene.repair import lights_with_power, repaired_all, warn_of_flat_faces, warn_of_unit
 from refgi.scene.scenefile import READERS, read_mesh_file, read_scene_file
 from refgi.scene.source import reading, source_of
@@ -19,7 +21,8 @@ from refgi.stages import stage
 
 @stage("scene.load")
 def load_scene(
-    source: str | Path, *, camera: Camera | None = None, lights: Sequence[Light] | None = None, strict: bool = False
+    source: str | Path, *, camera: Camera | None = None, lights: Sequence[Light] | None = None, strict: bool = False,
+    light_unit: LightUnit = "cd", emissive: Emissive = "seen",
 ) -> Scene:
     """Load a built-in scene, a scene file or a mesh file.
 
@@ -35,6 +38,12 @@ def load_scene(
     strict : bool
         Refuse what is else passed over with a warning: absent material files and textures of meshes, faces of fewer
         than three corners, indices of normals and texture coordinates that are not there.
+    light_unit : str
+        What glTF's intensities are in: "cd" as the format says, "lm" (an isotropic source's flux), or "W/sr", which
+        some exporters write.
+    emissive : str
+        "seen": emissive surfaces of files light nothing, only the camera sees them. "lamps": each connected emissive
+        part gets a lamp of its power at its middle, along its mean normal, with a cosine falloff: an approximation.
 
     Returns
     -------
@@ -56,7 +65,7 @@ def load_scene(
     30
     """
     try:
-        with reading() as files, strictness(strict):
+        with reading() as files, strictness(strict), reading_as(light_unit, emissive):
             scene = _found(source, camera, lights)
     except MemoryError as error:
         raise InputError(f"{shortened(str(source))}: does not fit in memory", file=str(source)) from error
@@ -100,17 +109,19 @@ def _from_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] |
     warn_of_flat_faces(dropped, str(path))
     geometry, materials = merge(meshes, smooth=True)
     warn_of_unit(geometry, str(path))
+    lamps = lamps_where_asked(geometry, materials, str(path))
     lacking = []
     try:
         if camera is None:
             camera = found.cameras[0] if found.cameras else default_camera(geometry)
             lacking += [] if found.cameras else ["camera"]
         if lights is None:
-            lights = found.lights or (default_light(geometry, camera),)
-            lacking += [] if found.lights else ["light"]
+            lights = found.lights or (() if lamps else (default_light(geometry, camera),))
+            lacking += [] if found.lights or lamps else ["light"]
     except InputError as error:
         raise InputError(f"{path}: placed to fit the mesh: {error}") from error
     if lacking:
         text = f"{path}: the file has no {' and no '.join(lacking)}; one was placed to fit the mesh"
         warnings.warn(RefgiWarning(text), stacklevel=5)
-    return Scene(text_of(path.stem), geometry, materials, camera, lights_with_power(lights, f"{path}: lights"))
+    return Scene(text_of(path.stem), geometry, materials, camera,
+                 lights_with_power((*lights, *lamps), f"{path}: lights"), emissive_lamps=len(lamps))

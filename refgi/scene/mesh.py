@@ -8,7 +8,7 @@ fits before memory is allocated.
 import dataclasses
 import os
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,7 +33,8 @@ MOST_VERTICES = 2**31 - 1  # corner indices are int32
 class Mesh:
     """Triangles of one material in world space: vertices (n, 3) m, faces (m, 3), optional vertex normals (n, 3).
 
-    `uv` (m, 3, 2): texture coordinates of each face's corners, v = 0 at the top of the picture, or None.
+    `uv` (m, 3, 2): texture coordinates of each face's corners, v = 0 at the top of the picture, or None. `colours`
+    (m, 3, 3): factors of the diffuse reflectance at each face's corners, linear RGB, or None.
     """
 
     vertices: Array
@@ -42,6 +43,7 @@ class Mesh:
     material: Material = UNPAINTED
     name: str = "mesh"
     uv: Array | None = None
+    colours: Array | None = None
 
     def expect_sound(self, where: str) -> None:
         """Raise `InputError` naming `where` unless shapes, coordinates and indices make a mesh."""
@@ -63,6 +65,8 @@ class Mesh:
                    np.shape(self.normals))
         if self.uv is not None:
             expect_coordinates(self.uv, len(faces), where)
+        if self.colours is not None:
+            expect_colours(self.colours, len(faces), where)
 
 
 class Batch(NamedTuple):
@@ -130,6 +134,20 @@ def expect_coordinates(uv: Array, faces: int, where: str) -> None:
     if not (uv.min(initial=0) >= -LARGEST and uv.max(initial=0) <= LARGEST):  # so that NaN fails as well
         row = int(np.argmin((np.abs(uv) <= LARGEST).all(axis=(1, 2))))
         expect(False, f"{where}: uv of face {row}", f"finite texture coordinates up to {LARGEST:g}", uv[row].tolist())
+
+
+def expect_colours(colours: Array, faces: int, where: str) -> None:
+    """Raise `InputError` naming `where` unless there are three factors from 0 to 1 for each corner."""
+    expect(np.shape(colours) == (faces, 3, 3), f"{where}: colours", f"shape {(faces, 3, 3)}", np.shape(colours))
+    if not (colours.min(initial=0) >= 0 and colours.max(initial=0) <= 1):  # so that NaN fails as well
+        row = int(np.argmin(((colours >= 0) & (colours <= 1)).all(axis=(1, 2))))
+        expect(False, f"{where}: colours of face {row}", "factors from 0 to 1", colours[row].tolist())
+
+
+def at_corners(shape: Any, change: Callable[[Array], Array]) -> dict[str, Any]:
+    """Return what a mesh or geometry has at its faces' corners, changed, by name: for `dataclasses.replace`."""
+    found = {key: getattr(shape, key) for key in ("uv", "colours")}
+    return {key: None if values is None else change(values) for key, values in found.items()}
 
 
 def as_float64(values: Array) -> Array:

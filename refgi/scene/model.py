@@ -29,7 +29,7 @@ from refgi.scene.light import (
     light_table,
 )
 from refgi.scene.material import Material, MaterialTable, material_table
-from refgi.scene.mesh import Mesh, expect_all_sound, expect_coordinates, expect_memory
+from refgi.scene.mesh import Mesh, at_corners, expect_all_sound, expect_colours, expect_coordinates, expect_memory
 from refgi.scene.source import Source
 from refgi.scene.values import (
     BLACK,
@@ -79,7 +79,8 @@ class Geometry:
     materials; `vertex_normals` (n, 3) float64 unit vectors, or None where the scene shades with face normals; `uv`
     (m, 3, 2) float64 texture coordinates of each face's corners, or None where no material has a texture; `cut_outs`
     where surfaces of the materials have holes, or None where none has: those of the scene's materials, which `merge`
-    and `Scene` put here.
+    and `Scene` put here; `colours` (m, 3, 3) float64 factors of the diffuse reflectance at each face's corners, linear
+    between them, or None where no mesh has vertex colours.
     """
 
     vertices: Array
@@ -88,6 +89,7 @@ class Geometry:
     vertex_normals: Array | None = None
     uv: Array | None = None
     cut_outs: CutOuts | None = None
+    colours: Array | None = None
 
     def __post_init__(self) -> None:
         if len(self.faces):
@@ -96,6 +98,8 @@ class Geometry:
                f"one index a face, shape {(len(self.faces),)}", np.shape(self.material_of_face))
         if self.uv is not None:
             expect_coordinates(self.uv, len(self.faces), "geometry")
+        if self.colours is not None:
+            expect_colours(self.colours, len(self.faces), "geometry")
 
     @cached_property
     def materials_needed(self) -> int:
@@ -126,7 +130,7 @@ class Geometry:
     def selected(self, chosen: Array) -> "Geometry":
         """Return some of the faces, with the same vertices; `chosen` (m,) bool."""
         return dataclasses.replace(self, faces=self.faces[chosen], material_of_face=self.material_of_face[chosen],
-                                   uv=None if self.uv is None else self.uv[chosen])
+                                   **at_corners(self, lambda values: values[chosen]))
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
@@ -185,6 +189,7 @@ class Scene:
     description: str = ""
     exposure: float = 1.0  # factor before the sRGB curve in PNG pictures; of no other meaning
     source: Source | None = None  # where `load_scene` had it from; None: it was made in Python
+    emissive_lamps: int = 0  # the last of `lights`, which stand for emissive surfaces
 
     def __post_init__(self) -> None:
         expect(is_number(self.exposure) and self.exposure > 0, "exposure", "a finite number > 0", self.exposure)
@@ -205,7 +210,7 @@ class Scene:
 
     def with_lights(self, *lights: Light) -> "Scene":
         """Return the scene with other lights, sharing everything else."""
-        return dataclasses.replace(self, lights=lights)
+        return dataclasses.replace(self, lights=lights, emissive_lamps=0)
 
     @property
     def face_count(self) -> int:
@@ -254,6 +259,7 @@ def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tu
         np.concatenate([np.asarray(m.normals, np.float64) for m in meshes]) if smooth else None,
         np.concatenate([_coordinates(mesh) for mesh in meshes]) if textured else None,
         cut_outs(tuple(index_of)),
+        np.concatenate([_colours(mesh) for mesh in meshes]) if any(m.colours is not None for m in meshes) else None,
     ), tuple(index_of)
 
 
@@ -273,6 +279,10 @@ def _coordinates(mesh: Mesh) -> Array:
     return np.asarray(mesh.uv, np.float64)
 
 
+def _colours(mesh: Mesh) -> Array:
+    return np.ones((len(mesh.faces), 3, 3)) if mesh.colours is None else np.asarray(mesh.colours, np.float64)
+
+
 def _with_face_normals(mesh: Mesh) -> Mesh:
     corners = np.asarray(mesh.vertices, np.float64)[np.asarray(mesh.faces)]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -280,4 +290,4 @@ def _with_face_normals(mesh: Mesh) -> Mesh:
     normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
     vertices = corners.reshape(-1, 3)
     return Mesh(vertices, np.arange(len(vertices)).reshape(-1, 3), np.repeat(normals, 3, axis=0), mesh.material,
-                mesh.name, mesh.uv)
+                mesh.name, mesh.uv, mesh.colours)

@@ -15,11 +15,13 @@ import numpy as np
 from refgi.errors import InputError, RefgiWarning, expect, first_faults, shortened
 from refgi.scene.files import Contents, is_there
 from refgi.scene.lines import lines_of, numbers_of
+from refgi.scene.material import UNPAINTED
 from refgi.scene.mesh import expect_all_sound
 from refgi.scene.model import Array, Material, Mesh
 from refgi.scene.mtl import Maps, read_library
 from refgi.scene.polygons import triangles_of
 from refgi.scene.strictness import is_strict
+from refgi.scene.vertexcolours import WHITE, factors
 
 NOT_POLYGONS = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "free-form surfaces"}
 
@@ -60,7 +62,7 @@ class _Reader:
         self.libraries: set[str] = set()
         self.absent: list[str] = []  # of them
         self.absent_textures: list[str] = []
-        self.coloured = 0  # vertices with a colour
+        self.colours: dict[int, tuple[float, ...]] = {}  # of vertices that have one
         self.passed_over: dict[str, int] = {}
         self.corners: list[tuple[int, int, int]] = []  # position, normal and texture coordinates (-1: none), from 0
         self.counts: list[int] = []  # corners of each polygon
@@ -71,8 +73,9 @@ class _Reader:
     def take(self, words: list[str], where: str) -> None:
         key, values = words[0], words[1:]
         if key == "v":
+            if len(values) >= 6:
+                self.colours[len(self.positions)] = numbers_of(values[3:6], where)
             self.positions.append(numbers_of(values[:3], where))
-            self.coloured += len(values) >= 6
         elif key == "vn":
             self.normals.append(numbers_of(values[:3], where))
         elif key == "vt":
@@ -95,8 +98,6 @@ class _Reader:
         return Contents(tuple(meshes), undefined=() if self.absent else tuple(undefined))
 
     def _warn(self) -> None:
-        if self.coloured:
-            warnings.warn(RefgiWarning(f"{self.path}: colours of {self.coloured:,} vertices passed over"), stacklevel=5)
         for what, count in self.passed_over.items():
             warnings.warn(RefgiWarning(f"{self.path}: {count:,} {what} passed over"), stacklevel=5)
         for what, names in (("material file(s) not there, their materials are grey", self.absent),
@@ -195,6 +196,7 @@ class _Reader:
         position, normal = np.divmod(key[vertex % len(key)], len(normals) + 1)
         first = np.searchsorted(vertex, np.arange(len(starts) + 1) * len(key)).tolist()
         ends = np.append(starts[1:], len(kind)).tolist()
+        colours = self._colours()
         for k, (start, end) in enumerate(zip(starts.tolist(), ends, strict=True)):
             part, faces = slice(first[k], first[k + 1]), slice(start, end)
             name = names[corners.material[start]]
@@ -203,7 +205,8 @@ class _Reader:
                 uv = self._laid(coordinates[corners.coordinates[faces]], name)
             has_normals = normal[first[k]] > 0
             yield Mesh(positions[position[part]], index[faces] - first[k],
-                       normals[normal[part] - 1] if has_normals else None, material, name or "default", uv)
+                       normals[normal[part] - 1] if has_normals else None, material, name or "default", uv,
+                       None if colours is None else colours[corners.position[faces]])
 
     def _normals(self, corners: _Corners, positions: Array, starts: Array) -> tuple[Array, Array]:
         """Return (m, 3) one more than the number of each corner's normal, 0 where its run has none, and normals (k, 3).
@@ -222,11 +225,20 @@ class _Reader:
         numbers[mended] = np.where(lacking[mended], own, numbers[mended])
         return numbers, np.concatenate([np.array(self.normals, np.float64).reshape(-1, 3), across])
 
+    def _colours(self) -> Array | None:
+        """Return the colours (n, 3) of all vertices, white where a vertex has none; None where none has any."""
+        if not self.colours:
+            return None
+        colours = np.ones((len(self.positions), 3))
+        colours[list(self.colours)] = list(self.colours.values())
+        return factors(colours, f"{self.path}")
+
     def _painted(self, name: str, textured: bool) -> Material:
         if textured and name not in self.painted:
             self.painted[name] = self.maps[name].painted(self.materials[name])
             self.absent_textures += [shortened(found.path.name, 80) for found in self.maps[name].absent]
-        return self.painted[name] if textured else self.materials.get(name, Material(name or "default"))
+        return self.painted[name] if textured else self.materials.get(name) or Material(
+            name or "default", WHITE.diffuse if self.colours else UNPAINTED.diffuse)
 
     def _laid(self, coordinates: Array, name: str) -> Array:
         """Return texture coordinates, v downwards, as a material's maps lie: u' = s u + o as the file has them."""

@@ -1,5 +1,6 @@
 """PLY meshes: polygons of any sizes and triangle strips, vertex normals, textures that a comment names."""
 
+import dataclasses
 import warnings
 from pathlib import Path
 
@@ -10,13 +11,13 @@ from refgi.scene.files import Contents, is_there
 from refgi.scene.material import UNPAINTED
 from refgi.scene.model import Array, Material, Mesh
 from refgi.scene.plydata import Column, Ply, read_entries
-from refgi.scene.plyheader import Element
 from refgi.scene.polygons import triangles_of
 from refgi.scene.strictness import tolerate
 from refgi.scene.texture.image import image_file
 from refgi.scene.texture.texture import Texture
+from refgi.scene.vertexcolours import WHITE, factors, from_codes
 
-COLOURS = {"red", "green", "blue", "r", "g", "b"}
+COLOURS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
 CORNERS = ("vertex_indices", "vertex_index")
 COORDINATES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 TEXTURE = "TextureFile"  # of a comment
@@ -32,33 +33,46 @@ def read_ply(path: Path) -> Contents:
     vertex = {key: one for key, one in ply.columns.get("vertex", {}).items() if one.counts is None}
     expect(bool(vertex) and ply.elements["vertex"].length > 0, f"{path}: element vertex", "at least one", 0)
     expect({"x", "y", "z"} <= vertex.keys(), f"{path}: element vertex", "properties x, y and z", list(vertex))
-    _warn_of_colours(ply.elements, path)
     vertices = np.column_stack([vertex[key].values for key in "xyz"])
     has_normals = {"nx", "ny", "nz"} <= vertex.keys()
     normals = np.column_stack([vertex[key].values for key in ("nx", "ny", "nz")]) if has_normals else None
-    faces, uv, texture_of = _faces(ply, vertices, path)
+    faces, uv, texture_of, face_of = _faces(ply, vertices, path)
     mesh = Mesh(vertices, faces, normals, UNPAINTED, path.stem)
     mesh.expect_sound(f"{path}")
+    colours = _colours(ply, faces, face_of, path)
+    mesh = mesh if colours is None else dataclasses.replace(mesh, material=WHITE, colours=colours)
     uv = _vertex_coordinates(vertex, faces) if uv is None else uv
     return Contents(tuple(_painted(mesh, uv, texture_of, ply.comments, path)))
 
 
-def _warn_of_colours(elements: dict[str, Element], path: Path) -> None:
-    """Say what a renderer of constant reflectances does not read."""
-    for name, what in (("vertex", "vertices"), ("face", "faces")):
-        names = elements[name].names if name in elements else []
-        found = [key for key in names if key.removeprefix("diffuse_") in COLOURS]
-        if found:
-            text = f"{path}: colours of {elements[name].length:,} {what} ({', '.join(found[:8])}) passed over"
+def _colours(ply: Ply, faces: Array, face_of: Array, path: Path) -> Array | None:
+    """Return the colours (m, 3, 3) of corners, by vertex or by face, None where there are none or all are white."""
+    found = {name: _colours_of(ply.columns.get(name, {})) for name in ("vertex", "face")}
+    of_vertex, of_face = found["vertex"], found["face"]
+    if of_vertex is not None:
+        if of_face is not None:
+            text = f"{path}: colours of {len(of_face):,} faces passed over for those of the vertices"
             warnings.warn(RefgiWarning(text), stacklevel=4)
+        values = factors(of_vertex, f"{path}")
+        return None if values is None else np.asarray(values[faces])
+    values = None if of_face is None else factors(np.append(of_face, [[1, 1, 1]], axis=0), f"{path}")
+    return None if values is None else np.repeat(values[face_of][:, None], 3, axis=1)
 
 
-def _faces(ply: Ply, vertices: Array, path: Path) -> tuple[Array, Array | None, Array]:
-    """Return triangles (m, 3), texture coordinates of their corners that belong to faces, and the texture of each."""
+def _colours_of(columns: dict[str, Column]) -> Array | None:
+    for names in COLOURS:
+        if set(names) <= columns.keys() and all(columns[name].counts is None for name in names):
+            return np.column_stack([from_codes(columns[name].values) for name in names])
+    return None
+
+
+def _faces(ply: Ply, vertices: Array, path: Path) -> tuple[Array, Array | None, Array, Array]:
+    """Return triangles (m, 3), texture coordinates of their corners that belong to faces, their textures and faces."""
     parts = [_corners(ply, name, path) for name in ("face", "tristrips")]
     some = any(part is not None and len(part.values) for part in parts)
     expect(some, f"{path}: element face", "at least one, with a list vertex_indices", 0)
     triangles, uv, texture_of = np.zeros((0, 3), np.int64), None, np.zeros(0, np.int64)
+    face_of = np.zeros(0, np.int64)  # -1: of a strip
     if parts[0] is not None:
         corners, counts, chosen = _polygons(parts[0], len(vertices), path)
         within, crossed = triangles_of(vertices, corners, counts)
@@ -66,7 +80,7 @@ def _faces(ply: Ply, vertices: Array, path: Path) -> tuple[Array, Array | None, 
             text = f"{crossed:,} polygon(s) that cross themselves or have very many corners are fans of their first"
             warnings.warn(RefgiWarning(f"{path}: {text}"), stacklevel=4)
         triangles = (corners if len(within) * 3 == len(corners) else corners[within]).reshape(-1, 3).astype(np.int64)
-        texture_of = np.zeros(len(within), np.int64)
+        texture_of, face_of = np.zeros(len(within), np.int64), np.repeat(np.flatnonzero(chosen), counts - 2)
         uv = _corner_coordinates(ply.columns["face"].get("texcoord"), parts[0], within, chosen, path)
         number = ply.columns["face"].get("texnumber")
         if number is not None and number.counts is None:
@@ -75,8 +89,9 @@ def _faces(ply: Ply, vertices: Array, path: Path) -> tuple[Array, Array | None, 
         strips = _strips(parts[1])
         triangles, uv = np.concatenate([triangles, strips]), None if len(strips) else uv
         texture_of = np.append(texture_of, np.zeros(len(strips), np.int64))
+        face_of = np.append(face_of, np.full(len(strips), -1))
     expect(len(triangles) > 0, f"{path}: element face", "a polygon of three or more corners", 0)
-    return triangles, uv, texture_of
+    return triangles, uv, texture_of, face_of
 
 
 def _corners(ply: Ply, name: str, path: Path) -> Column | None:
@@ -150,11 +165,11 @@ def _painted(mesh: Mesh, uv: Array | None, texture_of: Array, comments: list[str
         if names:
             tolerate(f"{path}: {len(names)} {TEXTURE}(s) passed over for lack of texture coordinates")
         usable = uv is not None and bool(np.isfinite(uv).all())
-        return [Mesh(mesh.vertices, mesh.faces, mesh.normals, mesh.material, mesh.name, uv if usable else None)]
+        return [dataclasses.replace(mesh, uv=uv if usable else None)]
     materials = [_material(name, path) for name in names]
     outside = (texture_of < 0) | (texture_of >= len(materials))
     number = np.where(outside, len(materials), texture_of)
-    materials.append(UNPAINTED)
+    materials.append(mesh.material)
     starts = np.flatnonzero(np.diff(number, prepend=-1)).tolist()
     meshes = []
     for start, end in zip(starts, [*starts[1:], len(number)], strict=True):
@@ -163,7 +178,7 @@ def _painted(mesh: Mesh, uv: Array | None, texture_of: Array, comments: list[str
             used, faces = np.unique(mesh.faces[start:end], return_inverse=True)
         meshes.append(Mesh(mesh.vertices[used], faces.reshape(-1, 3),
                            None if mesh.normals is None else mesh.normals[used], materials[number[start]], mesh.name,
-                           uv[start:end]))
+                           uv[start:end], None if mesh.colours is None else mesh.colours[start:end]))
         meshes[-1].expect_sound(f"{path}")
     return meshes
 

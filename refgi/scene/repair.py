@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect
-from refgi.scene.mesh import Batch, Mesh, as_float64, batches, missing_normals
+from refgi.scene.mesh import Batch, Mesh, as_float64, at_corners, batches, missing_normals
 from refgi.scene.model import DirectionalLight, Geometry, Light
 from refgi.scene.values import Array
 
@@ -73,7 +73,7 @@ def repaired(mesh: Mesh, where: str) -> tuple[Mesh, int]:
     dropped = int(np.count_nonzero(flat))
     expect(dropped < len(mesh.faces), f"{where}: faces", "at least one with an area", f"{dropped} of zero area")
     if dropped:
-        mesh = dataclasses.replace(mesh, faces=mesh.faces[~flat], uv=None if mesh.uv is None else mesh.uv[~flat])
+        mesh = dataclasses.replace(mesh, faces=mesh.faces[~flat], **at_corners(mesh, lambda values: values[~flat]))
     if mesh.normals is not None:
         mesh = dataclasses.replace(mesh, normals=unit_normals(mesh))
     return mesh, dropped

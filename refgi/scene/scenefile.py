@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from refgi.errors import MOST_FAULTS, InputError, expect, first_faults, shortened
+from refgi.scene.emissive import lamps_where_asked
 from refgi.scene.files import Contents, expect_utf8, is_there, read_bytes, warn_of_undefined
 from refgi.scene.gltf import read_gltf
 from refgi.scene.mesh import expect_memory
 from refgi.scene.model import Camera, Light, Material, Mesh, Scene, merge
 from refgi.scene.obj import read_obj
 from refgi.scene.ply import read_ply
+from refgi.scene.reading import wants_lamps
 from refgi.scene.repair import lights_with_power, repaired_all, warn_of_flat_faces, warn_of_unit
 from refgi.scene.texture.image import image_file
 from refgi.scene.texture.texture import Texture
@@ -41,16 +43,17 @@ def read_scene_file(path: Path, camera: Camera | None, lights: Sequence[Light] |
     `InputError`: one error with all faults of the file, else one with all faults of its meshes.
     """
     content = expect_utf8(read_bytes(path), path)
-    entry = _validated(content, path, need_camera=camera is None, need_lights=lights is None)
+    entry = _validated(content, path, need_camera=camera is None, need_lights=lights is None and not wants_lamps())
     meshes = _meshes(entry, _materials(entry, path), path)
     geometry, used = merge(meshes, smooth=any(mesh.normals is not None for mesh in meshes))
     warn_of_unit(geometry, str(path))
+    lamps = lamps_where_asked(geometry, used, str(path))
     if camera is None and entry.camera is not None:
         camera = entry.camera.built("")
     chosen = tuple(light.built("") for light in entry.lights) if lights is None else tuple(lights)
     assert camera is not None  # by _validated
-    return Scene(entry.name, geometry, used, camera, lights_with_power(chosen, f"{path}: lights"), entry.description,
-                 entry.preview_exposure)
+    return Scene(entry.name, geometry, used, camera, lights_with_power((*chosen, *lamps), f"{path}: lights"),
+                 entry.description, entry.preview_exposure, emissive_lamps=len(lamps))
 
 
 def _materials(entry: "SceneFile", path: Path) -> dict[str, Material]:

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, Validatio
 from refgi.errors import MOST_FAULTS, shortened
 from refgi.scene import model
 from refgi.scene.files import did_you_mean
+from refgi.scene.light import Falloff
 from refgi.scene.texture.texture import Filter, Wrap
 from refgi.scene.transform import affine
 
@@ -185,11 +186,12 @@ class Spot(Entry):
     inner_half_angle_deg: Number
     outer_half_angle_deg: Number
     intensity_w_per_sr: Triple
+    falloff: Falloff = "smoothstep"
 
     def built(self, name: str) -> model.SpotLight:  # noqa: ARG002
         """Return the light."""
         return model.SpotLight(self.position, self.direction, math.radians(self.inner_half_angle_deg),
-                               math.radians(self.outer_half_angle_deg), self.intensity_w_per_sr)
+                               math.radians(self.outer_half_angle_deg), self.intensity_w_per_sr, self.falloff)
 
 
 class Point(Entry):

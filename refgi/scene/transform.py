@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from refgi.errors import expect
-from refgi.scene.mesh import Mesh, as_float64, missing_normals
+from refgi.scene.mesh import Mesh, as_float64, at_corners, missing_normals
 from refgi.scene.values import Array
 
 IDENTITY = np.eye(4)
@@ -83,7 +83,7 @@ def _moved(mesh: Mesh, matrix: Array, inverse: Array, mirrors: bool) -> Mesh:
         normals = np.where(missing_normals(normals)[:, None], 0.0, normals) @ inverse
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
-    faces, uv = mesh.faces, mesh.uv
+    mesh = dataclasses.replace(mesh, vertices=vertices, normals=normals)
     if mirrors:
-        faces, uv = faces[:, ::-1], None if uv is None else uv[:, ::-1]
-    return dataclasses.replace(mesh, vertices=vertices, faces=faces, normals=normals, uv=uv)
+        return dataclasses.replace(mesh, faces=mesh.faces[:, ::-1], **at_corners(mesh, lambda values: values[:, ::-1]))
+    return mesh

@@ -13,6 +13,7 @@ import numpy as np
 
 from refgi.errors import InputError
 from refgi.scene import Camera, DirectionalLight, Geometry, Light, Scene, SpotLight
+from refgi.scene.mesh import at_corners
 from refgi.scene.motion import rotation_about
 from refgi.scene.values import BRIGHTEST, LARGEST, Array, Vector
 
@@ -154,7 +155,7 @@ def _remeshed(remesh: Callable[[Geometry], Geometry]) -> Callable[[Scene, int, i
 def _permuted(shape: Geometry) -> Geometry:
     order = np.random.default_rng(SHUFFLE).permutation(len(shape.faces))
     return dataclasses.replace(shape, faces=shape.faces[order], material_of_face=shape.material_of_face[order],
-                               uv=None if shape.uv is None else shape.uv[order])
+                               **at_corners(shape, lambda values: values[order]))
 
 
 def _unwelded(shape: Geometry) -> Geometry:
@@ -167,7 +168,7 @@ def _unwelded(shape: Geometry) -> Geometry:
 def _doubled(shape: Geometry) -> Geometry:
     return dataclasses.replace(shape, faces=np.concatenate([shape.faces] * 2),
                                material_of_face=np.concatenate([shape.material_of_face] * 2),
-                               uv=None if shape.uv is None else np.concatenate([shape.uv] * 2))
+                               **at_corners(shape, lambda values: np.concatenate([values] * 2)))
 
 
 def _split(shape: Geometry) -> Geometry:
@@ -179,15 +180,16 @@ def _split(shape: Geometry) -> Geometry:
     def with_middles(values: Array) -> Array:
         return np.concatenate([values, *(0.5 * (values[p] + values[q]) for p, q in ((a, b), (b, c), (c, a)))])
 
-    return Geometry(with_middles(np.asarray(shape.vertices, np.float64)),
-                    np.concatenate([np.stack(quarter, axis=1) for quarter in quarters]).astype(np.int32),
-                    np.concatenate([shape.material_of_face] * 4),
-                    None if shape.vertex_normals is None else with_middles(shape.vertex_normals),
-                    None if shape.uv is None else _split_coordinates(shape.uv), shape.cut_outs)
+    return dataclasses.replace(
+        shape, vertices=with_middles(np.asarray(shape.vertices, np.float64)),
+        faces=np.concatenate([np.stack(quarter, axis=1) for quarter in quarters]).astype(np.int32),
+        material_of_face=np.concatenate([shape.material_of_face] * 4),
+        vertex_normals=None if shape.vertex_normals is None else with_middles(shape.vertex_normals),
+        **at_corners(shape, _split_corners))
 
 
-def _split_coordinates(uv: Array) -> Array:
-    a, b, c = np.moveaxis(uv, 1, 0)
+def _split_corners(values: Array) -> Array:
+    a, b, c = np.moveaxis(values, 1, 0)
     ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
     quarters = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
     return np.concatenate([np.stack(quarter, axis=1) for quarter in quarters])
@@ -218,11 +220,12 @@ def _with_plane(scene: Scene, axis: int, place: float, half: float) -> Scene:
     corners[:, (axis + 2) % 3] += (-half, -half, half, half)
     normals = shape.vertex_normals
     faces = np.array([[0, 1, 2], [0, 2, 3]]) + len(shape.vertices)
-    return dataclasses.replace(scene, geometry=Geometry(
-        np.concatenate([shape.vertices, corners]), np.concatenate([shape.faces, faces]).astype(np.int32),
-        np.append(shape.material_of_face, [0, 0]).astype(np.int32),
-        None if normals is None else np.concatenate([normals, np.tile(np.eye(3)[axis], (4, 1))]),
-        None if shape.uv is None else np.concatenate([shape.uv, np.zeros((2, 3, 2))]), shape.cut_outs))
+    return dataclasses.replace(scene, geometry=dataclasses.replace(
+        shape, vertices=np.concatenate([shape.vertices, corners]),
+        faces=np.concatenate([shape.faces, faces]).astype(np.int32),
+        material_of_face=np.append(shape.material_of_face, [0, 0]).astype(np.int32),
+        vertex_normals=None if normals is None else np.concatenate([normals, np.tile(np.eye(3)[axis], (4, 1))]),
+        **at_corners(shape, lambda values: np.concatenate([values, np.zeros((2, *values.shape[1:]))]))))
 
 
 def _is_hidden(scene: Scene, faces: int, width: int, height: int) -> bool:

@@ -65,7 +65,7 @@ def film(scene: Scene, shape: tuple[int, int], least_exponent: float = MIRROR_EX
     where there is neither, on which no photon lands.
     """
     table = material_table(scene.materials)
-    mirrors = surfaces(scene)._replace(uv=None, textures=None)
+    mirrors = surfaces(scene)._replace(uv=None, textures=None, colours=None)
     mirrors.diffuse[:] = 0
     mirrors.specular[table.exponent < least_exponent] = 0
     if longest == 2:

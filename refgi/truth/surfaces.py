@@ -40,6 +40,7 @@ class Surfaces(NamedTuple):
     exponent: Array  # (k,) float64
     uv: Array | None = None  # (m, 3, 2) float64 texture coordinates, where there are textures
     textures: TextureTable | None = None  # that multiply `diffuse`: `refgi.truth.textured.diffuse_at`
+    colours: Array | None = None  # (m, 3, 3) float64 vertex colours that multiply `diffuse`, where there are some
 
 
 def surfaces(scene: Scene, mirror_exponent: float = math.inf) -> Surfaces:
@@ -56,7 +57,7 @@ def surfaces(scene: Scene, mirror_exponent: float = math.inf) -> Surfaces:
                     np.zeros((0, 3)) if normals is None else np.ascontiguousarray(normals, np.float64),
                     np.ascontiguousarray(geometry.material_of_face, np.int32), table.diffuse, table.specular,
                     table.exponent, None if textured is None else np.ascontiguousarray(geometry.uv, np.float64),
-                    textured)
+                    textured, None if geometry.colours is None else np.ascontiguousarray(geometry.colours))
 
 
 def lights_of(scene: Scene) -> LightTable:

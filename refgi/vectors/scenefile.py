@@ -37,7 +37,8 @@ def _light(light: Any) -> dict[str, Any]:
         return {"type": "spot", "position": list(light.position), "direction": list(light.direction),
                 "inner_half_angle_deg": math.degrees(light.inner_half_angle),
                 "outer_half_angle_deg": math.degrees(light.outer_half_angle),
-                "intensity_w_per_sr": list(light.intensity)}
+                "intensity_w_per_sr": list(light.intensity),
+                **({} if light.falloff == "smoothstep" else {"falloff": light.falloff})}
     if isinstance(light, PointLight):
         return {"type": "point", "position": list(light.position), "intensity_w_per_sr": list(light.intensity)}
     assert isinstance(light, DirectionalLight)

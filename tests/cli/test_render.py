@@ -134,6 +134,7 @@ def test_strict_refuses_what_a_mesh_lacks(tmp_path):
     (["cornell_box", "--light", "point:postion=0,1,0:intensity=1"], ["did you mean 'position'"]),
     (["cornell_box", "--light", "spot:position=0,1,0:target=0,1,0:intensity=1"], ["direction"]),
     (["cornell_box", "--light", "spot:position=0,1,0:target=0,0,0:outer_deg=91:intensity=1"], ["outer_half_angle"]),
+    (["cornell_box", "--light", "spot:position=0,1,0:target=0,0,0:falloff=linear:intensity=1"], ["light: falloff"]),
     (["cornell_box", "--light", "point:position=0,1,0:intensity=many"], ["many"]),
     (["cornell_box", "--set", "lights"], ["key=value"]),
 ])
@@ -239,6 +240,9 @@ def test_a_spot_shines_from_its_position_to_its_target():
     assert light.direction == (0.0, -2.0, -3.0)
     assert light.outer_half_angle == pytest.approx(np.radians(30))
     assert light.inner_half_angle == pytest.approx(np.radians(27))
+    assert light.falloff == "smoothstep"
+    light, = read_lights(["spot:position=1,2,3:target=1,0,0:falloff=squared_ramp:intensity=5"])
+    assert light.falloff == "squared_ramp"
 
 
 def test_a_bare_mesh_gets_a_view_and_says_so(plate, tmp_path):

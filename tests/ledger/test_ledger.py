@@ -325,6 +325,22 @@ def test_a_textured_wall_absorbs_what_its_texels_leave():
     assert rsm.albedo[0][seen].std() > 0.2
 
 
+@pytest.mark.parametrize("falloff", ["smoothstep", "squared_ramp", "ramp"])
+def test_coloured_walls_and_every_falloff_leave_nothing_over(falloff):
+    """What is emitted has a closed form, what is absorbed is the texels' own."""
+    scene = load_scene("cornell_box").with_camera(width=8, height=8)
+    corners = scene.geometry.vertices[scene.geometry.faces]
+    colours = 0.5 + 0.5 * np.sin(9 * corners)
+    light = dataclasses.replace(scene.lights[0], inner_half_angle=0.1, falloff=falloff)
+    frame = Frame(dataclasses.replace(scene, lights=(light,), geometry=dataclasses.replace(
+        scene.geometry, colours=colours)), rsm_resolution=48, dtype=np.float64)
+    terms, rsm = light_terms(frame.rsms[0], frame.scene.geometry, frame.materials), frame.rsms[0]
+    share, seen = texel_shares(rsm.light, rsm.projection), rsm.covered
+    expected = [(share * (1 - rsm.albedo[c]))[seen].sum() * light.intensity[c] for c in range(3)]
+    np.testing.assert_allclose(terms.absorbed, expected, rtol=1e-12)
+    np.testing.assert_allclose(terms.absorbed + terms.reflected + terms.missed, terms.emitted, rtol=1e-6)
+
+
 def test_glass_beside_a_texture_absorbs_nothing():
     scene = room()
     glass = dataclasses.replace(scene, materials=(Material("glass", (0.0, 0.0, 0.0), ior=1.5), scene.materials[1]))

@@ -7,7 +7,7 @@ import numpy as np
 from tests.naive.radiometry import spot_intensity
 
 
-def irradiance(kind, lamp, point, normal):
+def irradiance(kind, lamp, point, normal, falloff="smoothstep"):
     """Return E of a "spot", "point" or "directional" lamp, unblocked; `lamp` holds its arrays by name."""
     if kind == "directional":
         toward = -lamp["direction"] / np.linalg.norm(lamp["direction"])
@@ -18,7 +18,7 @@ def irradiance(kind, lamp, point, normal):
     if kind == "spot":
         axis = lamp["direction"] / np.linalg.norm(lamp["direction"])
         inner, outer = (math.cos(angle) for angle in lamp["half_angles"])
-        intensity = spot_intensity(intensity, axis @ away / far, inner, outer)
+        intensity = spot_intensity(intensity, axis @ away / far, inner, outer, falloff)
     return intensity * max(0.0, -(normal @ away) / far) / far**2
 
 

@@ -75,7 +75,8 @@ def emitted(scene, lamp, s, t):
     direction = around(axis, math.sqrt(1 - cosine**2), t) + cosine * axis
     intensity = np.asarray(lamp.intensity)
     if kind == "SpotLight":
-        intensity = spot_intensity(intensity, cosine, math.cos(lamp.inner_half_angle), math.cos(lamp.outer_half_angle))
+        intensity = spot_intensity(intensity, cosine, math.cos(lamp.inner_half_angle), math.cos(lamp.outer_half_angle),
+                                   lamp.falloff)
     return np.asarray(lamp.position), direction, intensity * 2 * math.pi * cap
 
 

@@ -38,7 +38,8 @@ def one_bounce(vertices, faces, albedo_of_face, light, x, n_x, cells, blocked=Tr
         cos_angle = 1 - (i + 0.5) / cells * (1 - cos_outer)
         sin_angle = math.sqrt(1 - cos_angle**2)
         t = min(1.0, max(0.0, (cos_angle - cos_outer) / (cos_inner - cos_outer))) if cos_inner > cos_outer else 1.0
-        intensity = np.asarray(light.intensity) * t * t * (3 - 2 * t)
+        share = {"smoothstep": t * t * (3 - 2 * t), "squared_ramp": t * t, "ramp": t}[light.falloff]
+        intensity = np.asarray(light.intensity) * share
         for j in range(cells):
             turn = 2 * math.pi * (j + 0.5) / cells
             d = cos_angle * axis + sin_angle * (math.cos(turn) * across + math.sin(turn) * other)

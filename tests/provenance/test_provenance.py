@@ -96,6 +96,9 @@ def test_the_program_is_this_refgi():
 def test_lights_and_cameras_come_back_to_the_bit():
     for light in LIGHTS:
         assert light_from(light_json(light)) == light
+    ramp = SpotLight((0, 1, 0), (0, -1, 0), 0.1, 0.4, (1, 2, 3), "squared_ramp")
+    assert light_from(light_json(ramp)) == ramp
+    assert "falloff" not in light_json(dataclasses.replace(ramp, falloff="smoothstep"))  # records of earlier versions
     camera = Camera((0.1, 0.2, 0.3), (1 / 3, 0.0, 0.0), (0.0, 1.0, 0.1), 0.7000000000000001, 12, 10)
     assert camera_from(plain(camera)) == camera
 

@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError, RefgiWarning
-from refgi.scene import DirectionalLight, PointLight, SpotLight, load_scene
+from refgi.frame import Frame
+from refgi.rsm import direct_irradiance
+from refgi.scene import Camera, DirectionalLight, PointLight, SpotLight, load_scene
 from refgi.scene.gltf import read_gltf
+from refgi.scene.reading import LightUnit
 from tests.scene.samples import BUFFER, FACES, TRIANGLES, glb_bytes, gltf_tree
 
 Edit = Callable[[dict[str, Any]], Any]
@@ -33,7 +36,6 @@ def test_mesh_material_camera_and_light(tmp_path: Path) -> None:
     assert np.array_equal(scene.geometry.vertices, TRIANGLES.astype(np.float64) + np.array([1, 2, 3]))
     assert np.array_equal(scene.geometry.faces, FACES)
     assert scene.materials[0].diffuse == (0.1, 0.2, 0.3)  # as decimal digits in the JSON, not rounded to 8 bits
-    assert scene.materials[0].emission == (4.0, 2.0, 0.0)
     assert (scene.camera.eye, scene.camera.target, scene.camera.vfov) == ((0, 0, 5), (0, 0, 4), 0.7)
     assert (scene.camera.width, scene.camera.height) == (768, 512)
     light = scene.lights[0]
@@ -41,6 +43,57 @@ def test_mesh_material_camera_and_light(tmp_path: Path) -> None:
     assert (light.position, light.direction) == ((0, 0, 4), (0, 0, -1))
     assert (light.inner_half_angle, light.outer_half_angle) == (0.2, 0.5)
     assert light.intensity == (1.0, 0.5, 0.25)  # 683 cd are 1 W/sr
+
+
+def test_a_spot_falls_off_as_the_extension_says(tmp_path: Path) -> None:
+    """KHR_lights_punctual: saturate((cos a - cos o) / (cos i - cos o)) squared, here 2 m above a floor and 683 cd."""
+    path, out = tmp_path / "spot.gltf", math.pi / 4
+    corners = np.array([[-3, 0, -3], [-3, 0, 3], [3, 0, 3], [3, 0, -3]], "<f4")
+    uri = "data:;base64," + base64.b64encode(corners.tobytes() + FACES.tobytes()).decode()
+    lamp = {"type": "spot", "intensity": 683.0, "spot": {}}
+    tree = gltf_tree() | {"materials": [{"pbrMetallicRoughness": {"metallicFactor": 0}}],
+                          "buffers": [{"byteLength": 60, "uri": uri}],
+                          "nodes": [{"mesh": 0}, {"camera": 0, "translation": [0, 0, 5]}, {
+                              "translation": [0, 2, 0], "rotation": [-math.sqrt(0.5), 0, 0, math.sqrt(0.5)],
+                              "extensions": {"KHR_lights_punctual": {"light": 0}}}],
+                          "extensions": {"KHR_lights_punctual": {"lights": [lamp]}}}
+    path.write_text(json.dumps(tree))
+    light, = load_scene(path).lights
+    assert isinstance(light, SpotLight)
+    assert (light.inner_half_angle, light.outer_half_angle, light.intensity) == (0, out, (1, 1, 1))
+    camera = Camera((0, 1.9, 0), (0, 0, 0), (0, 0, -1), math.radians(90), 33, 33)
+    buffer = Frame(load_scene(path, camera=camera), dtype=np.float64).gbuffer
+    got = direct_irradiance(buffer, light)[0][buffer.covered]
+    r = np.hypot(buffer.position[0], buffer.position[2])[buffer.covered]
+    cosine = 2 / np.hypot(r, 2)
+    falloff = np.clip((cosine - math.cos(out)) / (1 - math.cos(out)), 0, 1) ** 2
+    assert r.min() < 1 < 2 < r.max()
+    np.testing.assert_allclose(got, falloff * cosine / (r * r + 4), atol=1e-15)
+
+
+@pytest.mark.parametrize(("unit", "per_watt", "lux"), [
+    ("cd", 683.0, 683.0), ("lm", 683.0 * 4 * math.pi, 683.0), ("W/sr", 1.0, 1.0)])
+def test_the_unit_of_lights_may_be_another(tmp_path: Path, unit: LightUnit, per_watt: float, lux: float) -> None:
+    """1000 W of an isotropic source are 79.577 W/sr; a directional light is in lux or W/m^2."""
+    def edit(tree: dict[str, Any]) -> None:
+        tree["extensions"]["KHR_lights_punctual"]["lights"] = [
+            {"type": "point", "intensity": 79.577}, {"type": "spot", "intensity": 5, "spot": {}},
+            {"type": "directional", "intensity": 3}]
+        tree["nodes"][2]["children"] = [3, 4]
+        tree["nodes"] += [{"extensions": {"KHR_lights_punctual": {"light": k}}} for k in (1, 2)]
+
+    point, spot, sun = load_scene(written(tmp_path, edit), light_unit=unit).lights
+    assert isinstance(point, PointLight)
+    assert isinstance(spot, SpotLight)
+    assert isinstance(sun, DirectionalLight)
+    assert point.intensity[0] == pytest.approx(79.577 / per_watt)
+    assert spot.intensity[0] == pytest.approx(5 / per_watt)
+    assert sun.irradiance[0] == pytest.approx(3 / lux)
+
+
+def test_an_unknown_unit_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="light_unit: expected cd or lm or W/sr, got 'W'"):
+        load_scene(written(tmp_path), light_unit="W")  # type: ignore[arg-type]
 
 
 def test_geometry_equals_trimesh(tmp_path: Path) -> None:
@@ -155,17 +208,15 @@ def test_what_has_no_triangles_is_passed_over_with_a_count(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("key", ["normalTexture", "occlusionTexture"])
-def test_any_other_texture_and_vertex_colours_are_passed_over_with_a_count(tmp_path: Path, key: str) -> None:
+def test_any_other_texture_is_passed_over_with_a_count(tmp_path: Path, key: str) -> None:
     def edit(tree: dict[str, Any]) -> None:
         tree["materials"][0][key] = {"index": 0}
-        tree["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 0
 
     with pytest.warns(RefgiWarning) as said:
         load_scene(written(tmp_path, edit))
-    named = "normal maps (shading normals stay the mesh's)" if key == "normalTexture" else "other textures"
+    named = "normal maps (shading normals stay the mesh's)" if key == "normalTexture" else "occlusionTexture"
     assert {str(warning.message).partition(": ")[2] for warning in said} == {
-        f"1 material(s)' {named} passed over",
-        "1 primitive(s)' vertex colours passed over"}
+        f"1 material(s)' {named} passed over"}
 
 
 def chained(scale: list[float], depth: int = 3) -> Edit:
@@ -210,7 +261,7 @@ def setter(*path: str | int, value: Any) -> Edit:
 @pytest.mark.parametrize(("edit", "key"), [
     (setter("asset", "version", value="1.0"), "asset.version"),
     (setter("asset", value=None), "asset.version"),
-    (setter("extensionsRequired", value=["KHR_draco_mesh_compression"]), "extensionsRequired"),
+    (setter("extensionsRequired", value=["VENDOR_new"]), "extensionsRequired"),
     (setter("scene", value=4), "scene"),
     (setter("scene", value=-1), "scene"),
     (setter("scenes", 0, "nodes", value=[7]), "node"),

@@ -132,7 +132,8 @@ def test_tables() -> None:
     assert table.direction.tolist() == [[0, -1, 0], [0, 0, 0], [1, 0, 0]]
     assert table.position.tolist() == [[1, 2, 3], [7, 8, 9], [0, 0, 0]]
     assert table.intensity.tolist() == [[4, 5, 6], [1, 1, 1], [3, 2, 1]]
-    np.testing.assert_allclose(table.cone[0, ::2], [math.sin(0.4), math.cos(0.4), math.cos(0.2) - math.cos(0.4)])
+    np.testing.assert_allclose(table.cone[0, ::2], [math.sin(0.4), math.cos(0.4), math.cos(0.2) - math.cos(0.4),
+                                                   1])
     assert not table.cone[1:].any()
     materials = material_table([Material(), Material("b", (0, 0, 0), (1, 1, 1), 7.0, 1.5)])
     assert materials.exponent.tolist() == [0, 7]

@@ -100,12 +100,6 @@ def test_textures_that_are_there_are_passed_over_with_a_count(tmp_path: Path) ->
         read_obj(written(tmp_path, "mtllib m.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n"))
 
 
-def test_vertex_colours_are_passed_over_once_with_a_count(tmp_path: Path) -> None:
-    with pytest.warns(RefgiWarning, match="colours of 2 vertices passed over") as said:
-        read_obj(written(tmp_path, SQUARE + "v 0 0 1 0.5 0.5 0.5\nv 0 1 1 0.5 0.5 0.5\nf 1 2 3\nf 4 5 6\n"))
-    assert len(said) == 1
-
-
 def test_normals_belong_to_their_corners_in_every_material(tmp_path: Path) -> None:
     text = SQUARE + ("vn 1 0 0\nvn 0 1 0\nvn 0 0 1\nusemtl a\nf 1//1 2//2 3//3\nusemtl b\nf 1//3 3//2 4//1\n"
                      "vn 0 0 -1\nusemtl a\nf 1//4 2//4 4//4\n")

@@ -87,16 +87,3 @@ def test_a_bare_mesh_is_framed_and_lit(tmp_path: Path) -> None:
     for vertex in scene.geometry.vertices:
         towards = vertex - np.array(light.position)
         assert np.arccos(towards @ axis / np.linalg.norm(towards)) < light.inner_half_angle
-
-
-def test_colours_are_passed_over_once_with_a_count(tmp_path: Path) -> None:
-    text = ply_bytes(text=True).replace(b"property float z\n", b"property float z\nproperty uchar red\n"
-                                        b"property uchar green\nproperty uchar blue\n")
-    head, _, rows = text.partition(b"end_header\n")
-    lines = rows.splitlines()
-    rows = b"\n".join([line + b" 255 0 0" for line in lines[:4]] + lines[4:]) + b"\n"
-    with pytest.warns(RefgiWarning) as said:
-        mesh = read_ply(written(tmp_path, head + b"end_header\n" + rows)).meshes[0]
-    assert np.array_equal(mesh.vertices, TRIANGLES)
-    assert [str(warning.message) for warning in said] == [
-        f"{tmp_path / 'square.ply'}: colours of 4 vertices (red, green, blue) passed over"]

@@ -42,10 +42,12 @@ def test_every_value_arrives(tmp_path: Path) -> None:
 
 
 def test_several_lights_of_each_kind(tmp_path: Path) -> None:
-    lights = [*SCENE["lights"], {"type": "point", "position": [1, 2, 3], "intensity_w_per_sr": [4, 5, 6]},
+    lights = [*SCENE["lights"], SCENE["lights"][0] | {"falloff": "squared_ramp"},
+              {"type": "point", "position": [1, 2, 3], "intensity_w_per_sr": [4, 5, 6]},
               {"type": "directional", "direction": [0, -2, 0], "irradiance_w_per_m2": [7, 8, 9]}]
     scene = load_scene(write_scene(tmp_path, lights=lights))
-    assert scene.lights[1:] == (PointLight((1, 2, 3), (4, 5, 6)), DirectionalLight((0, -2, 0), (7, 8, 9)))
+    assert [light.falloff for light in scene.lights[:2]] == ["smoothstep", "squared_ramp"]
+    assert scene.lights[2:] == (PointLight((1, 2, 3), (4, 5, 6)), DirectionalLight((0, -2, 0), (7, 8, 9)))
 
 
 def test_material_by_name_inline_or_from_the_mesh(tmp_path: Path) -> None:
@@ -106,6 +108,7 @@ def test_normals_that_nobody_asks_for_are_noted(said: dict[str, bool], noted: bo
     (changed("camera", "up", value=[0, 0, 1]), "up", "(0.0, 0.0, 1.0)"),
     (changed("lights", 0, "outer_half_angle_deg", value=0), "outer_half_angle_deg", "0"),
     (changed("lights", 0, "outer_half_angle_deg", value=90.001), "lights[0]: outer_half_angle_deg", "90.001"),
+    (changed("lights", 0, "falloff", value="linear"), "lights[0].falloff", "'linear'"),
     (changed("lights", 0, "inner_half_angle_deg", value=31), "inner_half_angle_deg", "31"),
     (changed("lights", 0, "direction", value=[0, 0, 0]), "direction", "(0.0, 0.0, 0.0)"),
     (changed("lights", 0, "intensity_w_per_sr", value=[1, -1, 1]), "intensity_w_per_sr", "-1"),

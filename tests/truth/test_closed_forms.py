@@ -156,9 +156,9 @@ def test_estimators_agree_without_visibility(evidence):
     assert agree(corner_room(spot), evidence, "visibility=False", visibility=False) < SIGMAS + 1
 
 
-@pytest.mark.parametrize("blocked", [True, False])
-def test_the_naive_twin(blocked, evidence):
-    spot = SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.3, 0.6, (2.0, 1.5, 1.0))
+@pytest.mark.parametrize(("blocked", "falloff"), [(True, "smoothstep"), (False, "smoothstep"), (True, "squared_ramp")])
+def test_the_naive_twin(blocked, falloff, evidence):
+    spot = SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.3, 0.6, (2.0, 1.5, 1.0), falloff)
     room = corner_room(spot)
     points, normals, triangles = receivers_in_corner(4)
     albedo = np.array([m.diffuse for m in room.materials])[room.geometry.material_of_face]
@@ -168,7 +168,7 @@ def test_the_naive_twin(blocked, evidence):
         result = at(room, [x], [n], TruthSettings(samples=480, visibility=blocked), triangle=triangle, repeat=64)
         worst = max(worst, np.abs(result.picture_mean / expected - 1).max())
     assert worst < 0.01  # the midpoint rule of the twin: 72 cells a side leave about 0.5 % at edges (48: 1.5 %)
-    evidence(f"visibility={blocked}: within {worst:.1e} of the twin")
+    evidence(f"visibility={blocked}, {falloff}: within {worst:.1e} of the twin")
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)

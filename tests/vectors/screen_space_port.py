@@ -72,7 +72,8 @@ def irradiance(case, arrays, _):
     for lamp, values in lamps(arrays).items():
         for at in pixels(arrays):
             if arrays[f"shadow{lamp[5:]}.visible"][at]:
-                light[:, *at] += direct.irradiance(case.facts[lamp], values, position[:, *at], normal[:, *at])
+                light[:, *at] += direct.irradiance(case.facts[lamp], values, position[:, *at], normal[:, *at],
+                                                   case.facts.get(f"{lamp}.falloff", "smoothstep"))
     return {"direct.irradiance": light}
 
 

@@ -21,7 +21,7 @@ static vec3 times(const float *reflectance, const float *power, float measure) {
 void flux_stage(Case *c, int number) {
     char name[16] = {'r', 's', 'm', (char)('0' + number), 0};
     const char *lamp = fact(c, "light%d", number);
-    int spot = json_is(lamp, "spot"), glossy = has(c, "%s.lobe_flux", name);
+    int spot = json_is(lamp, "spot"), squared = json_is(fact(c, "light%d.falloff", number), "squared_ramp"), glossy = has(c, "%s.lobe_flux", name);
     View v = view_of(c, name);
     const int *id = get(c, "%s.triangle_id", name)->i, *material = get(c, "scene.material_of_face")->i;
     const float *power = get(c, json_is(lamp, "directional") ? "light%d.irradiance" : "light%d.intensity", number)->f;
@@ -40,7 +40,7 @@ void flux_stage(Case *c, int number) {
         float y1 = (2.0f * (float)(row + 1) / (float)v.rows - 1.0f) * v.half[1];
         angle[k] = v.kind == ORTHOGRAPHIC ? dx * dy : rectangle_angle(x0, x1, y0, y1, dx * dy);
         if (id[k] < 0) continue;
-        float measure = spot ? spot_integral(x0, x1, y0, y1, cone[0], cone[1]) : angle[k];
+        float measure = spot ? spot_integral(x0, x1, y0, y1, cone[0], cone[1], squared) : angle[k];
         int m = material[id[k]];
         put3(flux, count, k, times(get(c, "materials.diffuse")->f + 3 * m, power, measure));
         if (!glossy) continue;

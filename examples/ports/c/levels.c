@@ -2,14 +2,15 @@
 #include "json.h"
 #include "stages.h"
 
-/* Smoothstep of a spot; the difference of cosines as one of tangents, which keeps its digits in float32. */
-static float spot_share(vec3 axis, vec3 to_point, float inner, float outer) {
+/* Smoothstep or squared ramp of a spot; the difference of cosines as one of tangents, which keeps its digits in float32. */
+static float spot_share(vec3 axis, vec3 to_point, float inner, float outer, int squared) {
     float along = dot(axis, to_point) / length(axis), tangent, limit = tanf(outer), cosine = cosf(outer);
     if (along <= 0.0f) return 0.0f;
     tangent = length(cross(axis, to_point)) / (length(axis) * along);
     float square = 1.0f + tangent * tangent, width = 2.0f * sinf(0.5f * (outer - inner)) * sinf(0.5f * (outer + inner));
     float t = (limit - tangent) * (limit + tangent) * cosine * cosine / (square * (1.0f / sqrtf(square) + cosine) * width);
     t = clampf(t, 0.0f, 1.0f);
+    if (squared) return t * t;
     return t * t * (3.0f - 2.0f * t);
 }
 
@@ -19,6 +20,7 @@ void direct_stage(Case *c) {
     float *out = make(c, "direct.irradiance")->f;
     for (int lamp = 0; fact(c, "light%d", lamp); lamp++) {
         const char *kind = fact(c, "light%d", lamp);
+        int squared = json_is(fact(c, "light%d.falloff", lamp), "squared_ramp");
         int spot = json_is(kind, "spot"), far = json_is(kind, "directional");
         const int *visible = get(c, "shadow%d.visible", lamp)->i;
         const float *power = get(c, far ? "light%d.irradiance" : "light%d.intensity", lamp)->f;
@@ -30,7 +32,7 @@ void direct_stage(Case *c) {
             vec3 d = far ? axis : sub(plane3(position, id->size, k), place);
             float square = dot(d, d), cosine = -dot(plane3(normal, id->size, k), d) / sqrtf(square);
             if (cosine <= 0.0f) continue;
-            float share = (spot ? spot_share(axis, d, cone[0], cone[1]) : 1.0f) * cosine / (far ? 1.0f : square);
+            float share = (spot ? spot_share(axis, d, cone[0], cone[1], squared) : 1.0f) * cosine / (far ? 1.0f : square);
             put3(out, id->size, k, add(plane3(out, id->size, k), scale(row3(power), share)));
         }
     }

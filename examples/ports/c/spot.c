@@ -7,14 +7,15 @@ static const float NODE[NODES / 2] = {0.0950125098f, 0.2816035508f, 0.4580167777
 static const float WEIGHT[NODES / 2] = {0.1894506105f, 0.1826034150f, 0.1691565194f, 0.1495959888f,
                                         0.1246289713f, 0.0951585117f, 0.0622535239f, 0.0271524594f};
 
-typedef struct { float x, cos_outer, scale, radius[2]; } Cone;
+typedef struct { float x, cos_outer, scale, radius[2]; int squared; } Cone;
 
-/* Smoothstep between the cones (docs/conventions) times the density of solid angle. The difference of cosines that it
+/* Smoothstep or squared ramp between the cones (docs/conventions) times the density of solid angle. The difference of cosines that it
    needs is taken from tangents, cos a - cos o = (tan^2 o - tan^2 a) cos^2 a cos^2 o / (cos a + cos o): no digits go. */
 static float density(const Cone *s, float y) {
     float tangent = s->x * s->x + y * y, square = 1.0f + tangent, root = sqrtf(square);
     float t = (s->radius[1] * s->radius[1] - tangent) / (square * (1.0f / root + s->cos_outer)) * s->scale;
     t = clampf(t, 0.0f, 1.0f);
+    if (s->squared) return t * t / (square * root);
     return t * t * (3.0f - 2.0f * t) / (square * root);
 }
 
@@ -55,9 +56,9 @@ static float column_integral(Cone *s, float x, float y0, float y1) {
 }
 
 /* Both directions are cut where the cones' circles cross, so that each piece is smooth. */
-float spot_integral(float x0, float x1, float y0, float y1, float inner, float outer) {
+float spot_integral(float x0, float x1, float y0, float y1, float inner, float outer, int squared) {
     float width = 2.0f * sinf(0.5f * (outer - inner)) * sinf(0.5f * (outer + inner)), cosine = cosf(outer);
-    Cone s = {0, cosine, cosine * cosine / width, {tanf(inner), tanf(outer)}};
+    Cone s = {0, cosine, cosine * cosine / width, {tanf(inner), tanf(outer)}, squared};
     float at[16] = {x0, x1}, total = 0.0f, edge[3] = {0.0f, y0, y1};
     int n = 2;
     for (int k = 0; k < 2; k++)

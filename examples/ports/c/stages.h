@@ -70,7 +70,7 @@ void hard_stage(Case *c);                                          /* pcf.c */
 void pcf_stage(Case *c);
 void facing_stage(Case *c);
 
-float spot_integral(float x0, float x1, float y0, float y1, float inner, float outer); /* spot.c */
+float spot_integral(float x0, float x1, float y0, float y1, float inner, float outer, int squared); /* spot.c */
 float lobe_norm(vec3 normal, vec3 axis, float exponent);                               /* lobes.c */
 float lobe_shape(vec3 axis, vec3 direction, float exponent);
 

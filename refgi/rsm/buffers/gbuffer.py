@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, resolve_at, resolve_materials
+from refgi.rsm.buffers.colours import tint
 from refgi.rsm.buffers.facing import facing_normals
 from refgi.rsm.buffers.surfaces import Surface
 from refgi.rsm.buffers.textures import paint
@@ -196,6 +197,7 @@ class GBuffer:
             channels = ChannelMask(*(name in missing for name in ChannelMask._fields))
             resolve_at(surface, self.projection, self.visibility.triangle_id, texel, channels, planes, allocate(1, 1))
             paint(self._geometry, self._materials, self.projection, self.visibility.triangle_id, planes.albedo, texel)
+            tint(self._geometry, self.projection, self.visibility.triangle_id, planes.albedo, texel)
             computed = {name: getattr(planes, name)[..., 0, :] for name in missing}
         return tuple(computed[n] if n in computed else values_at(self.resolve(n)[0], texel) for n in names)
 
@@ -286,6 +288,7 @@ def _resolve(
     else:
         resolve(surface, projection, triangle_id, channels, planes, allocate(numba.get_num_threads()))
     paint(geometry, materials, projection, triangle_id, planes.albedo)
+    tint(geometry, projection, triangle_id, planes.albedo)
     return {name: getattr(planes, name) for name in names}
 
 

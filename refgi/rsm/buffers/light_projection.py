@@ -97,11 +97,12 @@ def texel_shares(
     if isinstance(light, SpotLight):
         angles = light.inner_half_angle, light.outer_half_angle
         if maps.maps == 1:
-            return spot_power(maps, *angles) if texel is None else spot_power_at(maps, *angles, texel)
+            return spot_power(maps, *angles, light.falloff) if texel is None else spot_power_at(
+                maps, *angles, texel, light.falloff)
     share = texel_solid_angles(maps) if solid_angle is None else solid_angle
     if isinstance(light, SpotLight):
         axis = np.asarray(light.direction) / np.linalg.norm(light.direction)
-        share = share * sampled_spot_share(maps, axis, *angles)
+        share = share * sampled_spot_share(maps, axis, *angles, light.falloff)
     return share if texel is None else share.reshape(-1)[texel]
 
 

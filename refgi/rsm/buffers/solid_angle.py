@@ -26,7 +26,7 @@ from refgi.radiometry import (
     spot_falloff,
 )
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
-from refgi.scene.light import cone_row
+from refgi.scene.light import SHAPES, Falloff, cone_row
 from refgi.stages import stage
 
 Array = npt.NDArray[Any]
@@ -49,6 +49,8 @@ class Circles(NamedTuple):
     inner: float  # radius of full intensity
     outer: float  # radius beyond which there is none
     span: float  # cosine of the inner half-angle minus that of the outer
+    bend: float = 1.0  # of `smooth_edge`, as `linear`
+    linear: float = 0.0
 
 
 def texel_solid_angles(projection: Projection) -> Array:
@@ -76,25 +78,28 @@ def texel_solid_angles_at(projection: Projection, texel: Array) -> Array:
     return _integrals_at(projection, Circles(math.inf, math.inf, 0.0), texel)
 
 
-def spot_power(projection: Projection, inner: float, outer: float) -> Array:
+def spot_power(projection: Projection, inner: float, outer: float, falloff: Falloff = "smoothstep") -> Array:
     """Return the integral of a spot's falloff over every texel of one map that looks along the spot's axis.
 
     `projection`: a perspective or paraboloid map. `inner`, `outer`: the spot's half-angles, rad. Returns (H, W): sr,
-    float64: the texel's power is this times the on-axis intensity. Sums to 2 pi (1 - (cos inner + cos outer)/2) when
-    the map encloses the cone.
+    float64: the texel's power is this times the on-axis intensity. When the map encloses the cone, it sums to
+    2 pi (1 - cos inner + m (cos inner - cos outer)), m of `refgi.scene.light.MEANS`.
     """
-    return _stacked(projection, _texel_integrals(_intrinsics(projection), _circles(projection.kind, inner, outer)))
+    circles = _circles(projection.kind, inner, outer, falloff)
+    return _stacked(projection, _texel_integrals(_intrinsics(projection), circles))
 
 
-def spot_power_at(projection: Projection, inner: float, outer: float, texel: Array) -> Array:
+def spot_power_at(
+    projection: Projection, inner: float, outer: float, texel: Array, falloff: Falloff = "smoothstep"
+) -> Array:
     """Return what `spot_power` gives at some texels.
 
     `projection`: a perspective or paraboloid map. `inner`, `outer`: the spot's half-angles, rad. `texel` (n,) int:
     texels of the flattened map. Returns (n,): sr, float64.
     """
     if projection.kind == PARABOLOID:  # whose rim texels hold what their neighbours give them
-        return spot_power(projection, inner, outer).reshape(-1)[texel]
-    return _integrals_at(projection, _circles(projection.kind, inner, outer), texel)
+        return spot_power(projection, inner, outer, falloff).reshape(-1)[texel]
+    return _integrals_at(projection, _circles(projection.kind, inner, outer, falloff), texel)
 
 
 def _integrals_at(projection: Projection, spot: Circles, texel: Array) -> Array:
@@ -108,10 +113,10 @@ def _intrinsics(projection: Projection) -> Projection:
     return projection._replace(origin=np.zeros((1, 3)), frame=np.eye(3)[None], reach=math.inf)
 
 
-def _circles(kind: int, inner: float, outer: float) -> Circles:
+def _circles(kind: int, inner: float, outer: float, falloff: Falloff) -> Circles:
     part = 0.5 if kind == PARABOLOID else 1.0
     span = 2.0 * math.sin((outer + inner) / 2) * math.sin((outer - inner) / 2)
-    return Circles(math.tan(part * inner), math.tan(part * outer), span)
+    return Circles(math.tan(part * inner), math.tan(part * outer), span, *SHAPES[falloff])
 
 
 def _stacked(projection: Projection, one: Array) -> Array:
@@ -279,7 +284,7 @@ def _falloff_strip(kind: int, x: float, y0: float, y1: float, spot: Circles) -> 
             else:
                 root = math.sqrt(square)
                 density, above = 1.0 / (root * square), inside / (root * root_edge * (root + root_edge))
-            total += FEW_WEIGHTS[node] * density * smooth_edge(above, spot.span)
+            total += FEW_WEIGHTS[node] * density * smooth_edge(above, spot.span, spot.bend, spot.linear)
     return total * (y1 - y0)
 
 
@@ -304,14 +309,16 @@ def _beyond(i: int, j: int, shift: float, step: float) -> bool:
     return x * x + y * y > 1.0
 
 
-def sampled_spot_share(projection: Projection, axis: Array, inner: float, outer: float) -> Array:
+def sampled_spot_share(
+    projection: Projection, axis: Array, inner: float, outer: float, falloff: Falloff = "smoothstep"
+) -> Array:
     """Return the mean falloff of a spot over each texel of maps that do not look along its axis.
 
     `projection`: perspective maps, such as the faces of a cube. `axis` (3,): unit vector along the spot. `inner`,
     `outer`: the spot's half-angles, rad. Returns (H, W): 0 to 1, float64, from 4 x 4 samples a texel.
     """
     share = np.empty(projection.shape)
-    _sample_spot(projection, np.asarray(axis, np.float64), cone_row(inner, outer), share)
+    _sample_spot(projection, np.asarray(axis, np.float64), cone_row(inner, outer, falloff), share)
     return share
 
 

@@ -12,13 +12,10 @@ from typing import Any
 
 from refgi.errors import InputError, expect, shortened
 from refgi.scene.files import expect_utf8, read_bytes
+from refgi.scene.gltf.extensions import MESHOPT, READABLE, packed
 
 MAGIC = b"glTF"
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
-# Nothing else that is required by a file can be passed over without drawing something wrong.
-READABLE_EXTENSIONS = {"EXT_mesh_gpu_instancing",
-                       "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_mesh_quantization",
-                       "KHR_materials_ior", "KHR_materials_unlit", "KHR_texture_transform"}
 
 
 class Document:
@@ -114,6 +111,10 @@ class Document:
         length = self.integer(entry, "byteLength", where)
         uri = entry.get("uri")
         if uri is None:
+            extensions = self.member(entry, "extensions", where)
+            for name in MESHOPT:
+                if self.member(extensions, name, where).get("fallback") is True:
+                    raise packed(f"{self.path}: {where}", "meshopt-compressed meshes", name)
             expect(index == 0 and self._chunk is not None, f"{self.path}: {where}.uri", "a uri or a GLB chunk", None)
             content = self._chunk or b""
         else:
@@ -178,8 +179,8 @@ def _parsed(text: bytes, path: Path) -> dict[str, Any]:
     required = tree.get("extensionsRequired", [])
     expect(isinstance(required, list) and all(isinstance(name, str) for name in required),
            f"{path}: extensionsRequired", "a list of strings", required)
-    unknown = sorted(set(required) - READABLE_EXTENSIONS)
-    expect(not unknown, f"{path}: extensionsRequired", f"only {', '.join(sorted(READABLE_EXTENSIONS))}", unknown)
+    unknown = sorted(set(required) - READABLE)
+    expect(not unknown, f"{path}: extensionsRequired", "extensions that are read or change no light", unknown)
     return tree  # type: ignore[no-any-return]
 
 

@@ -3,9 +3,9 @@
 KHR_lights_punctual lights and cameras of a glTF document, placed by their node.
 
 glTF measures spot and point lights in candela (lm/sr) and directional lights in lux (lm/m^2). They become W/sr and
-W/m^2 by the luminous efficacy that defines the candela, 683 lm/W, the factor that exporters use as well. `range` is
-ignored (light falls with the square of the distance). Between its two cone angles a glTF spot falls with the square of
-a linear ramp in the cosine, ours with the smoothstep of `SpotLight`; inside and outside they agree.
+W/m^2 by the luminous efficacy that defines the candela, 683 lm/W, the factor that exporters use as well, unless another
+unit is asked for. `range` is
+ignored (light falls with the square of the distance). Between its cone angles a spot has the extension's falloff.
 """
 
 import math
@@ -16,11 +16,11 @@ import numpy as np
 from refgi.errors import InputError, expect
 from refgi.scene.gltf.container import Document
 from refgi.scene.model import Camera, DirectionalLight, Light, PointLight, SpotLight
+from refgi.scene.reading import per_watt
 from refgi.scene.transform import expect_affine, invertible
 from refgi.scene.values import Array, Vector
 
 NO_MATRIX = tuple(np.eye(4).ravel().tolist())
-LUMEN_PER_WATT = 683.0
 EXTENSION = "KHR_lights_punctual"
 ROUNDING = 1e-6  # rad; a float32 near pi / 2 is within 6e-8, and written with 7 digits within 5e-7
 PICTURE_HEIGHT = 512  # pixels; a glTF camera has an aspect ratio only
@@ -165,10 +165,10 @@ def node_light(document: Document, node: dict[str, Any], matrix: Array, where: s
 
 def _light(document: Document, entry: dict[str, Any], matrix: Array, where: str) -> Light:
     colour = document.numbers(entry, "color", where, (1.0, 1.0, 1.0))
-    power = document.number(entry, "intensity", where, 1.0) / LUMEN_PER_WATT
+    kind = entry.get("type")
+    power = document.number(entry, "intensity", where, 1.0) / per_watt(directional=kind == "directional")
     intensity = (colour[0] * power, colour[1] * power, colour[2] * power)
     position, direction = _vector(matrix[:3, 3]), _vector(-_unit(matrix[:3, 2]))
-    kind = entry.get("type")
     if kind == "directional":
         return DirectionalLight(direction, intensity)
     if kind == "point":
@@ -177,7 +177,7 @@ def _light(document: Document, entry: dict[str, Any], matrix: Array, where: str)
     cone = document.member(entry, "spot", where)
     inner = document.number(cone, "innerConeAngle", f"{where}.spot", 0.0)
     outer = document.number(cone, "outerConeAngle", f"{where}.spot", math.pi / 4)
-    return SpotLight(position, direction, _not_over_flat(inner), _not_over_flat(outer), intensity)
+    return SpotLight(position, direction, _not_over_flat(inner), _not_over_flat(outer), intensity, "squared_ramp")
 
 
 def _not_over_flat(angle: float) -> float:

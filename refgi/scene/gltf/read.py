@@ -17,16 +17,19 @@ from refgi.scene.files import Contents
 from refgi.scene.gltf.accessors import accessor
 from refgi.scene.gltf.container import Document
 from refgi.scene.gltf.deform import Deformer, Pose, pose_of
+from refgi.scene.gltf.extensions import DRACO, packed, unread
 from refgi.scene.gltf.instances import instances
+from refgi.scene.gltf.materials import UNPAINTED, read_material
+from refgi.scene.gltf.nodes import EXTENSION as LIGHTS
 from refgi.scene.gltf.nodes import node_camera, node_light, scene_nodes
 from refgi.scene.gltf.textures import Look, base_colour, emissive, transformed
 from refgi.scene.mesh import as_float64, expect_memory
-from refgi.scene.model import Array, Camera, Light, Material, Mesh, Rgb
+from refgi.scene.model import Array, Camera, Light, Material, Mesh
 from refgi.scene.transform import IDENTITY, invertible, transformed_all
+from refgi.scene.vertexcolours import factors
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
-CUTOFF = 0.5  # glTF's default of alphaCutoff
-READ = ("baseColorTexture", "emissiveTexture", "normalTexture")  # or named apart among what is passed over
+COLOURS = "COLOR_0"
 
 
 def read_gltf(path: Path) -> Contents:
@@ -60,9 +63,9 @@ class _Reader:
         self.vertices = self.faces = 0
         self.cameras: list[Camera] = []
         self.lights: list[Light] = []
-        self.passed_over: dict[str, int] = {}
-        self.blended = 0  # materials
-        self.materials: list[Material] = [self._material(index) for index in range(len(document.items("materials")))]
+        self.counts: dict[str, int] = {}  # of what is not as the file has it, by the text that says so
+        self.materials: list[Material] = [read_material(document, index, self._say)
+                                          for index in range(len(document.items("materials")))]
         self._looks: dict[int, Look | None] = {}
         self._shapes: dict[tuple[int, Pose], list[Mesh]] = {}
         self._nodes = scene_nodes(document)
@@ -80,11 +83,9 @@ class _Reader:
                 shapes += found * len(placed)
                 matrices += [matrix for matrix in placed for _ in found]
             self._view_and_light(node, self._nodes.world[k], where)
-        for what, count in self.passed_over.items():
-            warnings.warn(RefgiWarning(f"{self.path}: {count} {what} passed over"), stacklevel=4)
-        if self.blended:
-            text = f"material(s) of alphaMode BLEND taken as MASK with a cutoff of {CUTOFF}: no partial transparency"
-            warnings.warn(RefgiWarning(f"{self.path}: {self.blended} {text}"), stacklevel=4)
+        self._pass_over_the_rest()
+        for text, count in self.counts.items():
+            warnings.warn(RefgiWarning(f"{self.path}: {count} {text}"), stacklevel=4)
         meshes = transformed_all(shapes, np.array(matrices)) if shapes else []
         return Contents(tuple(meshes), tuple(self.cameras), tuple(self.lights))
 
@@ -139,9 +140,12 @@ class _Reader:
             return None
         attributes = self.document.member(entry, "attributes", where)
         expect("POSITION" in attributes, f"{self.path}: {where}.attributes", "a POSITION", sorted(attributes))
+        if DRACO in self.document.member(entry, "extensions", where) and "bufferView" not in self.document.item(
+                "accessors", attributes["POSITION"], f"{where}.attributes.POSITION"):
+            raise packed(f"{self.path}: {where}", "Draco-compressed meshes", DRACO)
         vertices = accessor(self.document, attributes["POSITION"], "VEC3", f"{where}.attributes.POSITION")
-        if any(key.startswith("COLOR_") for key in attributes):
-            self._pass_over("primitive(s)' vertex colours")
+        if any(key.startswith("COLOR_") and key != COLOURS for key in attributes):
+            self._pass_over("primitive(s)' further vertex colours (COLOR_1 ...)")
         normals = None
         if "NORMAL" in attributes:
             normals = accessor(self.document, attributes["NORMAL"], "VEC3", f"{where}.attributes.NORMAL")
@@ -155,7 +159,23 @@ class _Reader:
         material, look = self._material_of(entry, where)
         mesh = Mesh(vertices, _triangles(corners, mode, f"{self.path}: {where}"), normals, material, name)
         mesh.expect_sound(f"{self.path}: {where}")
+        if COLOURS in attributes:
+            mesh = dataclasses.replace(mesh, colours=self._colours(mesh, attributes[COLOURS], where))
         return self._with_coordinates(mesh, attributes, look, where)
+
+    def _colours(self, mesh: Mesh, index: Any, where: str) -> Array | None:
+        """Return the colours of a mesh's corners, linear as the file has them; alpha counts for nothing."""
+        where = f"{where}.attributes.{COLOURS}"
+        kind = self.document.item("accessors", index, where).get("type")
+        values = accessor(self.document, index, kind if kind in ("VEC3", "VEC4") else "VEC3", where)
+        if values.dtype.kind in "iu":  # whole numbers without `normalized`
+            values = values / np.iinfo(values.dtype).max
+        expect(len(values) == len(mesh.vertices), f"{self.path}: {where}",
+               f"{len(mesh.vertices)} elements as POSITION", len(values))
+        if mesh.material.cutoff is not None and values.shape[1] == 4 and values[:, 3].min(initial=1) < 1:
+            self._pass_over("primitive(s)' alpha of vertex colours")
+        found = factors(values[:, :3], f"{self.path}: {where}")
+        return None if found is None else found[mesh.faces]
 
     def _with_coordinates(self, mesh: Mesh, attributes: dict[str, Any], look: Look | None, where: str) -> Mesh:
         """Return the mesh with the texture coordinates that its material asks for, or without texture."""
@@ -186,11 +206,12 @@ class _Reader:
     def _material_of(self, entry: dict[str, Any], where: str) -> tuple[Material, Look | None]:
         """Return a primitive's material and how its texture lies on it, the image decoded when first asked for."""
         if "material" not in entry:
-            return Material(), None
+            return UNPAINTED, None
         index = entry["material"]
         found = self.document.item("materials", index, f"{where}.material")
         if index not in self._looks:
-            look = base_colour(self.document, found, f"materials[{index}]")
+            clear = self.materials[index].is_dielectric
+            look = None if clear else base_colour(self.document, found, f"materials[{index}]")
             glows = any(self.materials[index].emission)
             shining = emissive(self.document, found, f"materials[{index}]") if glows else None
             if look is not None:
@@ -202,40 +223,24 @@ class _Reader:
                 self.materials[index] = dataclasses.replace(self.materials[index], emission_texture=shining.texture)
         return self.materials[index], self._looks[index]
 
-    def _material(self, index: int) -> Material:
-        entry, where = self.document.items("materials")[index], f"materials[{index}]"
-        surface = self.document.member(entry, "pbrMetallicRoughness", where)
-        if "normalTexture" in entry:
-            self._pass_over("material(s)' normal maps (shading normals stay the mesh's)")
-        if any(key.endswith("Texture") and key not in READ for key in (*surface, *entry)):
-            self._pass_over("material(s)' other textures")
-        base = self.document.numbers(surface, "baseColorFactor", f"{where}.pbrMetallicRoughness", (1.0,) * 4)
-        emissive = self.document.numbers(entry, "emissiveFactor", where, (0.0, 0.0, 0.0))
-        key = "KHR_materials_emissive_strength"
-        extension = self.document.member(self.document.member(entry, "extensions", where), key, where)
-        strength = self.document.number(extension, "emissiveStrength", f"{where}.extensions.{key}", 1.0)
-        emission: Rgb = (emissive[0] * strength, emissive[1] * strength, emissive[2] * strength)
-        cutoff = self._cutoff(entry, where)
-        try:
-            return Material(self.document.name(entry, where), (base[0], base[1], base[2]), emission=emission,
-                            alpha=1.0 if cutoff is None else base[3], cutoff=cutoff)
-        except InputError as error:
-            raise InputError(f"{self.path}: {where}: {error}") from error
-
-    def _cutoff(self, entry: dict[str, Any], where: str) -> float | None:
-        """Return from which alpha on a material is there, None where it is there everywhere."""
-        mode = entry.get("alphaMode", "OPAQUE")
-        expect(mode in ("OPAQUE", "MASK", "BLEND"), f"{self.path}: {where}.alphaMode", "OPAQUE, MASK or BLEND", mode)
-        if mode == "OPAQUE":
-            return None
-        if mode == "BLEND":
-            self.blended += 1
-            return CUTOFF
-        return self.document.number(entry, "alphaCutoff", where, CUTOFF)
+    def _pass_over_the_rest(self) -> None:
+        """Count what the document has and no part of the reader looks at."""
+        tree = self.document.tree
+        self._pass_over("animation(s)", len(self.document.items("animations")))
+        self._pass_over("scene(s) beside the first or default one", len(self.document.items("scenes")) - 1)
+        punctual = self.document.member(self.document.member(tree, "extensions", ""), LIGHTS, "extensions")
+        lights = punctual.get("lights", [])
+        self._pass_over("light(s)' range (light falls with the square of the distance)", sum(
+            isinstance(light, dict) and "range" in light for light in (lights if isinstance(lights, list) else ())))
+        for name, count in unread(tree):
+            self._pass_over(f"use(s) of the extension {name}", count)
 
     def _pass_over(self, what: str, count: int = 1) -> None:
-        if count:
-            self.passed_over[what] = self.passed_over.get(what, 0) + count
+        self._say(f"{what} passed over", count)
+
+    def _say(self, text: str, count: int = 1) -> None:
+        if count > 0:
+            self.counts[text] = self.counts.get(text, 0) + count
 
 
 def _triangles(corners: Array, mode: int, where: str) -> Array:

@@ -10,6 +10,8 @@ import numpy as np
 
 from refgi.errors import InputError, expect, shortened
 from refgi.scene.gltf.container import Document
+from refgi.scene.gltf.extensions import IMAGES, packed
+from refgi.scene.gltf.materials import GLOSSY
 from refgi.scene.texture.image import Image, decoded
 from refgi.scene.texture.texture import Filter, Texture, Wrap
 from refgi.scene.values import Array
@@ -38,6 +40,10 @@ def base_colour(document: Document, material: dict[str, Any], where: str) -> Loo
 
     Raises `InputError` that names file and image if it cannot be read.
     """
+    extensions = document.member(material, "extensions", where)
+    if GLOSSY in extensions:
+        glossy = document.member(extensions, GLOSSY, where)
+        return _look(document, glossy, "diffuseTexture", f"{where}.extensions.{GLOSSY}")
     surface = document.member(material, "pbrMetallicRoughness", where)
     return _look(document, surface, "baseColorTexture", f"{where}.pbrMetallicRoughness")
 
@@ -85,7 +91,11 @@ def _texture(document: Document, info: dict[str, Any], where: str) -> Texture:
         wrap = WRAPS[across], WRAPS[down]
         chosen = FILTERS[_code(document, sampler, "minFilter", key, FILTERS, 9987)]
     if "source" not in entry:
-        extensions = ", ".join(document.member(entry, "extensions", where)) or "none"
+        found = document.member(entry, "extensions", where)
+        for name, form in IMAGES.items():
+            if name in found:
+                raise packed(f"{document.path}: {where}.source", f"{form} images", name)
+        extensions = ", ".join(found) or "none"
         raise InputError(f"{document.path}: {where}.source: expected a PNG or JPEG image, got none "
                          f"(extensions: {shortened(extensions, 80)})")
     return Texture(_image(document, entry["source"], f"{where}.source"), wrap, chosen)

@@ -88,12 +88,8 @@ def point_sample(table: TextureTable, texture: int, u: float, v: float) -> Colou
 
 
 @kernel
-def coordinates_at(vertices: Array, faces: Array, uv: Array, triangle: int, x: float, y: float,
-                   z: float) -> tuple[float, float]:
-    """Return the texture coordinates of a point on a triangle's plane, from its barycentric coordinates.
-
-    `uv` (m, 3, 2): of each face's corners. Result: those of the first corner on a triangle without area.
-    """
+def barycentric(vertices: Array, faces: Array, triangle: int, x: float, y: float, z: float) -> tuple[float, float]:
+    """Return the barycentric coordinates of a triangle's second and third corner at a point; 0 without area."""
     i, j, k = faces[triangle, 0], faces[triangle, 1], faces[triangle, 2]
     px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
     ax, ay, az = vertices[j, 0] - px, vertices[j, 1] - py, vertices[j, 2] - pz
@@ -101,12 +97,35 @@ def coordinates_at(vertices: Array, faces: Array, uv: Array, triangle: int, x: f
     nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     qx, qy, qz = x - px, y - py, z - pz
     square = nx * nx + ny * ny + nz * nz
-    u, v = uv[triangle, 0, 0], uv[triangle, 0, 1]
     if square == 0.0:
-        return u, v
+        return 0.0, 0.0
     # parts of the area N = a x b: (q x b) . N and (a x q) . N
     s = ((qy * bz - qz * by) * nx + (qz * bx - qx * bz) * ny + (qx * by - qy * bx) * nz) / square
     t = ((ay * qz - az * qy) * nx + (az * qx - ax * qz) * ny + (ax * qy - ay * qx) * nz) / square
+    return s, t
+
+
+@kernel
+def colour_at(vertices: Array, faces: Array, colours: Array, triangle: int, x: float, y: float, z: float) -> Colour:
+    """Return the vertex colours (m, 3, 3) of a triangle's corners at a point: linear between them, not beyond."""
+    s, t = barycentric(vertices, faces, triangle, x, y, z)
+    s = min(max(s, 0.0), 1.0)
+    t = min(max(t, 0.0), 1.0 - s)
+    r, g, b = colours[triangle, 0, 0], colours[triangle, 0, 1], colours[triangle, 0, 2]
+    return (r + s * (colours[triangle, 1, 0] - r) + t * (colours[triangle, 2, 0] - r),
+            g + s * (colours[triangle, 1, 1] - g) + t * (colours[triangle, 2, 1] - g),
+            b + s * (colours[triangle, 1, 2] - b) + t * (colours[triangle, 2, 2] - b))
+
+
+@kernel
+def coordinates_at(vertices: Array, faces: Array, uv: Array, triangle: int, x: float, y: float,
+                   z: float) -> tuple[float, float]:
+    """Return the texture coordinates of a point on a triangle's plane, from its barycentric coordinates.
+
+    `uv` (m, 3, 2): of each face's corners. Result: those of the first corner on a triangle without area.
+    """
+    s, t = barycentric(vertices, faces, triangle, x, y, z)
+    u, v = uv[triangle, 0, 0], uv[triangle, 0, 1]
     return (u + s * (uv[triangle, 1, 0] - u) + t * (uv[triangle, 2, 0] - u),
             v + s * (uv[triangle, 1, 1] - v) + t * (uv[triangle, 2, 1] - v))
 
@@ -127,3 +146,14 @@ def multiply_at(table: TextureTable, vertices: Array, faces: Array, uv: Array, t
             colour[i, 0] *= r
             colour[i, 1] *= g
             colour[i, 2] *= b
+
+
+@kernel
+def multiply_by_colours(vertices: Array, faces: Array, colours: Array, triangle: Array, position: Array,
+                        colour: Array) -> None:
+    """Multiply colours (n, 3) by the vertex colours of triangles (n,) at points (n, 3)."""
+    for i in range(len(triangle)):
+        r, g, b = colour_at(vertices, faces, colours, triangle[i], position[i, 0], position[i, 1], position[i, 2])
+        colour[i, 0] *= r
+        colour[i, 1] *= g
+        colour[i, 2] *= b

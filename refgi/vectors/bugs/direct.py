@@ -6,8 +6,8 @@ import numpy as np
 
 from refgi.scene import DirectionalLight, SpotLight
 from refgi.scene.model import Light
-from refgi.vectors.bugs.falloffs import CONE, FALLOFFS
-from refgi.vectors.bugs.spot_integral import Falloff, share_at, smooth
+from refgi.vectors.bugs.falloffs import CONE, falloffs_of
+from refgi.vectors.bugs.spot_integral import Falloff, own_falloff, share_at
 from refgi.vectors.spec import Array, Arrays, Bug, Run
 
 Lamps = list[tuple[str, Light]]
@@ -47,7 +47,7 @@ def direct_family(lamps: Lamps) -> tuple[Bug, ...]:
             Bug("lights lie at the origin: their place is missing", literal(place="origin"), LAW),
         ]
     if spot:
-        found += _spot_bugs(literal)
+        found += _spot_bugs(literal, lamps)
     if len(lamps) > 1:
         found += [
             Bug("the first light's shadow for all lights: shadow0 alone", literal(shadow="first"), SHADOW),
@@ -69,9 +69,9 @@ def direct_family(lamps: Lamps) -> tuple[Bug, ...]:
     return tuple(found)
 
 
-def _spot_bugs(literal: Any) -> list[Bug]:
+def _spot_bugs(literal: Any, lamps: Lamps) -> list[Bug]:
     return [
-        *(Bug(cause, literal(falloff=one), CONE) for cause, one in FALLOFFS.items()),
+        *(Bug(cause, literal(falloff=one), CONE) for cause, one in falloffs_of([light for _, light in lamps]).items()),
         Bug("inner and outer half-angle of the cone are exchanged", literal(angles=(1, 0)), CONE),
         Bug("the inner half-angle is left out: light falls off from the axis on", literal(angles=(None, 1)), CONE),
         Bug("whole angles in place of half-angles: the cone is half as wide", literal(widened=0.5), "half-angles"),
@@ -85,7 +85,7 @@ def _spot_bugs(literal: Any) -> list[Bug]:
 
 def literal_direct(
     arrays: Arrays, lamps: Lamps, *, cosine: str = "positive", power: int = 2, least: float = 0.0,
-    softened: float = 0.0, place: str = "own", falloff: Falloff = smooth, angles: tuple[int | None, int] = (0, 1),
+    softened: float = 0.0, place: str = "own", falloff: Falloff | None = None, angles: tuple[int | None, int] = (0, 1),
     widened: float = 1.0, unit: bool = True, strength: str = "own", shadow: str = "own", joined: str = "sum",
 ) -> Array:
     """Return the direct irradiance of all lights, or with a bug: (3, h, w)."""
@@ -110,7 +110,7 @@ def literal_direct(
             cone = np.asarray(arrays[f"{lamp}.half_angles"], np.float64)
             off = -(w * axis.reshape(3, 1, 1)).sum(axis=0)
             inner, outer = (1e-9 if one is None else widened * float(cone[one]) for one in angles)
-            fall = fall * share_at(off, inner, outer, falloff)
+            fall = fall * share_at(off, inner, outer, falloff or own_falloff(light))
             arriving = off * (arriving > 0) if cosine == "axis" else arriving
         power_of = _strength(arrays, lamps, k if strength != "first" else 0, strength, float(cone[1]))
         parts.append(power_of * (_cosine(arriving, cosine) * fall * (seen[k] & covered)))

@@ -1,14 +1,16 @@
 """A spot's falloff between its cones as ports get it wrong; t is 0 at the outer and 1 at the inner cone."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 
-from refgi.vectors.bugs.spot_integral import Falloff, clamped, smoothstep
+from refgi.scene.model import Light, SpotLight
+from refgi.vectors.bugs.spot_integral import OWN, Falloff, clamped, smoothstep
 from refgi.vectors.spec import Array
 
-CONE = "docs/conventions: smoothstep between the cosines of the cones"
+CONE = "docs/conventions: falloff between the cosines of the cones"
+SQUARED = "the falloff is t^2: smoothstep's 3 - 2t is missing"
 
 
 def _of_t(shape: Callable[[Array], Array]) -> Falloff:
@@ -33,7 +35,7 @@ def _times_cosine(t: Array, cosine: Array, inner: float, outer: float) -> Array:
 
 FALLOFFS: Mapping[str, Falloff] = MappingProxyType({
     "the falloff is linear: no smoothstep": _of_t(clamped),
-    "the falloff is t^2: smoothstep's 3 - 2t is missing": _of_t(lambda t: clamped(t) ** 2),
+    SQUARED: OWN["squared_ramp"],
     "smoothstep lacks one t: t (3 - 2t)": _of_t(lambda t: clamped(t) * (3 - 2 * clamped(t))),
     "smoothstep is taken twice": _of_t(lambda t: smoothstep(smoothstep(clamped(t)))),
     "the falloff is squared": _of_t(lambda t: smoothstep(clamped(t)) ** 2),
@@ -57,3 +59,12 @@ FALLOFFS: Mapping[str, Falloff] = MappingProxyType({
     "smoothstep of squared cosines": _of_squares,
     "the cosine off the spot's axis counts as well": _times_cosine,
 })
+
+
+def falloffs_of(lights: Sequence[Light]) -> dict[str, Falloff]:
+    """Return the wrong falloffs of some lights' spots: what is right for all of them is none."""
+    kinds = {light.falloff for light in lights if isinstance(light, SpotLight)}
+    found = {cause: one for cause, one in FALLOFFS.items() if cause != SQUARED or kinds != {"squared_ramp"}}
+    if "squared_ramp" in kinds:
+        found["a spot of a squared ramp falls off by the smoothstep"] = OWN["smoothstep"]
+    return found

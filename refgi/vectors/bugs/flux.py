@@ -7,7 +7,7 @@ import numpy as np
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
 from refgi.scene import SpotLight
 from refgi.scene.model import Light
-from refgi.vectors.bugs.falloffs import CONE, FALLOFFS
+from refgi.vectors.bugs.falloffs import CONE, falloffs_of
 from refgi.vectors.bugs.flux_form import EVERY, literal_flux
 from refgi.vectors.bugs.views import CENTRES, CUBE, ViewChange, view_changes, view_of
 from refgi.vectors.spec import Arrays, Bug, Run
@@ -47,7 +47,7 @@ def flux_family(name: str, lamp: str, light: Light, maps: Projection, glossy: bo
         Bug("channels of the lamp's strength are in reverse order: bgr", literal(strength="reverse"), "linear RGB"),
         Bug("all channels have the mean of the lamp's strength", literal(strength="grey"), "linear RGB"),
     ]
-    found += _parallel(literal) if maps.kind == ORTHOGRAPHIC else _perspective(literal, isinstance(light, SpotLight))
+    found += _parallel(literal) if maps.kind == ORTHOGRAPHIC else _perspective(literal, light)
     if glossy:
         found += [Bug("diffuse and specular reflectance are exchanged", literal(table="exchanged"), OWN),
                   Bug("the diffuse part reflects the sum of both reflectances", literal(table="sum"), OWN),
@@ -77,18 +77,18 @@ def _parallel(literal: Any) -> list[Bug]:
     ]
 
 
-def _perspective(literal: Any, spot: bool) -> list[Bug]:
+def _perspective(literal: Any, spot: Light) -> list[Bug]:
     found = [
         Bug("the area on the image plane in place of the solid angle", literal(angle=0.0), ANGLE),
         *(Bug(f"the solid angle is area times cos^{power} at the texel's centre", literal(angle=float(power)), ANGLE)
           for power in (1, 2, 3, 4)),
         Bug("the first texel's solid angle for all", literal(angle=-1.0), ANGLE),
         Bug("image coordinates of texels run from 0 and not from the centre", literal(corner=True), ANGLE)]
-    if not spot:
+    if not isinstance(spot, SpotLight):
         return found
     found += [Bug(f"the falloff's integral has density cos^{power} of solid angle in place of cos^3",
                   literal(power=float(power)), ANGLE) for power in (1, 2, 4, 5)]
-    return [*found, *(Bug(cause, literal(falloff=one), CONE) for cause, one in FALLOFFS.items()),
+    return [*found, *(Bug(cause, literal(falloff=one), CONE) for cause, one in falloffs_of([spot]).items()),
         Bug("the area on the image plane in place of the solid angle, in the falloff's integral alone",
             literal(power=0.0), ANGLE),
         Bug("the area on the image plane in place of the solid angle, in the falloff's integral too",

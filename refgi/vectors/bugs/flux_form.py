@@ -7,7 +7,7 @@ import numpy as np
 
 from refgi.scene import DirectionalLight, SpotLight
 from refgi.scene.model import Light
-from refgi.vectors.bugs.spot_integral import Falloff, share_at, smooth, spot_integrals
+from refgi.vectors.bugs.spot_integral import Falloff, own_falloff, share_at, spot_integrals
 from refgi.vectors.bugs.surface import literal_surface, rays
 from refgi.vectors.bugs.views import View, ViewChange
 from refgi.vectors.spec import Array, Arrays
@@ -18,7 +18,7 @@ EVERY = slice(None)
 def literal_flux(
     arrays: Arrays, name: str, lamp: tuple[str, Light], view: View, *, paint: str = "own", holes: bool = False,
     table: str = "own", times: str = "none", strength: str = "own", area: str = "own", angle: float | None = None,
-    corner: bool = False, power: float = 3.0, falloff: Falloff = smooth, angles: tuple[int | None, int] = (0, 1),
+    corner: bool = False, power: float = 3.0, falloff: Falloff | None = None, angles: tuple[int | None, int] = (0, 1),
     widened: float = 1.0, sample: bool = False, pieces: tuple[slice, slice] = (EVERY, EVERY), modulo: bool = True,
     maps: int | None = None, mirror: str = "r", lobe_axis: bool = False, lobe_frame: ViewChange | None = None,
     lobe_centre: tuple[float, float] = (0.5, 0.5), everywhere: bool = False, exponent: str = "own",
@@ -26,6 +26,7 @@ def literal_flux(
 ) -> dict[str, Array]:
     """Return solid angle, flux and lobes of each texel of a light's map, or with a bug."""
     ids, light = np.asarray(arrays[f"{name}.triangle_id"]), lamp[1]
+    falloff = falloff or own_falloff(light)
     directional, key = isinstance(light, DirectionalLight), "half_angles"
     rows = np.arange(view.maps * view.rows)
     rows = rows % view.rows if modulo else rows

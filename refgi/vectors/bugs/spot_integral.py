@@ -1,14 +1,16 @@
 """A spot's falloff integrated over rectangles of the image plane, piece by piece between its circles.
 
-The integrand is smoothstep(t) times the density of solid angle cos^3 a, with t = (cos a - cos o) / (cos i - cos o),
+The integrand is smoothstep(t), or t t, times the density of solid angle cos^3 a, t = (cos a - cos o) / (cos i - cos o),
 where i and o are the inner and outer half-angle. Both directions are cut where the circles of the cones cross, so that
 each piece is smooth, and each piece has a Gauss rule.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 import numpy as np
 
+from refgi.scene.model import Light, SpotLight
 from refgi.vectors.spec import Array
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)
@@ -32,8 +34,26 @@ def share_at(cosine: Array, inner: float, outer: float, falloff: Falloff) -> Arr
 
 
 def smooth(t: Array, cosine: Array, inner: float, outer: float) -> Array:  # noqa: ARG001 a falloff among others
-    """Return the falloff as it should be."""
+    """Return the usual falloff as it should be."""
     return smoothstep(clamped(t))
+
+
+def squared(t: Array, cosine: Array, inner: float, outer: float) -> Array:  # noqa: ARG001
+    """Return the falloff of glTF as it should be."""
+    return np.asarray(clamped(t) ** 2)
+
+
+def ramp(t: Array, cosine: Array, inner: float, outer: float) -> Array:  # noqa: ARG001
+    """Return the falloff of a cosine lobe as it should be."""
+    return clamped(t)
+
+
+OWN: Mapping[str, Falloff] = MappingProxyType({"smoothstep": smooth, "squared_ramp": squared, "ramp": ramp})
+
+
+def own_falloff(light: Light) -> Falloff:
+    """Return a spot's falloff as it should be."""
+    return OWN[light.falloff if isinstance(light, SpotLight) else SpotLight.falloff]
 
 
 def spot_integrals(

@@ -11,7 +11,7 @@ from refgi.scene import Scene, SpotLight
 from refgi.settings import of, replaced
 from refgi.sssil.settings import PRESETS, HssilSettings, TemporalSettings
 from refgi.sssil.temporal.sequence import Sequence
-from refgi.vectors.cases.scenes import BULB, DOWN, POLE, SPOT, VIEW, room, stored_scene
+from refgi.vectors.cases.scenes import BULB, DOWN, POLE, RAMP, SPOT, VIEW, room, stored_scene
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
 from refgi.vectors.stages.buffers import add_gbuffer, give_scene
@@ -35,6 +35,7 @@ SETTINGS = {
     "hssil-radiance": replaced(CLOSEST, {"samples": 10, "radius": 2.5, "levels": 3, "seed": 2,
                                          "downsample": "closest_average", "pattern": "fixed"}),
     "hssil-all": replaced(CLOSEST, {"radius": 2.0, "levels": 3, "pattern": "all"}),
+    "hssil-ramp": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "seed": 4}),
 }
 VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
     "hssil-default": (room(SPOT, BULB), (40, 28), "map"),
@@ -45,6 +46,7 @@ VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
     "hssil-average": (room(SPOT, BULB), (27, 19), "exact"),
     "hssil-radiance": (room(SPOT, BULB, matte=True, smooth=True), (30, 21), "exact"),
     "hssil-all": (room(BULB, matte=True), (18, 14), "exact"),
+    "hssil-ramp": (room(RAMP, SPOT, matte=True), (16, 12), "exact"),
 }
 TEMPORAL = {
     "hssil-temporal": of(TemporalSettings),
@@ -117,6 +119,7 @@ QUICK = {
     "hssil-odd": _quick("hssil-odd", "13 x 11 pixels from full resolution down to one texel"),
     "hssil-pole": _quick("hssil-pole", "a camera that looks straight down: surfaces of one depth; a lamp above a "
                          "purely glossy shelf"),
+    "hssil-ramp": _quick("hssil-ramp", "a spot of a squared ramp beside one of the smoothstep"),
     "hssil-temporal": lambda: coherent("hssil-temporal", "a camera that moves: fourth frame, surfaces found in 1 to 3 "
                                        "frames before, disoccluded ones"),
     "hssil-entering": lambda: coherent("hssil-entering", "a camera that turns: entering pixels, clamped light of the "

@@ -15,6 +15,7 @@ BULB = PointLight((0.2, 0.9, 0.3), (0.1, 0.25, 0.5))
 SUN = DirectionalLight((-0.5, -0.9, -0.3), (0.5, 0.3, 0.9))
 DOWN = SpotLight((0.1, 1.7, 0.2), (0.0, -1.0, 0.0), 0.3, 0.7, (3.0, 1.0, 2.0))  # along the frame's usual up
 VIEW = Camera((1.7, 1.4, 1.5), (-0.4, 0.35, -0.5), (0.1, 1.0, 0.0), math.radians(70))  # rolled
+RAMP = SpotLight((-0.1, 1.6, 0.3), (0.2, -1.0, -0.5), 0.1, 0.8, (1.5, 3.0, 2.0), "squared_ramp")  # glTF's falloff
 AWAY = SpotLight((1.5, 1.5, 0.5), (1.0, 0.2, 0.1), 0.2, 0.5, (4.0, 2.0, 1.0))  # into the void
 POLE = Camera((0.2, 2.5, 0.1), (0.2, 0.0, 0.1), (0.0, 0.0, -1.0), math.radians(50))  # straight down
 

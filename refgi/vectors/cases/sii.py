@@ -10,7 +10,7 @@ from refgi.lights.warp import Warp
 from refgi.pairs.settings import PairSettings
 from refgi.scene import Scene
 from refgi.settings import of
-from refgi.vectors.cases.scenes import BULB, DOWN, POLE, SPOT, SUN, far_away, room
+from refgi.vectors.cases.scenes import BULB, DOWN, POLE, RAMP, SPOT, SUN, far_away, room
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
 from refgi.vectors.stages.buffers import add_gbuffer, add_rsm, give_scene
@@ -66,6 +66,8 @@ QUICK = {
                                   pattern="grid"),
     "sii-one-texel": lambda: splatting("sii-one-texel", "maps of one texel, two lights", room(SPOT, DOWN), (8, 6), 1,
                                        (1, 1), pattern="grid"),
+    "sii-ramp": lambda: splatting("sii-ramp", "a spot of a squared ramp beside one of the smoothstep",
+                                  room(RAMP, SPOT, matte=True), (12, 9), 11, (12, 8), shifts=((0.1, 0.2), (0.3, 0.45))),
 }
 FULL = {
     "sii-smooth": lambda: splatting("sii-smooth", "interpolated normals on a ball", room(SPOT, BULB, smooth=True),

@@ -141,7 +141,7 @@ def light_of(arrays: Arrays, lamp: str, light: Light) -> Light:
                              for key in _light_keys(light)}
     if isinstance(light, SpotLight):
         inner, outer = value.pop("half_angles")
-        value |= {"inner_half_angle": min(inner, outer), "outer_half_angle": outer}
+        value |= {"inner_half_angle": min(inner, outer), "outer_half_angle": outer, "falloff": light.falloff}
     made: Light = type(light)(**value)
     return made
 
@@ -180,6 +180,8 @@ def _give_light(recipe: Recipe, lamp: str, light: Light) -> None:
             value = light.inner_half_angle, light.outer_half_angle
         recipe.give(f"{lamp}.{key}", value, spec[key])
     recipe.facts[lamp] = NAMES[type(light)]
+    if isinstance(light, SpotLight) and light.falloff != SpotLight.falloff:
+        recipe.facts[f"{lamp}.falloff"] = light.falloff
 
 
 def _give_maps(recipe: Recipe, name: str, maps: Projection) -> None:

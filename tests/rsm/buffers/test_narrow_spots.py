@@ -25,8 +25,8 @@ FLOOR = geometry([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], [[0, 1, 2], [
 SHARES = (0.0, 0.3, 0.8, 0.99, 0.9999, 1.0)  # of the outer half-angle that the inner one is
 
 
-def exact_falloff(d, axis, inner, outer):
-    """t t (3 - 2 t), t = clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1), to 60 digits."""
+def exact_falloff(d, axis, inner, outer, falloff="smoothstep"):
+    """t t (3 - 2 t), t t or t, t = clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1), to 60 digits."""
     with mpmath.workdps(60):
         d, axis = (mpmath.matrix([mpmath.mpf(float(c)) for c in vector]) for vector in (d, axis))
         dot = sum(d[i] * axis[i] for i in range(3))
@@ -35,7 +35,7 @@ def exact_falloff(d, axis, inner, outer):
         if cosine >= high or cosine <= low:
             return mpmath.mpf(int(cosine >= high))
         t = (cosine - low) / (high - low)
-        return t * t * (3 - 2 * t)
+        return {"smoothstep": t * t * (3 - 2 * t), "squared_ramp": t * t, "ramp": t}[falloff]
 
 
 def directions_about(axis, outer, inner, count, rng):
@@ -49,17 +49,18 @@ def directions_about(axis, outer, inner, count, rng):
     return unit * 10 ** rng.uniform(-3, 3, (count, 1))
 
 
+@pytest.mark.parametrize("falloff", ["smoothstep", "squared_ramp", "ramp"])
 @pytest.mark.parametrize("real", [np.float32, np.float64])
 @pytest.mark.parametrize("degrees", DEGREES)
-def test_the_falloff_is_exact_to_a_few_units_in_the_last_place(real, degrees):
+def test_the_falloff_is_exact_to_a_few_units_in_the_last_place(real, degrees, falloff):
     rng, outer, worst = np.random.default_rng(1), math.radians(degrees), 0.0
     for share in SHARES:
         axis = rng.normal(size=3)
         axis /= np.linalg.norm(axis)
-        cone = cone_row(share * outer, outer)
+        cone = cone_row(share * outer, outer, falloff)
         for d in directions_about(axis, outer, share * outer, 60, rng).astype(real):
             got = real(spot_falloff(tuple(float(c) for c in d), tuple(axis), cone, PLAIN[real]))
-            exact = exact_falloff(d, axis, share * outer, outer)
+            exact = exact_falloff(d, axis, share * outer, outer, falloff)
             assert (got == 0) == (exact < np.finfo(real).tiny)
             worst = max(worst, abs(float((mpmath.mpf(float(got)) - exact) / float(np.spacing(real(float(exact)))))))
     assert worst < ULP

@@ -36,15 +36,17 @@ def in_a_ball(light, resolution=32, materials=(DIFFUSE,), dtype=np.float64, **op
 
 @pytest.mark.feature("SII-01")
 @pytest.mark.parametrize("resolution", [17, 33, 128])
+@pytest.mark.parametrize(("falloff", "mean"), [("smoothstep", 1 / 2), ("squared_ramp", 1 / 3), ("ramp", 1 / 2)])
 @pytest.mark.parametrize(("inner", "outer"), [(30, 50), (40, 40), (0, 70), (60, 80), (85, 85)])
-def test_spot_flux_sums_to_albedo_times_its_power(resolution, inner, outer, evidence):
-    light = SpotLight((0.3, 0.2, -0.4), (1, -2, 0.5), math.radians(inner), math.radians(outer), (3.0, 2.0, 1.0))
+def test_spot_flux_sums_to_albedo_times_its_power(resolution, inner, outer, falloff, mean, evidence):
+    light = SpotLight((0.3, 0.2, -0.4), (1, -2, 0.5), math.radians(inner), math.radians(outer), (3, 2, 1), falloff)
     rsm = in_a_ball(light, resolution)
-    power = 2 * math.pi * (1 - (math.cos(light.inner_half_angle) + math.cos(light.outer_half_angle)) / 2)
+    cosine, cos_outer = math.cos(light.inner_half_angle), math.cos(light.outer_half_angle)
+    power = 2 * math.pi * (1 - cosine + mean * (cosine - cos_outer))
     expected = np.array(RHO) * light.intensity * power
     error = np.abs(rsm.flux.sum(axis=(1, 2)) / expected - 1).max()
     assert error < 1e-6
-    evidence(f"spot {inner}/{outer} deg, {resolution}^2: {error:.0e}")
+    evidence(f"spot {inner}/{outer} deg {falloff}, {resolution}^2: {error:.0e}")
 
 
 @pytest.mark.feature("SII-01", "SII-02")

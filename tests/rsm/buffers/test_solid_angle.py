@@ -1,10 +1,12 @@
 """Solid angles of texels: quadrature, closed sums, and a spot's falloff integrated over texels."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
+from refgi.rsm.buffers.light_projection import texel_shares
 from refgi.rsm.buffers.solid_angle import sampled_spot_share, spot_power, spot_power_at, texel_solid_angles
 from refgi.rsm.raster.projection import (
     cube_projection,
@@ -139,14 +141,17 @@ def test_sampled_share_tends_to_the_exact_one():
     assert sampled.sum() == pytest.approx(exact.sum(), rel=1e-5)
 
 
+@pytest.mark.parametrize("falloff", ["smoothstep", "squared_ramp", "ramp"])
 @pytest.mark.parametrize("n", [1, 2, 9, 16])
 @pytest.mark.parametrize("half", [math.radians(40), math.radians(85)])
-def test_power_of_some_texels_is_that_of_the_whole_map(n, half):
-    light = spot(half / 2, half)
+def test_power_of_some_texels_is_that_of_the_whole_map(n, half, falloff):
+    light = dataclasses.replace(spot(half / 2, half), falloff=falloff)
     maps = spot_projection(light, n) if half < 1 else paraboloid_projection([(0, 0, 0)], [light.direction], n)
     angles = light.inner_half_angle, light.outer_half_angle
-    texel = np.arange(n * n)[::-1]
-    np.testing.assert_array_equal(spot_power_at(maps, *angles, texel), spot_power(maps, *angles).reshape(-1)[texel])
+    texel, whole = np.arange(n * n)[::-1], spot_power(maps, *angles, falloff)
+    np.testing.assert_array_equal(spot_power_at(maps, *angles, texel, falloff), whole.reshape(-1)[texel])
+    np.testing.assert_array_equal(texel_shares(light, maps), whole)
+    np.testing.assert_array_equal(texel_shares(light, maps, texel=texel), whole.reshape(-1)[texel])
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8])

@@ -12,6 +12,7 @@ from refgi.methods import find_method, render
 from refgi.rsm.buffers.light_projection import incident_flux, light_projection
 from refgi.scene import SpotLight, load_scene
 from refgi.scene.gltf import read_gltf
+from refgi.scene.light import Falloff
 from refgi.settings import of
 from tests.scene.samples import SCENE, glb_bytes, gltf_tree, write_scene
 
@@ -22,8 +23,8 @@ ALMOST = RIGHT - math.radians(0.001)
 SAME = 2e-3  # of the mean: lights are drawn anew from a map whose texels all change by 2e-5
 
 
-def spot(inner: float, outer: float = RIGHT) -> SpotLight:
-    return SpotLight((0.3, 0.4, 0.3), (0.1, -1, 0.2), inner, outer, (3, 2, 1))
+def spot(inner: float, outer: float = RIGHT, falloff: Falloff = "smoothstep") -> SpotLight:
+    return SpotLight((0.3, 0.4, 0.3), (0.1, -1, 0.2), inner, outer, (3, 2, 1), falloff)
 
 
 @pytest.fixture(scope="module")
@@ -31,14 +32,15 @@ def room():
     return load_scene("cornell_box").with_camera(width=24, height=24)
 
 
+@pytest.mark.parametrize(("falloff", "mean"), [("smoothstep", 1 / 2), ("squared_ramp", 1 / 3), ("ramp", 1 / 2)])
 @pytest.mark.parametrize("inner", [0.0, 0.4, ALMOST, RIGHT])
 @pytest.mark.parametrize(("shape", "tolerance"), [("auto", INTEGRATED), ("paraboloid", INTEGRATED), ("cube", SAMPLED)])
-def test_all_of_the_power_falls_into_the_map(room, inner, shape, tolerance):
-    light = spot(inner)
+def test_all_of_the_power_falls_into_the_map(room, inner, shape, tolerance, falloff, mean):
+    light = spot(inner, falloff=falloff)
     maps = light_projection(light, room.geometry, 32, shape)
     flux = incident_flux(light, maps, None, np.float64)
-    # the integral of the smoothstep in the cosine over the half space: 2 pi I (1 - (cos inner + cos outer) / 2)
-    power = 2 * math.pi * (1 - math.cos(inner) / 2) * np.array([3, 2, 1])
+    # between the cones the falloff, even in the cosine, is its mean: 2 pi I ((1 - cos inner) + mean (cos inner - 0))
+    power = 2 * math.pi * (1 - math.cos(inner) + mean * math.cos(inner)) * np.array([3, 2, 1])
     assert flux.reshape(3, -1).sum(axis=1) == pytest.approx(power, rel=tolerance)
 
 

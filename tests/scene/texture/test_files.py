@@ -142,14 +142,16 @@ def test_normalised_coordinates_and_mirrored_nodes(tmp_path: Path) -> None:
 
 def test_materials_share_images_and_scenes_without_textures_have_no_coordinates(tmp_path: Path) -> None:
     def two(tree: dict[str, Any]) -> None:
-        tree["materials"].append({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
+        tree["materials"].append({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0},
+                                                           "metallicFactor": 0}})
         tree["meshes"][0]["primitives"].append(tree["meshes"][0]["primitives"][0] | {"material": 1})
 
     first, second = load_scene(textured(tmp_path, two)).materials
     assert first.texture is not None
     assert second.texture is not None
     assert first.texture.image is second.texture.image
-    plain = load_scene(textured(tmp_path, lambda tree: tree["materials"][0].pop("pbrMetallicRoughness")))
+    surface = "pbrMetallicRoughness"
+    plain = load_scene(textured(tmp_path, lambda tree: tree["materials"][0][surface].pop("baseColorTexture")))
     assert plain.geometry.uv is None
     assert plain.materials[0].texture is None
 
@@ -188,7 +190,7 @@ def test_what_is_not_read_is_said(tmp_path: Path) -> None:
         scene = load_scene(textured(tmp_path, edit))
     assert {str(one.message).partition(": ")[2] for one in said} == {
         "1 material(s)' normal maps (shading normals stay the mesh's) passed over",
-        "1 material(s)' other textures passed over",
+        "1 material(s)' occlusionTexture passed over",
         "1 primitive(s)' textures for lack of TEXCOORD_0 passed over"}
     assert scene.materials[0].texture is None
 

@@ -33,7 +33,7 @@ def write_kit(folder: Path, *, case: str = "a", name: str = "sum", file: str = "
     (home / "out" / "sum.npy").write_bytes(content)
     (home / "bugs.npz").write_bytes(bugs)
     entry = {"file": file, "sha256": hashlib.sha256(content).hexdigest(), "dtype": "<f4", "shape": [2, 3],
-             "axes": "row, column", "unit": "1", "what": "x", "tier": "T1"} | ({} if extra is None else {"bound": extra})
+             "axes": "row, column", "unit": "1", "what": "", "tier": "T1"} | ({} if extra is None else {"bound": extra})
     made = {"id": case, "method": "sii", "what": "x", "vectors": "1.0.1", "facts": {}, "factors": {}, "given": [],
             "stages": [{"name": "sum", "what": "x", "reads": [], "writes": [name]}], "arrays": {name: entry},
             "bugs_sha256": hashlib.sha256(bugs).hexdigest()}

@@ -124,12 +124,12 @@ def read_parts(path: Path) -> list[Part]:
 
     try:
         with _complaints() as complaints:
-            with OpenEXR.File(str(path), header_only=True) as file:
+            with OpenEXR.File(_source(path), header_only=True) as file:
                 headers = [part.header for part in file.parts]
                 for header in headers:
                     _expect_flat(header, path)
                 _expect_room(headers, path)
-            with OpenEXR.File(str(path), separate_channels=True) as file:
+            with OpenEXR.File(_source(path), separate_channels=True) as file:
                 parts = [_part(part) for part in file.parts]
         if complaints:  # rows that cannot be decoded stay black, and nothing is raised
             raise ValueError(complaints[0])
@@ -140,6 +140,11 @@ def read_parts(path: Path) -> list[Part]:
     expect(all(part.channels for part in parts) and bool(parts), str(path), "an EXR with whole pixel data",
            "none: cut short or damaged")
     return parts
+
+
+def _source(path: Path) -> str | BinaryIO:
+    """Return what OpenEXR opens: a name in UTF-8, else the content."""
+    return str(path) if is_text(str(path)) else io.BytesIO(path.read_bytes())
 
 
 def _part(part: Any) -> Part:

@@ -55,7 +55,8 @@ def test_names_of_scenes_methods_and_settings_are_text(made, content, name):
 
 
 @pytest.mark.parametrize(("path", "said"), [
-    (("environment", "versions"), "environment: expected versions"), (("environment", "cpu"), "environment: expected cpu"),
+    (("environment", "versions"), "environment: expected versions"),
+    (("environment", "cpu"), "environment: expected cpu"),
     (("scenes", 0, "runs", 0, "errors", "truth"), "scenes.0.runs.0.errors: expected results"),
     (("scenes", 0, "line", 0, "errors", "truth"), "scenes.0.line.0.errors: expected results")])
 def test_what_a_page_needs_is_asked_for(made, content, path, said):

@@ -171,6 +171,8 @@ def read_array(file: Path) -> Array:
 def _bytes_said(content: io.BytesIO) -> int:
     """Return how many bytes of elements the header says that there are, and go past it."""
     version = np.lib.format.read_magic(content)
+    if version not in ((1, 0), (2, 0), (3, 0)):
+        raise ValueError(f"version {version[0]}.{version[1]}")
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, kind = read(content)
     if kind.hasobject or min(shape, default=0) < 0:

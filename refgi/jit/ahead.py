@@ -78,7 +78,7 @@ def _is_kept(one: Specialisation) -> bool:
     try:
         kernel, arguments = one.find()
         kept: bool = kernel._cache.path(arguments).exists()
-    except (ImportError, AttributeError, TypeError, NameError):
+    except (ImportError, AttributeError, TypeError, ValueError):
         return True
     return kept
 

@@ -6,13 +6,15 @@ that says how many.
 """
 
 import contextlib
+import difflib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 MOST_FAULTS = 20  # reported of one file; a generated file can have as many as it has keys
 LONGEST_VALUE = 400  # characters of a value in an error
 LONGEST_MESSAGE = 2000  # bytes of an error in UTF-8, with all of a file's faults
 ROOM_FOR_REST = 40  # bytes of it for "... and so many more"
+MOST_EDITS = 3  # between a mistyped word and what was meant; one for each three letters before a suffix
 # what ends a line beside \n, commands a terminal, or cannot be written in UTF-8
 UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
@@ -161,3 +163,43 @@ def first_faults(faults: Sequence[str], separator: str = "\n") -> str:
         said.append(text)
     more = len(faults) - len(said)
     return separator.join([*said, *([f"... and {more:,} more"] if more > 0 else [])])
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word that a mistyped one is likely to mean.
+
+    Parameters
+    ----------
+    word : str
+        As it was typed.
+    known : iterable of str
+        What would have been right.
+
+    Returns
+    -------
+    str or None
+        None where all are further off than a letter for each three of the word, suffix apart.
+
+    Examples
+    --------
+    >>> nearest("coutn", ["count", "cutoff"]), nearest("gone.mtl", ["n.mtl", "one.mtl"]), nearest("a.mtl", ["b.mtl"])
+    ('count', 'one.mtl', None)
+    """
+    near = difflib.get_close_matches(word, list(known), n=3, cutoff=0.5)
+    edits = {one: _edits(word, one) for one in near}
+    most = min(MOST_EDITS, len(word.partition(".")[0]) // 3)
+    return min((one for one in near if edits[one] <= most), key=edits.__getitem__, default=None)
+
+
+def _edits(a: str, b: str) -> int:
+    """Return how many letters to insert, leave out, replace or swap with their neighbour make one word of another."""
+    before: list[int] = []
+    row = list(range(len(b) + 1))
+    for i, letter in enumerate(a):
+        before, row, above = row, [i + 1], before
+        for j, other in enumerate(b):
+            cost = min(before[j] + (letter != other), before[j + 1] + 1, row[j] + 1)
+            if i and j and letter == b[j - 1] and a[i - 1] == other:
+                cost = min(cost, above[j - 1] + 1)
+            row.append(cost)
+    return row[-1]

@@ -92,8 +92,9 @@ def _asked(
 def _report(session: Session, comparison: "Comparison", out: str | None) -> None:
     from refgi.compare.metrics import count_non_finite
     from refgi.compare.results import as_json
+    from refgi.scene.repair import faintest_irradiance
 
-    if not comparison.truth.irradiance.any():
+    if comparison.truth.irradiance.max() <= faintest_irradiance(comparison.scene.lights, comparison.scene.geometry):
         say("there is no indirect light in this scene: the truth is wholly black")
     if bad := count_non_finite(comparison.truth.irradiance, comparison.covered):
         say(f"{bad} pixels of the truth are NaN or infinite")

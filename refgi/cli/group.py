@@ -4,7 +4,6 @@ An exception that ended a run, as exit code, message, file and key.
 """
 
 import contextlib
-import difflib
 import importlib
 import os
 import signal
@@ -20,7 +19,7 @@ import click
 from refgi import __version__
 from refgi.cli.room import require_room, require_threads
 from refgi.cli.session import DONE, FAILED, INTERRUPTED, TERMINATED, USAGE, Fault, Session
-from refgi.errors import InputError, RefgiError
+from refgi.errors import InputError, RefgiError, nearest
 
 VERBS = ("scenes", "render", "sequence", "compare", "bench", "batch", "choose", "report", "vectors", "check", "stress",
          "explain", "settings", "warm", "info")
@@ -138,8 +137,8 @@ class VerbGroup(click.Group):
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
-            near = difflib.get_close_matches(args[0], VERBS, n=1)
-            hint = f"Did you mean {near[0]!r}?" if near else f"There are {', '.join(VERBS)}."
+            near = nearest(args[0], VERBS)
+            hint = f"Did you mean {near!r}?" if near else f"There are {', '.join(VERBS)}."
             raise click.UsageError(f"{error.format_message()} {hint}", ctx) from error
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -130,6 +130,8 @@ def seen(function: F) -> F:
                      help="A light instead of the scene's own; repeatable. spot:position=0,2,0:target=0,0,0:"
                           "outer_deg=35:intensity=20, point:position=0,2,0:intensity=20 (W/sr) or "
                           "directional:direction=0,-1,0:irradiance=3 (W/m^2)."),
+        click.option("--strict", is_flag=True,
+                     help="Refuse a mesh that lacks material files, images or normals that it names."),
     )):
         function = decorate(function)
     return function

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from refgi.cli.destination import Pictures
     from refgi.methods import Picture
     from refgi.provenance import Job, Record
+    from refgi.scene import Scene
 
 
 @click.command("render")
@@ -92,7 +93,7 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     record = _record(job, picture)
     content = _content(picture, job, seconds, record) | {"stages": [_run(run) for run in log.runs]}
     planes = _write(picture, files, record)
-    _say_aloud(content)
+    _say_aloud(content, job.scene)
     content["files"] = [str(file) for file in files.files]
     size = "x".join(map(str, content["size"]))
     text = f"{job.scene.name} by {job.method}: {size} in {seconds:.2f} s"
@@ -164,13 +165,16 @@ def _write(picture: "Picture", files: "Pictures", record: "Record") -> dict[str,
     return planes
 
 
-def _say_aloud(content: dict[str, Any]) -> None:
+def _say_aloud(content: dict[str, Any], scene: "Scene") -> None:
+    from refgi.scene.repair import faintest_irradiance
+
+    least = faintest_irradiance(scene.lights, scene.geometry)
     if bad := content["non_finite_pixels"]:
         say(f"{bad} pixels of the picture are NaN or infinite")
-    elif content["brightest_radiance"] <= 0:
+    elif content["brightest_radiance"] <= least:
         seen = "nothing but surfaces without light" if content["covered_pixels"] else "no surface at all"
         say(f"the picture is wholly black: the camera sees {seen}")
-    elif content["mean_indirect_irradiance"] == 0:
+    elif content["mean_indirect_irradiance"] <= least:
         say("there is no indirect light in the picture")
 
 

@@ -116,6 +116,7 @@ class View:
     up: tuple[float, float, float] | None
     vfov_deg: float | None
     lights: tuple[str, ...]
+    strict: bool = False
 
     def load(self) -> Scene:
         """Return the scene with its camera and lights changed as asked.
@@ -134,8 +135,8 @@ class View:
         lights = read_lights(self.lights)
         whole = "eye" in changes and "target" in changes
         if whole and Path(self.scene).suffix.lower() in (".glb", ".gltf", ".obj", ".ply"):
-            return load_scene(self.scene, camera=Camera(**changes), lights=lights)
-        scene = load_scene(self.scene, lights=lights)
+            return load_scene(self.scene, camera=Camera(**changes), lights=lights, strict=self.strict)
+        scene = load_scene(self.scene, lights=lights, strict=self.strict)
         return scene.with_camera(**changes) if changes else scene
 
     def _camera_changes(self) -> dict[str, Any]:

@@ -24,8 +24,8 @@ from refgi.scene import Scene
 if TYPE_CHECKING:
     from refgi.diagnostics import SamplingError
 
-PACKAGES = ("refgi", "numpy", "numba", "llvmlite", "scipy", "embreex", "trimesh", "OpenEXR", "imageio", "pillow",
-            "matplotlib", "click", "rich", "pydantic", "jinja2", "flip-evaluator")
+PACKAGES = ("refgi", "numpy", "numba", "llvmlite", "scipy", "embreex", "OpenEXR", "imageio", "pillow", "matplotlib",
+            "click", "rich", "pydantic", "jinja2", "flip-evaluator")
 GIT_SECONDS = 10.0
 DIRTY = "-dirty"
 VERSION = 2  # of the record; its key is `provenance`

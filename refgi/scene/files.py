@@ -1,13 +1,14 @@
 """File access of the readers, and `Contents`, the common result of all mesh formats."""
 
-import difflib
+import codecs
 import itertools
 import tomllib
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from refgi.errors import InputError
+from refgi.errors import InputError, RefgiWarning, first_faults, nearest, shortened
 from refgi.scene.mesh import physical_memory
 from refgi.scene.model import Camera, Light, Mesh
 from refgi.scene.source import record_file
@@ -17,11 +18,12 @@ LONGEST_WORD, MOST_CANDIDATES = 200, 1000  # comparing words takes the square of
 
 
 class Contents(NamedTuple):
-    """What one mesh file holds, in its own world space."""
+    """What one mesh file holds, in its own world space, and the materials that it uses and does not define."""
 
     meshes: tuple[Mesh, ...]
     cameras: tuple[Camera, ...] = ()
     lights: tuple[Light, ...] = ()
+    undefined: tuple[str, ...] = ()
 
 
 def read_bytes(path: Path) -> bytes:
@@ -48,6 +50,32 @@ def read_bytes(path: Path) -> bytes:
     return content
 
 
+def warn_of_undefined(names: Sequence[str], where: str) -> None:
+    """Say which materials a file uses and does not define, if any; `where`: the file."""
+    if names:
+        listed = first_faults([shortened(repr(name), 80) for name in names], ", ")
+        text = f"{where}: {len(names):,} material(s) used and not defined, rendered grey: {listed}"
+        warnings.warn(RefgiWarning(text), stacklevel=4)
+
+
+def expect_utf8(content: bytes, path: Path) -> bytes:
+    """Return the bytes of a text file without byte order mark; raises `InputError` if they are UTF-16."""
+    start = content[:4]
+    if start[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) or start.count(0) == len(start) // 2 > 0:
+        raise InputError(f"{path}: expected text in UTF-8, got UTF-16; save it as UTF-8")
+    return content.removeprefix(codecs.BOM_UTF8)
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file, UTF-8 or else Latin-1, its lines ended by a line feed; raises as `read_bytes`."""
+    content = expect_utf8(read_bytes(path), path)
+    try:
+        text = content.decode()
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file.
 
@@ -68,7 +96,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         with the square of their number.
     """
     try:
-        text = read_bytes(path).decode()
+        text = expect_utf8(read_bytes(path), path).decode()
         deepest = max((line.partition("=")[0].count(".") for line in text.splitlines()), default=0)
         if deepest > MOST_PARTS:
             raise ValueError(f"a key of {deepest + 1:,} parts")
@@ -123,8 +151,8 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     """
     if len(word) > LONGEST_WORD:
         return ""
-    near = difflib.get_close_matches(word, list(itertools.islice(known, MOST_CANDIDATES)), n=1, cutoff=0.5)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    near = nearest(word, itertools.islice(known, MOST_CANDIDATES))
+    return f"; did you mean {near!r}?" if near else ""
 
 
 def _near(path: Path) -> str:

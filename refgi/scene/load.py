@@ -1,85 +1,25 @@
-"""`load_scene`: a `Scene` from a built-in name, a scene file or a mesh file.
-
-A mesh without camera or light gets a default one: camera from above, front right; spot from above, front left.
-"""
+"""`load_scene`: a `Scene` from a built-in name, a scene file or a mesh file."""
 
 import dataclasses
-import math
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from refgi.errors import InputError, RefgiWarning, blame, first_faults, shortened
 from refgi.scene.builtin import SCENES, build_named
-from refgi.scene.files import did_you_mean, is_there, text_of
-from refgi.scene.model import Array, Camera, Geometry, Light, Scene, SpotLight, Vector, merge
+from refgi.scene.files import did_you_mean, is_there, text_of, warn_of_undefined
+from refgi.scene.model import Camera, Light, Scene, merge
+from refgi.scene.placed import default_camera, default_light
 from refgi.scene.repair import lights_with_power, repaired_all, warn_of_flat_faces, warn_of_unit
 from refgi.scene.scenefile import READERS, read_mesh_file, read_scene_file
 from refgi.scene.source import reading, source_of
+from refgi.scene.strictness import strictness
 from refgi.stages import stage
-
-VIEW_DIRECTION = np.array([0.55, 0.4, 1.0])  # from the middle of the mesh towards the eye
-LIGHT_DIRECTION = np.array([-0.8, 1.1, 0.7])  # ... towards the light
-VFOV = math.radians(35.0)
-LIGHT_DISTANCE = 4.0  # radii of the bounding sphere
-SMALLEST_RADIUS = 1e-9  # m; eye and target of a camera must differ
-FULL_IRRADIANCE = math.pi  # W/m^2 at the middle of the mesh: an albedo's radiance is then the albedo itself
-
-
-def default_camera(geometry: Geometry) -> Camera:
-    """Return a camera with the whole bounding box in view.
-
-    Parameters
-    ----------
-    geometry : Geometry
-        Not empty.
-
-    Returns
-    -------
-    Camera
-        512 x 512 pixels.
-    """
-    middle, radius = _sphere(geometry)
-    eye = middle + VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION) * (radius / math.sin(VFOV / 2))
-    return Camera(_vector(eye), _vector(middle), vfov=VFOV)
-
-
-def default_light(geometry: Geometry) -> SpotLight:
-    """Return a spot light whose cone holds the whole bounding box.
-
-    Parameters
-    ----------
-    geometry : Geometry
-        Not empty.
-
-    Returns
-    -------
-    SpotLight
-        White, with an irradiance of pi W/m^2 at the middle.
-    """
-    middle, radius = _sphere(geometry)
-    distance = LIGHT_DISTANCE * radius
-    position = middle + LIGHT_DIRECTION / np.linalg.norm(LIGHT_DIRECTION) * distance
-    outer = 1.2 * math.asin(1 / LIGHT_DISTANCE)
-    power = FULL_IRRADIANCE * distance**2
-    return SpotLight(_vector(position), _vector(middle - position), outer / 1.2, outer, (power, power, power))
-
-
-def _sphere(geometry: Geometry) -> tuple[Array, float]:
-    low, high = geometry.bounds
-    return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, SMALLEST_RADIUS)
-
-
-def _vector(values: Array) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
 
 
 @stage("scene.load")
 def load_scene(
-    source: str | Path, *, camera: Camera | None = None, lights: Sequence[Light] | None = None
+    source: str | Path, *, camera: Camera | None = None, lights: Sequence[Light] | None = None, strict: bool = False
 ) -> Scene:
     """Load a built-in scene, a scene file or a mesh file.
 
@@ -92,6 +32,9 @@ def load_scene(
         Replaces the scene's own camera.
     lights : sequence of Light, optional
         Replace the scene's own lights.
+    strict : bool
+        Refuse what is else passed over with a warning: absent material files and textures of meshes, faces of fewer
+        than three corners, indices of normals and texture coordinates that are not there.
 
     Returns
     -------
@@ -113,7 +56,7 @@ def load_scene(
     30
     """
     try:
-        with reading() as files:
+        with reading() as files, strictness(strict):
             scene = _found(source, camera, lights)
     except MemoryError as error:
         raise InputError(f"{shortened(str(source))}: does not fit in memory", file=str(source)) from error
@@ -149,6 +92,7 @@ def _with(scene: Scene, camera: Camera | None, lights: Sequence[Light] | None) -
 
 def _from_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] | None) -> Scene:
     found = read_mesh_file(path)
+    warn_of_undefined(found.undefined, str(path))
     faults: list[str] = []
     meshes, dropped = repaired_all(found.meshes, lambda number: f"{path}: {found.meshes[number].name}", faults)
     if faults:
@@ -162,7 +106,7 @@ def _from_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] |
             camera = found.cameras[0] if found.cameras else default_camera(geometry)
             lacking += [] if found.cameras else ["camera"]
         if lights is None:
-            lights = found.lights or (default_light(geometry),)
+            lights = found.lights or (default_light(geometry, camera),)
             lacking += [] if found.lights else ["light"]
     except InputError as error:
         raise InputError(f"{path}: placed to fit the mesh: {error}") from error

@@ -8,21 +8,23 @@ import dataclasses
 import itertools
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect, first_faults, shortened
-from refgi.scene.files import is_there, read_bytes
+from refgi.scene.files import is_there
+from refgi.scene.lines import TEXTURES, colour_of, lines_of, numbers_of
 from refgi.scene.material import reflects_too_much
 from refgi.scene.model import Material, Rgb
+from refgi.scene.strictness import is_strict
 from refgi.scene.texture.image import Image, image_file
 from refgi.scene.texture.texture import Texture
 
 CUTOFF = 0.5
-TEXTURES = ("bump", "disp", "decal", "norm", "refl")  # and all that starts with map_
+WHITE = (1.0, 1.0, 1.0)
 # arguments that an option of map_Kd and map_d has at most
 OPTIONS = {"-s": 3, "-o": 3, "-t": 3, "-clamp": 1, "-mm": 2, "-bm": 1, "-boost": 1, "-blendu": 1, "-blendv": 1,
            "-cc": 1, "-texres": 1, "-imfchan": 1, "-type": 1}
@@ -62,6 +64,12 @@ class Maps(NamedTuple):
 
     diffuse: TextureMap | None
     opacity: TextureMap | None = None
+    grey: bool = False  # without its texture, as there is no Kd
+
+    @property
+    def absent(self) -> list[TextureMap]:
+        """Those whose file is not there."""
+        return [found for found in self[:2] if found and not is_there(found.path)]
 
     @property
     def place(self) -> TextureMap:
@@ -71,8 +79,13 @@ class Maps(NamedTuple):
         return found
 
     def painted(self, material: Material) -> Material:
-        """Return a material with them, decoded."""
-        diffuse, opacity = self
+        """Return a material with them, decoded; raises `InputError` if one is absent where readers are strict."""
+        absent = [] if is_strict() else self.absent
+        if self.diffuse in absent:
+            material = dataclasses.replace(material, diffuse=Material().diffuse if self.grey else material.diffuse)
+        if self.opacity in absent:
+            material = dataclasses.replace(material, cutoff=None, alpha=1.0)
+        diffuse, opacity = (None if found in absent else found for found in self[:2])
         return dataclasses.replace(material, texture=diffuse and diffuse.texture(),
                                    alpha_texture=opacity and opacity.texture(opacity=True))
 
@@ -98,7 +111,7 @@ def read_library(path: Path) -> tuple[dict[str, Material], dict[str, Maps]]:
             name = " ".join(words[1:])
             current = values.setdefault(name, {})
         elif words[0] in ("Kd", "Ks", "Ke"):
-            current[words[0]] = numbers_of(words[1:4], f"{path}: line {number}")
+            current[words[0]] = colour_of(words[1:4], f"{path}: line {number}")
         elif words[0] == "Ns":
             current["Ns"] = numbers_of(words[1:2], f"{path}: line {number}", 1)
         elif words[0] in ("d", "Tr") and _is_number(words[-1]):
@@ -118,7 +131,9 @@ def read_library(path: Path) -> tuple[dict[str, Material], dict[str, Maps]]:
         text = f"{path}: options {', '.join(sorted(options))} of map_Kd passed over"
         warnings.warn(RefgiWarning(text), stacklevel=5)
     for name in maps.keys() & values.keys():
-        values[name].setdefault("Kd", (1.0, 1.0, 1.0))
+        if "Kd" not in values[name]:
+            values[name]["Kd"] = WHITE
+            maps[name] = maps[name]._replace(grey=True)
     _add_cut_outs(opacities, values, maps, path)
     too_bright = sum(_is_lobed(found) and reflects_too_much(*_reflectances(found)) for found in values.values())
     if too_bright:
@@ -136,7 +151,7 @@ def _add_cut_outs(opacities: dict[str, TextureMap], values: dict[str, dict[str, 
         if diffuse is not None and not found.lies_as(diffuse):
             elsewhere += 1
             continue
-        maps[name] = Maps(diffuse, found)
+        maps[name] = Maps(diffuse, found, name in maps and maps[name].grey)
         values.setdefault(name, {})["cutoff"] = (CUTOFF,)
         cut += 1
     partial = sum("cutoff" not in found and found.get("d", (1.0,))[0] < 1 for found in values.values())
@@ -181,8 +196,8 @@ def _warn_of_textures(textures: Sequence[tuple[str, ...]], path: Path) -> None:
         return
     kinds = ", ".join(sorted({shortened(words[0], 40) for words in textures})[:10])
     # options come before the name, which may hold spaces
-    found = {words: any(is_there(path.parent / " ".join(words[k:])) for k in range(1, min(len(words), 20)))
-             for words in set(textures)}
+    found = {words: any(is_there(path.parent / " ".join(words[k:]).replace("\\", "/"))
+                        for k in range(1, min(len(words), 20))) for words in set(textures)}
     missing = [" ".join(words[1:]) for words in textures if not found[words]]
     absent = f"; {len(missing):,} of them name no file: {first_faults([shortened(m, 80) for m in missing], ', ')}"
     bumps = any(word in words[0].lower() for words in textures for word in ("bump", "norm"))
@@ -210,25 +225,6 @@ def _material(name: str, found: dict[str, tuple[float, ...]], path: Path) -> Mat
                         alpha=1.0 if cutoff is None else min(max(found.get("d", (1.0,))[0], 0.0), 1.0), cutoff=cutoff)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
-
-
-def lines_of(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Yield the number and the words of each line that says something, continued lines joined."""
-    text = read_bytes(path).decode("utf-8", "replace").replace("\\\r\n", " ").replace("\\\n", " ")
-    for number, line in enumerate(text.splitlines(), 1):
-        words = line.partition("#")[0].split()
-        if words:
-            yield number, words
-
-
-def numbers_of(words: list[str], where: str, count: int = 3) -> tuple[float, ...]:
-    """Return so many numbers of a line; raises `InputError` if there are others."""
-    try:
-        values = tuple(float(word) for word in words)
-    except ValueError:
-        values = ()
-    expect(len(values) == count, where, f"{count} number(s)", " ".join(words))
-    return values
 
 
 def _rgb(values: tuple[float, ...]) -> Rgb:

@@ -6,24 +6,31 @@ coordinates of OBJ have v = 0 at the bottom of the picture; they are turned when
 """
 
 import warnings
-from itertools import pairwise
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from refgi.errors import InputError, RefgiWarning, expect, shortened
-from refgi.scene.files import Contents
+from refgi.errors import InputError, RefgiWarning, expect, first_faults, shortened
+from refgi.scene.files import Contents, is_there
+from refgi.scene.lines import lines_of, numbers_of
+from refgi.scene.mesh import expect_all_sound
 from refgi.scene.model import Array, Material, Mesh
-from refgi.scene.mtl import Maps, lines_of, numbers_of, read_library
+from refgi.scene.mtl import Maps, read_library
+from refgi.scene.polygons import triangles_of
+from refgi.scene.strictness import is_strict
+from refgi.scene.texture.image import expect_all_fit
 
-Corner = tuple[int, int, int]  # position, normal and texture coordinates (-1: none), counted from 0
+NOT_POLYGONS = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "free-form surfaces"}
 
 
 def read_obj(path: Path) -> Contents:
-    """Read the polygons of an OBJ file, one mesh per material in order of first use.
+    """Read the polygons of an OBJ file in its order, one mesh for each run of faces of one material.
 
-    `path`: the file; `mtllib` files are looked for beside it. Result: meshes with vertex normals where every corner
-    names one. Raises `InputError` if a line cannot be read, an index is out of range, or there are no polygons.
+    `path`: the file; `mtllib` files are looked for beside it. Result: meshes with vertex normals where any corner names
+    one; corners that name none have the normal of their face. Raises `InputError` if a line cannot be read, an index of
+    a vertex is out of range, or there are no polygons.
     """
     reader = _Reader(path)
     for number, words in lines_of(path):
@@ -31,8 +38,17 @@ def read_obj(path: Path) -> Contents:
     return reader.contents()
 
 
+class _Corners(NamedTuple):
+    """The corners of all triangles in the file's order."""
+
+    position: Array  # (m, 3)
+    normal: Array  # (m, 3); -1: none
+    coordinates: Array  # (m, 3); -1: none
+    material: Array  # (m,) in the order of first use
+
+
 class _Reader:
-    """Positions, normals and polygons by material, as the lines come."""
+    """Positions, normals and polygons, as the lines come."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -41,11 +57,17 @@ class _Reader:
         self.coordinates: list[tuple[float, ...]] = []
         self.materials: dict[str, Material] = {}
         self.maps: dict[str, Maps] = {}
-        self.without = 0  # faces whose texture has no coordinates
+        self.painted: dict[str, Material] = {}  # with their textures decoded
         self.libraries: set[str] = set()
+        self.absent: list[str] = []  # of them
+        self.absent_textures: list[str] = []
         self.coloured = 0  # vertices with a colour
-        self.triangles: dict[str, list[Corner]] = {}
-        self.current = "default"
+        self.passed_over: dict[str, int] = {}
+        self.corners: list[tuple[int, int, int]] = []  # position, normal and texture coordinates (-1: none), from 0
+        self.counts: list[int] = []  # corners of each polygon
+        self.material_of: list[int] = []  # of each polygon
+        self.names: dict[str, int] = {}  # of materials, in order of first use
+        self.current = ""
 
     def take(self, words: list[str], where: str) -> None:
         key, values = words[0], words[1:]
@@ -61,84 +83,174 @@ class _Reader:
         elif key == "usemtl" and values:
             self.current = " ".join(values)
         elif key == "mtllib" and values:
-            self._read_library(" ".join(values), where)
+            self._read_libraries(values, where)
+        elif key in NOT_POLYGONS:
+            self._pass_over(NOT_POLYGONS[key])
 
     def contents(self) -> Contents:
-        expect(bool(self.triangles), f"{self.path}: f", "at least one polygon", 0)
+        expect(bool(self.counts), f"{self.path}: f", "at least one polygon of three or more corners", 0)
+        meshes = list(self._meshes(self._triangles()))
+        self._warn()
+        expect_all_sound(meshes, lambda number: f"{self.path}: material {meshes[number].name!r}")
+        undefined = [name for name in self.names if name and name not in self.materials]
+        return Contents(tuple(meshes), undefined=() if self.absent else tuple(undefined))
+
+    def _warn(self) -> None:
         if self.coloured:
-            warnings.warn(RefgiWarning(f"{self.path}: colours of {self.coloured:,} vertices passed over"), stacklevel=4)
-        positions, normals = np.array(self.positions), np.array(self.normals)
-        coordinates = np.array([*self.coordinates, (0.0, 0.0)])
-        coordinates[:, 1] = 1 - coordinates[:, 1]
-        meshes = [mesh for name in self.triangles for mesh in self._meshes(name, positions, normals, coordinates)]
-        if self.without:
-            warnings.warn(RefgiWarning(f"{self.path}: textures of {self.without:,} triangles passed over for lack of "
-                                       "texture coordinates (vt)"), stacklevel=4)
-        return Contents(tuple(meshes))
+            warnings.warn(RefgiWarning(f"{self.path}: colours of {self.coloured:,} vertices passed over"), stacklevel=5)
+        for what, count in self.passed_over.items():
+            warnings.warn(RefgiWarning(f"{self.path}: {count:,} {what} passed over"), stacklevel=5)
+        for what, names in (("material file(s) not there, their materials are grey", self.absent),
+                            ("texture(s) of map_Kd and map_d not there, left out", self.absent_textures)):
+            if names:
+                text = f"{self.path}: {len(names):,} {what}: {first_faults(names, ', ')}"
+                warnings.warn(RefgiWarning(text), stacklevel=5)
+
+    def _pass_over(self, what: str) -> None:
+        self.passed_over[what] = self.passed_over.get(what, 0) + 1
+
+    def _read_libraries(self, words: list[str], where: str) -> None:
+        """Read the libraries of an mtllib line: one name that may hold spaces, or several."""
+        whole = " ".join(words)
+        names = [whole] if len(words) == 1 or self._library(whole) is not None else words
+        for name in names:
+            if name not in self.libraries:
+                self.libraries.add(name)
+                self._read_library(name, where)
+
+    def _library(self, name: str) -> Path | None:
+        """Return the file of a library, None where there is none."""
+        for way in (name, name.replace("\\", "/")):
+            if is_there(self.path.parent / way):
+                return self.path.parent / way
+        return None
 
     def _read_library(self, name: str, where: str) -> None:
-        if name in self.libraries:
+        found = self._library(name)
+        if found is None and not is_strict():
+            self.absent.append(shortened(name, 80))
             return
-        self.libraries.add(name)
         try:
-            materials, maps = read_library(self.path.parent / name)
-            self.materials |= materials
-            self.maps = {key: found for key, found in self.maps.items() if key not in materials} | maps
+            materials, maps = read_library(found or self.path.parent / name)
         except InputError as error:
             raise InputError(f"{where}: mtllib: {shortened(str(error), 1000)}") from error
+        # the first library that has a name counts
+        self.maps |= {key: one for key, one in maps.items() if key not in self.materials}
+        self.materials = materials | self.materials
 
     def _polygon(self, values: list[str], where: str) -> None:
-        expect(len(values) >= 3, where, "three or more corners", len(values))
-        corners = [self._corner(value, where) for value in values]
-        fan = self.triangles.setdefault(self.current, [])
-        for second, third in pairwise(corners[1:]):
-            fan += (corners[0], second, third)
+        if len(values) < 3:
+            expect(not is_strict(), where, "three or more corners", len(values))
+            self._pass_over("faces of fewer than three corners")
+            return
+        self.corners += [self._corner(value, where) for value in values]
+        self.counts.append(len(values))
+        self.material_of.append(self.names.setdefault(self.current, len(self.names)))
 
-    def _corner(self, text: str, where: str) -> Corner:
+    def _corner(self, text: str, where: str) -> tuple[int, int, int]:
         parts = text.split("/")
         position = _index(parts[0], len(self.positions), where)
-        normal = _index(parts[2], len(self.normals), where) if len(parts) > 2 and parts[2] else -1
-        has_vt = len(parts) > 1 and parts[1] and self.coordinates
-        return position, normal, _index(parts[1], len(self.coordinates), where) if has_vt else -1
+        normal = self._spare_index(parts[2], len(self.normals), where, "vn") if len(parts) > 2 and parts[2] else -1
+        coordinates = -1
+        if len(parts) > 1 and parts[1]:
+            coordinates = self._spare_index(parts[1], len(self.coordinates), where, "vt")
+        return position, normal, coordinates
 
-    def _meshes(self, name: str, positions: Array, normals: Array, coordinates: Array) -> list[Mesh]:
-        """Return the mesh of a material; what lacks the coordinates for its texture becomes another, without it."""
-        corners = np.array(self.triangles[name], np.int64)
-        material = self.materials.get(name, Material(name))
-        placed = np.repeat((corners[:, 2].reshape(-1, 3) >= 0).all(axis=1), 3)
+    def _spare_index(self, text: str, count: int, where: str, key: str) -> int:
+        """Return the index of a normal or coordinates, -1 where there is none such: the position is enough."""
+        index = _integer(text)
+        if index is None or 1 <= abs(index) <= count or is_strict():
+            return _index(text, count, where) if count or key == "vn" else -1
+        if count or key == "vn":
+            self._pass_over(f"indices of absent {'normals' if key == 'vn' else 'texture coordinates'} ({key})")
+        return -1
+
+    def _triangles(self) -> _Corners:
+        corners = np.array(self.corners, np.int64)
+        counts = np.array(self.counts, np.int64)
+        triangles, crossed = triangles_of(np.array(self.positions), corners[:, 0], counts)
+        if crossed:
+            text = f"{crossed:,} polygon(s) that cross themselves or have very many corners are fans of their first"
+            warnings.warn(RefgiWarning(f"{self.path}: {text}"), stacklevel=5)
+        position, normal, coordinates = (corners[triangles, k] for k in range(3))
+        return _Corners(position, normal, coordinates, np.repeat(np.array(self.material_of, np.int64), counts - 2))
+
+    def _meshes(self, corners: _Corners) -> Iterator[Mesh]:
+        """Yield a mesh for each run of triangles of one material, with or without its textures."""
+        positions, coordinates = np.array(self.positions), np.array([*self.coordinates, (0.0, 0.0)])
+        coordinates[:, 1] = 1 - coordinates[:, 1]
+        names = list(self.names)
+        textured = np.array([name in self.maps for name in names])[corners.material]
+        placed = np.asarray((corners.coordinates >= 0).all(axis=1))
+        if without := int(np.count_nonzero(textured & ~placed)):
+            text = f"textures of {without:,} triangles passed over for lack of texture coordinates (vt)"
+            warnings.warn(RefgiWarning(f"{self.path}: {text}"), stacklevel=5)
+        # what lacks the coordinates for its texture is a mesh without it
+        kind = 2 * corners.material + (textured & ~placed)
+        starts = np.flatnonzero(np.diff(kind, prepend=-1))
+        normal_of, normals = self._normals(corners, positions, starts)
+        run = np.cumsum(np.diff(kind, prepend=-1) != 0) - 1
+        key, number = np.unique(corners.position * (len(normals) + 1) + normal_of, return_inverse=True)
+        vertex, index = np.unique(run[:, None] * len(key) + number.reshape(-1, 3), return_inverse=True)
+        index = index.reshape(-1, 3)
+        position, normal = np.divmod(key[vertex % len(key)], len(normals) + 1)
+        first = np.searchsorted(vertex, np.arange(len(starts) + 1) * len(key)).tolist()
+        ends = np.append(starts[1:], len(kind)).tolist()
+        shown = {names[number] for number in corners.material[starts[textured[starts] & placed[starts]]]}
+        expect_all_fit((found.path for name in shown for found in self.maps[name][:2] if found),
+                       f"{self.path}: textures")
+        for k, (start, end) in enumerate(zip(starts.tolist(), ends, strict=True)):
+            part, faces = slice(first[k], first[k + 1]), slice(start, end)
+            name = names[corners.material[start]]
+            material, uv = self._painted(name, bool(textured[start] and placed[start])), None
+            if placed[faces].all():
+                uv = self._laid(coordinates[corners.coordinates[faces]], name)
+            has_normals = normal[first[k]] > 0
+            yield Mesh(positions[position[part]], index[faces] - first[k],
+                       normals[normal[part] - 1] if has_normals else None, material, name or "default", uv)
+
+    def _normals(self, corners: _Corners, positions: Array, starts: Array) -> tuple[Array, Array]:
+        """Return (m, 3) one more than the number of each corner's normal, 0 where its run has none, and normals (k, 3).
+
+        Behind the file's normals stand those of faces of which corners name none, in runs in which others do.
+        """
+        numbers = corners.normal + 1
+        lacking = numbers == 0
+        named = np.add.reduceat(np.count_nonzero(numbers, axis=1), starts)
+        in_such_runs = np.repeat(named > 0, np.diff(starts, append=len(numbers)))
+        mended = np.flatnonzero(in_such_runs & lacking.any(axis=1))
+        a, b, c = (positions[corners.position[mended, k]] for k in range(3))
+        with np.errstate(over="ignore", invalid="ignore"):  # coordinates are checked later
+            across = np.cross(b - a, c - a)
+        own = len(self.normals) + 1 + np.arange(len(mended))[:, None]
+        numbers[mended] = np.where(lacking[mended], own, numbers[mended])
+        return numbers, np.concatenate([np.array(self.normals, np.float64).reshape(-1, 3), across])
+
+    def _painted(self, name: str, textured: bool) -> Material:
+        if textured and name not in self.painted:
+            self.painted[name] = self.maps[name].painted(self.materials[name])
+            self.absent_textures += [shortened(found.path.name, 80) for found in self.maps[name].absent]
+        return self.painted[name] if textured else self.materials.get(name, Material(name or "default"))
+
+    def _laid(self, coordinates: Array, name: str) -> Array:
+        """Return texture coordinates, v downwards, as a material's maps lie: u' = s u + o as the file has them."""
         if name not in self.maps:
-            return [self._mesh(name, corners, positions, normals, material, coordinates if placed.all() else None)]
-        self.without += int(np.count_nonzero(~placed)) // 3
-        meshes = []
-        if placed.any():
-            found, painted = self.maps[name].place, self.maps[name].painted(material)
-            # u' = s u + o as the file has them, v upwards
-            scale, offset, bottom = np.array(found.scale), np.array(found.offset), np.array((0.0, 1.0))
-            turned = (coordinates - bottom) * scale + bottom + offset * (1.0, -1.0)
-            meshes.append(self._mesh(name, corners[placed], positions, normals, painted, turned))
-        if not placed.all():
-            meshes.append(self._mesh(name, corners[~placed], positions, normals, material, None))
-        return meshes
-
-    def _mesh(self, name: str, corners: Array, positions: Array, all_normals: Array, material: Material,
-              coordinates: Array | None) -> Mesh:
-        uv = None if coordinates is None else coordinates[corners[:, 2]].reshape(-1, 3, 2)
-        corners = corners[:, :2]
-        if (corners[:, 1] < 0).any():
-            used, faces = np.unique(corners[:, 0], return_inverse=True)
-            normals = None
-        else:
-            pairs, faces = np.unique(corners, axis=0, return_inverse=True)
-            used, normals = pairs[:, 0], all_normals[pairs[:, 1]]
-        mesh = Mesh(positions[used], faces.reshape(-1, 3), normals, material, name, uv)
-        mesh.expect_sound(f"{self.path}: material {name!r}")
-        return mesh
+            return coordinates
+        found, bottom = self.maps[name].place, np.array((0.0, 1.0))
+        return np.asarray((coordinates - bottom) * found.scale + bottom + np.array(found.offset) * (1.0, -1.0))
 
 
 def _index(text: str, count: int, where: str) -> int:
-    try:
-        index = int(text)
-    except ValueError:
-        index = 0
-    expect(1 <= abs(index) <= count, where, f"an index from 1 to {count} (or negative)", text)
+    """Return an index of the file, from 1 or negative, counted from 0."""
+    index = _integer(text)
+    if index is None or not 1 <= abs(index) <= count:
+        expect(False, where, f"an index from 1 to {count} (or negative)", text)
+        return -1
     return index - 1 if index > 0 else count + index
+
+
+def _integer(text: str) -> int | None:
+    try:
+        return int(text)
+    except ValueError:
+        return None

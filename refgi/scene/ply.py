@@ -1,131 +1,177 @@
-"""PLY meshes, parsed by trimesh between two checks of our own.
+"""PLY meshes: polygons of any sizes and triangle strips, vertex normals, textures that a comment names."""
 
-trimesh trusts the header's counts and silently keeps what it could read, so the header is held against the file's
-size before, and the result against the header after. Its import takes more than a second and is therefore left until
-a PLY file is met.
-"""
-
-import io
 import warnings
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from refgi.errors import InputError, RefgiWarning, expect
-from refgi.scene.files import Contents, read_bytes
-from refgi.scene.model import Array, Mesh
+from refgi.errors import RefgiWarning, expect
+from refgi.scene.files import Contents, is_there
+from refgi.scene.material import UNPAINTED
+from refgi.scene.model import Array, Material, Mesh
+from refgi.scene.plydata import Column, Ply, read_entries
+from refgi.scene.plyheader import Element
+from refgi.scene.polygons import triangles_of
+from refgi.scene.strictness import tolerate
+from refgi.scene.texture.image import image_file
+from refgi.scene.texture.texture import Texture
 
-SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2, "uint16": 2, "int": 4,
-         "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4, "double": 8, "float64": 8}
-LONGEST_HEADER = 65536  # bytes
 COLOURS = {"red", "green", "blue", "r", "g", "b"}
-
-
-class _Element(NamedTuple):
-    name: str
-    length: int
-    properties: list[str]
-    least_bytes: int  # of one entry in a binary file; lists hold at least three items in a face
+CORNERS = ("vertex_indices", "vertex_index")
+COORDINATES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
+TEXTURE = "TextureFile"  # of a comment
 
 
 def read_ply(path: Path) -> Contents:
-    """Read the triangles (and vertex normals) of a PLY file.
+    """Read the triangles, vertex normals and textures of a PLY file.
 
-    `path`: the file, ASCII or binary. Result: one mesh of the default material. Raises `InputError` if the file is
-    damaged, cut short or holds no triangles.
+    `path`: the file, ASCII or binary. Result: one mesh, or one for each run of faces of one texture where there are
+    several. Raises `InputError` if the file is damaged, cut short or holds no triangles.
     """
-    content = read_bytes(path)
-    elements, encoding, start = _header(content, path)
-    _expect_complete(elements, encoding, content, start, path)
-    parsed = _parsed(content, path)
-    vertices, faces = np.asarray(parsed.get("vertices", ())), parsed.get("faces", ())
-    _warn_of_colours(elements, path)
-    expect(len(vertices) == elements["vertex"].length, f"{path}: element vertex",
-           f"{elements['vertex'].length} entries", len(vertices))
-    expect(len(faces) > 0, f"{path}: face", "at least one", 0)
-    expect(len(faces) >= elements["face"].length, f"{path}: element face",
-           f"{elements['face'].length} polygons of three or four corners", len(faces))
-    normals = parsed.get("vertex_normals")
-    mesh = Mesh(vertices, _triangles(faces, path), None if normals is None else np.asarray(normals),
-                name=path.stem)
+    ply = read_entries(path)
+    vertex = {key: one for key, one in ply.columns.get("vertex", {}).items() if one.counts is None}
+    expect(bool(vertex) and ply.elements["vertex"].length > 0, f"{path}: element vertex", "at least one", 0)
+    expect({"x", "y", "z"} <= vertex.keys(), f"{path}: element vertex", "properties x, y and z", list(vertex))
+    _warn_of_colours(ply.elements, path)
+    vertices = np.column_stack([vertex[key].values for key in "xyz"])
+    has_normals = {"nx", "ny", "nz"} <= vertex.keys()
+    normals = np.column_stack([vertex[key].values for key in ("nx", "ny", "nz")]) if has_normals else None
+    faces, uv, texture_of = _faces(ply, vertices, path)
+    mesh = Mesh(vertices, faces, normals, UNPAINTED, path.stem)
     mesh.expect_sound(f"{path}")
-    return Contents((mesh,))
+    uv = _vertex_coordinates(vertex, faces) if uv is None else uv
+    return Contents(tuple(_painted(mesh, uv, texture_of, ply.comments, path)))
 
 
-def _warn_of_colours(elements: dict[str, _Element], path: Path) -> None:
+def _warn_of_colours(elements: dict[str, Element], path: Path) -> None:
     """Say what a renderer of constant reflectances does not read."""
     for name, what in (("vertex", "vertices"), ("face", "faces")):
-        found = [key for key in elements[name].properties if key.removeprefix("diffuse_") in COLOURS]
+        names = elements[name].names if name in elements else []
+        found = [key for key in names if key.removeprefix("diffuse_") in COLOURS]
         if found:
             text = f"{path}: colours of {elements[name].length:,} {what} ({', '.join(found[:8])}) passed over"
             warnings.warn(RefgiWarning(text), stacklevel=4)
 
 
-def _header(content: bytes, path: Path) -> tuple[dict[str, _Element], str, int]:
-    """Return the elements by name, the encoding, and where the entries start."""
-    expect(content[:3] == b"ply", f"{path}", "a PLY file (first line 'ply')", content[:8])
-    end = content.find(b"end_header", 0, LONGEST_HEADER)
-    line_end = content.find(b"\n", end)
-    expect(end > 0 and line_end > 0, f"{path}", "a header that ends (the file is cut short)", f"{len(content)} bytes")
-    lines = [line.split() for line in content[:end].decode("ascii", "replace").splitlines()[1:]]
-    encoding = next((line[1] for line in lines if line[:1] == ["format"] and len(line) > 1), "")
-    known = ("ascii", "binary_little_endian", "binary_big_endian")
-    expect(encoding in known, f"{path}: format", f"one of {', '.join(known)}", encoding)
-    elements: dict[str, _Element] = {}
-    current: _Element | None = None
-    for line in lines:
-        if line[:1] == ["element"]:
-            expect(len(line) == 3 and line[2].isdecimal() and len(line[2]) < 16, f"{path}: element",
-                   "a name and a count of at most 15 digits", " ".join(line))
-            current = _Element(line[1], int(line[2]), [], 0)
-            elements[line[1]] = current
-        elif line[:1] == ["property"]:
-            expect(current is not None, f"{path}: property", "an element before it", " ".join(line))
-            current = _with_property(current, line, path)  # type: ignore[arg-type]
-            elements[current.name] = current
-    return elements, encoding, line_end + 1
+def _faces(ply: Ply, vertices: Array, path: Path) -> tuple[Array, Array | None, Array]:
+    """Return triangles (m, 3), texture coordinates of their corners that belong to faces, and the texture of each."""
+    parts = [_corners(ply, name, path) for name in ("face", "tristrips")]
+    some = any(part is not None and len(part.values) for part in parts)
+    expect(some, f"{path}: element face", "at least one, with a list vertex_indices", 0)
+    triangles, uv, texture_of = np.zeros((0, 3), np.int64), None, np.zeros(0, np.int64)
+    if parts[0] is not None:
+        corners, counts, chosen = _polygons(parts[0], len(vertices), path)
+        within, crossed = triangles_of(vertices, corners, counts)
+        if crossed:
+            text = f"{crossed:,} polygon(s) that cross themselves or have very many corners are fans of their first"
+            warnings.warn(RefgiWarning(f"{path}: {text}"), stacklevel=4)
+        triangles = (corners if len(within) * 3 == len(corners) else corners[within]).reshape(-1, 3).astype(np.int64)
+        texture_of = np.zeros(len(within), np.int64)
+        uv = _corner_coordinates(ply.columns["face"].get("texcoord"), parts[0], within, chosen, path)
+        number = ply.columns["face"].get("texnumber")
+        if number is not None and number.counts is None:
+            texture_of = np.repeat(number.values[chosen].astype(np.int64), counts - 2)
+    if parts[1] is not None:
+        strips = _strips(parts[1])
+        triangles, uv = np.concatenate([triangles, strips]), None if len(strips) else uv
+        texture_of = np.append(texture_of, np.zeros(len(strips), np.int64))
+    expect(len(triangles) > 0, f"{path}: element face", "a polygon of three or more corners", 0)
+    return triangles, uv, texture_of
 
 
-def _with_property(element: _Element, line: list[str], path: Path) -> _Element:
-    is_list = line[1:2] == ["list"]
-    types = line[2:4] if is_list else line[1:2]
-    good = len(line) == (5 if is_list else 3) and all(name in SIZES for name in types)
-    expect(good, f"{path}: property", "known types and a name", " ".join(line))
-    least = SIZES[types[0]] + 3 * SIZES[types[1]] * (element.name == "face") if is_list else SIZES[types[0]]
-    return element._replace(properties=[*element.properties, line[-1]], least_bytes=element.least_bytes + least)
+def _corners(ply: Ply, name: str, path: Path) -> Column | None:
+    """Return the lists of vertex indices of an element, None where it has none."""
+    columns = ply.columns.get(name, {})
+    key = next((key for key in CORNERS if key in columns), None)
+    if key is None or not ply.elements[name].length:
+        return None
+    good = columns[key].counts is not None and columns[key].values.dtype.kind in "iu"
+    expect(good, f"{path}: element {name}: {key}", "a list of integers", columns[key].values.dtype.name)
+    return columns[key]
 
 
-def _expect_complete(elements: dict[str, _Element], encoding: str, content: bytes, start: int, path: Path) -> None:
-    for name, needed in (("vertex", ("x", "y", "z")), ("face", ())):
-        expect(name in elements and elements[name].length > 0, f"{path}: element {name}", "at least one", 0)
-        lacking = [key for key in needed if key not in elements[name].properties]
-        expect(not lacking, f"{path}: element {name}", "properties x, y and z", elements[name].properties)
-    if encoding == "ascii":
-        needed_lines, lines = sum(e.length for e in elements.values()), content.count(b"\n", start) + 1
-        expect(lines >= needed_lines, f"{path}", f"{needed_lines} lines of entries (the file is cut short)", lines)
-    else:
-        least, left = sum(e.length * e.least_bytes for e in elements.values()), len(content) - start
-        expect(left >= least, f"{path}", f"at least {least} bytes of entries (the file is cut short)", left)
+def _polygons(lists: Column, vertices: int, path: Path) -> tuple[Array, Array, Array]:
+    """Return the corners and their counts of all polygons of three or more, and (faces,) which faces these are."""
+    assert lists.counts is not None
+    corners, counts = lists.values, lists.counts
+    if len(corners) and not (corners.min() >= 0 and corners.max() < vertices):
+        outside = (corners < 0) | (corners >= vertices)
+        face = int(np.searchsorted(np.cumsum(counts), np.argmax(outside), "right"))
+        first = int(counts[:face].sum())
+        expect(False, f"{path}: face {face}", f"vertex indices from 0 to {vertices - 1}",
+               corners[first : first + counts[face]].tolist())
+    chosen = np.asarray(counts >= 3)
+    if few := int(np.count_nonzero(~chosen)):
+        tolerate(f"{path}: {few:,} faces of fewer than three corners passed over")
+        corners, counts = corners[np.repeat(chosen, counts)], counts[chosen]
+    return corners, counts, chosen
 
 
-def _parsed(content: bytes, path: Path) -> dict[str, Any]:
-    """Let trimesh parse the file; whatever it raises or warns of becomes one error."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from trimesh.exchange.ply import load_ply
+def _strips(lists: Column) -> Array:
+    """Return the triangles (m, 3) of strips, which -1 starts anew; every other one turned to the side of the first."""
+    assert lists.counts is not None
+    values = lists.values.astype(np.int64)
+    if lists.values.dtype.kind == "u":
+        values[values == np.iinfo(lists.values.dtype).max] = -1
+    values = np.insert(values, np.cumsum(lists.counts), -1)
+    number = np.arange(len(values))
+    place = number - np.maximum.accumulate(np.where(values < 0, number, -1)) - 1  # in its strip
+    triangles = np.stack([values[:-2], values[1:-1], values[2:]], axis=1)
+    odd = place[:-2] % 2 == 1
+    triangles[odd, :2] = triangles[odd, 1::-1]
+    a, b, c = triangles.T
+    return np.asarray(triangles[(triangles >= 0).all(axis=1) & (a != b) & (b != c) & (c != a)])
 
-        warnings.simplefilter("error")
-        try:
-            return dict(load_ply(io.BytesIO(content), fix_texture=False, skip_materials=True))
-        except Exception as error:  # trimesh documents no types; a damaged file raises nearly any
-            raise InputError(f"{path}: damaged PLY entries: {error}") from error
+
+def _vertex_coordinates(vertex: dict[str, Column], faces: Array) -> Array | None:
+    """Return (m, 3, 2) texture coordinates that belong to vertices, v downwards, None where there are none."""
+    for pair in COORDINATES:
+        if set(pair) <= vertex.keys():
+            u, v = (vertex[key].values.astype(np.float64) for key in pair)
+            return np.asarray(np.stack([u, 1 - v], axis=1)[faces])
+    return None
 
 
-def _triangles(faces: Any, path: Path) -> Array:
-    corners = np.asarray(faces)
-    good = corners.ndim == 2 and corners.shape[1] in (3, 4) and corners.dtype.kind in "iu"
-    expect(good, f"{path}: face", "lists of three or four indices", f"{corners.dtype} {corners.shape}")
-    if corners.shape[1] == 4:
-        corners = corners[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    return corners.astype(np.int64)
+def _corner_coordinates(found: Column | None, lists: Column, within: Array, chosen: Array, path: Path) -> Array | None:
+    """Return (m, 3, 2) texture coordinates that belong to the corners of faces, v downwards, None where some lack."""
+    if found is None or found.counts is None or lists.counts is None:
+        return None
+    if not np.array_equal(found.counts, 2 * lists.counts):
+        tolerate(f"{path}: texture coordinates of faces (texcoord) passed over: not one pair for each corner")
+        return None
+    pairs = found.values.astype(np.float64).reshape(-1, 2)[np.repeat(chosen, lists.counts)]
+    return np.asarray(np.stack([pairs[:, 0], 1 - pairs[:, 1]], axis=1)[within])
+
+
+def _painted(mesh: Mesh, uv: Array | None, texture_of: Array, comments: list[str], path: Path) -> list[Mesh]:
+    """Return the mesh with its textures, a mesh for each run of faces of one."""
+    names = [text.split(None, 1)[1].strip() for text in comments if text.split()[0] == TEXTURE and " " in text.strip()]
+    if uv is None or not names:
+        if names:
+            tolerate(f"{path}: {len(names)} {TEXTURE}(s) passed over for lack of texture coordinates")
+        usable = uv is not None and bool(np.isfinite(uv).all())
+        return [Mesh(mesh.vertices, mesh.faces, mesh.normals, mesh.material, mesh.name, uv if usable else None)]
+    materials = [_material(name, path) for name in names]
+    outside = (texture_of < 0) | (texture_of >= len(materials))
+    number = np.where(outside, len(materials), texture_of)
+    materials.append(UNPAINTED)
+    starts = np.flatnonzero(np.diff(number, prepend=-1)).tolist()
+    meshes = []
+    for start, end in zip(starts, [*starts[1:], len(number)], strict=True):
+        used, faces = np.arange(len(mesh.vertices)), mesh.faces
+        if len(starts) > 1:
+            used, faces = np.unique(mesh.faces[start:end], return_inverse=True)
+        meshes.append(Mesh(mesh.vertices[used], faces.reshape(-1, 3),
+                           None if mesh.normals is None else mesh.normals[used], materials[number[start]], mesh.name,
+                           uv[start:end]))
+        meshes[-1].expect_sound(f"{path}")
+    return meshes
+
+
+def _material(name: str, path: Path) -> Material:
+    """Return the material of a texture, grey where its file is absent."""
+    file = path.parent / name.replace("\\", "/")
+    if not is_there(file):
+        tolerate(f"{path}: {TEXTURE}: {file.name}: no such file, its faces are grey")
+        return UNPAINTED
+    return Material(diffuse=(1.0, 1.0, 1.0), texture=Texture(image_file(file)))

@@ -20,6 +20,7 @@ from refgi.scene.values import Array
 
 # A face counts as flat when twice its area is lost in the rounding of the cross product that gives it.
 FLAT = 16 * float(np.finfo(np.float64).eps)
+FAINTEST, NEAREST = 1e-9, 1e-6  # of a picture's light; m
 SMALLEST_USUAL, LARGEST_USUAL = 0.01, 1000.0  # m across
 
 
@@ -152,6 +153,18 @@ def lights_with_power(lights: Sequence[Light], where: str) -> tuple[Light, ...]:
         noun = "light" if dropped == 1 else "lights"
         warnings.warn(RefgiWarning(f"{where}: {dropped} {noun} of zero power left out"), stacklevel=3)
     return remaining
+
+
+def faintest_irradiance(lights: Sequence[Light], geometry: Geometry) -> float:
+    """Return the irradiance (W/m^2) below which a picture under these lights is black: theirs at the middle times 1e-9.
+
+    A light in the middle counts as a hundredth of the diagonal away.
+    """
+    middle, nearest = np.mean(geometry.bounds, axis=0), max(geometry.diagonal / 100, NEAREST)
+    total = sum(max(_power(light)) / (1.0 if isinstance(light, DirectionalLight) else
+                                      max(float(np.linalg.norm(middle - light.position)), nearest) ** 2)
+                for light in lights)
+    return FAINTEST * total
 
 
 def _power(light: Light) -> tuple[float, float, float]:

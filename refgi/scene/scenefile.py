@@ -1,6 +1,5 @@
 """Scene files (JSON with meshes, materials, camera and lights; keys in docs/scenes.md), and mesh files by suffix."""
 
-import codecs
 import collections
 import dataclasses
 import json
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from refgi.errors import MOST_FAULTS, InputError, expect, first_faults, shortened
-from refgi.scene.files import Contents, is_there, read_bytes
+from refgi.scene.files import Contents, expect_utf8, is_there, read_bytes, warn_of_undefined
 from refgi.scene.gltf import read_gltf
 from refgi.scene.mesh import expect_memory
 from refgi.scene.model import Camera, Light, Material, Mesh, Scene, merge
@@ -41,7 +40,7 @@ def read_scene_file(path: Path, camera: Camera | None, lights: Sequence[Light] |
     `path`: the file; meshes are looked for beside it. Result: the scene, in the order of the file's objects. Raises
     `InputError`: one error with all faults of the file, else one with all faults of its meshes.
     """
-    content = read_bytes(path).removeprefix(codecs.BOM_UTF8)
+    content = expect_utf8(read_bytes(path), path)
     entry = _validated(content, path, need_camera=camera is None, need_lights=lights is None)
     meshes = _meshes(entry, _materials(entry, path), path)
     geometry, used = merge(meshes, smooth=any(mesh.normals is not None for mesh in meshes))
@@ -189,6 +188,7 @@ def _object_meshes(
     contents: dict[str, Contents | InputError] = {}
     meshes: list[Mesh] = []
     owner: list[int] = []
+    undefined: dict[str, None] = {}
     vertices = faces = 0
     for number, item in enumerate(entry.objects):
         try:
@@ -209,6 +209,9 @@ def _object_meshes(
             faults.append(f"{path}: objects[{number}].material: {error}")
             continue
         owner += [number] * len(found.meshes)
+        if item.material is None:
+            undefined |= dict.fromkeys(name for name in found.undefined if name not in materials)
+    warn_of_undefined(list(undefined), str(path))
     return meshes, owner
 
 

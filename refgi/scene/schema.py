@@ -42,11 +42,12 @@ Matrix = Annotated[tuple[Number, ...], Field(min_length=16, max_length=16)]
 
 
 class Entry(BaseModel):
-    """What every object of the file has in common: a `note` is allowed anywhere, other unknown keys nowhere."""
+    """What every object of the file has in common: `note` and `extras` are allowed anywhere, unknown keys nowhere."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
     note: str = ""
+    extras: Any = None  # of other programs
 
     @model_validator(mode="after")
     def build_once(self) -> Self:

@@ -1,12 +1,11 @@
 """Values by key: find what a key means, change several at once, and list them."""
 
 import dataclasses
-import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from typing import Any, TypeVar
 
-from refgi.errors import InputError, first_faults
+from refgi.errors import InputError, first_faults, nearest
 from refgi.settings.fields import Settings, checked, choices_of, expected, hints, is_choice, may_be_none
 from refgi.settings.tree import Leaf, leaves
 
@@ -203,8 +202,8 @@ def _principals_below(kind: type[Settings], prefix: str) -> Iterable[Leaf]:
 def _hint(key: str, tree: Sequence[Leaf]) -> str:
     whole = {name: leaf.key for leaf in tree for name in (leaf.key.rpartition(".")[2], leaf.key)}
     whole |= {part: part for leaf in tree for part in leaf.key.split(".")[:-1]}
-    near = difflib.get_close_matches(key, whole, n=1)
-    return f"; did you mean {whole[near[0]]!r}?" if near else ""
+    near = nearest(key, whole)
+    return f"; did you mean {whole[near]!r}?" if near else ""
 
 
 def _nested(values: Mapping[str, Any]) -> dict[str, Any]:

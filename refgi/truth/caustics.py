@@ -28,7 +28,6 @@ from refgi.truth.surfaces import Surfaces, around, face_cross, face_normal, heig
 Array = npt.NDArray[Any]
 
 MIRROR_EXPONENT = 100.0  # lobes from here on count as mirror-like: half of their flux lies within 7 degrees
-SHARP_FOR_LOBES = 1e3  # half of its flux lies within 2.1 degrees: receivers' lobes meet it too rarely by chance
 SHARP_LOBE = 3e4  # half of its flux lies within 0.4 degrees: sharper than cells of light on curved surfaces
 LONGEST_CHAIN = 16
 

@@ -15,11 +15,13 @@ from refgi.scene import LightTable
 from refgi.truth.cell_densities import (
     Beside,
     Tops,
+    direction_density,
     found_for,
     image_density,
     near_density,
     point_of,
     rays_beside,
+    response,
     tops_for,
 )
 from refgi.truth.cell_rays import Picks
@@ -81,9 +83,11 @@ def _connect_to_receiver(beside: Beside, r: int, surfaces: Surfaces, lights: Lig
         mirror, chance = found.mirror, found.mirror_chance
     if mirror >= 0 and beside.counts.mirrors > 0:
         image = beside.counts.mirrors * chance * image_density(beside, k, mirror, r, w)
-    total = near_density(beside.counts.directions, dot(n, w), image, (-dot(g, w), dot(toward, toward), dot(g, back)))
+    cosine, lobes = dot(n, w), beside.lobes
+    near = beside.counts.directions * direction_density(lobes, r, w, cosine)
+    total = near_density(near, image, (-dot(g, w), dot(toward, toward), dot(g, back)))
     total += picks.density[ray] * length * length
-    if _fill_lobe(surfaces, triangle, (y, g, back, w), dot(n, w), power, total, shadows, ray):
+    if _fill_lobe(surfaces, triangle, (y, g, back, w), response(lobes, r, w, cosine), power, total, shadows, ray):
         offset = ray_offset(y[0], y[1], y[2], grain) + far_offset(way[0], way[1], way[2])
         for c in range(3):
             shadows.origin[ray, c] = receivers.origin[c, r]
@@ -109,7 +113,8 @@ def _connect_to_light(beside: Beside, r: int, surfaces: Surfaces, lights: LightT
     length = np.float64(picks.paths.travelled[ray]) + picks.paths.distance[ray]
     total = rays_beside(beside, k, found, r, (w, cosine, length), (dot(g, back), square, dot(g, (lx, ly, lz))))
     power = (red * square, green * square, blue * square)
-    if _fill_lobe(surfaces, triangle, (y, g, (lx, ly, lz), w), cosine, power, total, shadows, ray):
+    received = response(beside.lobes, r, w, cosine)
+    if _fill_lobe(surfaces, triangle, (y, g, (lx, ly, lz), w), received, power, total, shadows, ray):
         aim_at_light(lights, k, (y, g, toward), far, lift(surfaces, triangle, y, g, grain), grain, shadows, ray)
 
 
@@ -126,9 +131,9 @@ def subtract(a: tuple[float, float, float], b: tuple[float, float, float]) -> tu
 
 
 @kernel
-def _fill_lobe(surfaces: Surfaces, triangle: int, sender: Any, cosine: float, power: Any, total: float,
+def _fill_lobe(surfaces: Surfaces, triangle: int, sender: Any, received: float, power: Any, total: float,
                shadows: Shadows, ray: int) -> bool:
-    """Fill rho I pattern <n_x.w> / (pi r^2) over all densities, `total` r^2; return whether that is light.
+    """Fill rho I pattern / (pi r^2) over all densities, `total` r^2, times `received`; return whether that is light.
 
     `sender`: the point, its face normal, towards the light, and the direction from the receiver. `power`: I, W/sr.
     """
@@ -138,6 +143,6 @@ def _fill_lobe(surfaces: Surfaces, triangle: int, sender: Any, cosine: float, po
     pattern = lobe_pattern(surfaces, material, n, light, (-w[0], -w[1], -w[2]))
     most = 0.0
     for c in range(3):
-        shadows.contribution[ray, c] = glossy[c] * power[c] * pattern * cosine / (np.pi * total) if total > 0 else 0.0
+        shadows.contribution[ray, c] = glossy[c] * power[c] * pattern * received / (np.pi * total) if total > 0 else 0.0
         most = max(most, shadows.contribution[ray, c])
     return most > 0

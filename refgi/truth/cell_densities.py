@@ -10,11 +10,13 @@ light besides (`refgi.truth.cell_walk`), and
 With r and d the distances from the point y to the receiver and to the light, g the face normal at y, p the chance of a
 cell and W its measure, N directions (a), k_b and k_c picks put
 
-    n_a = N <n_x.w> / pi F,   n_b = k_b ((1 - e) p_b / W + e / (lights W_light)),   n_c = k_c p_c D(w) F,
+    n_a = N D_a(w) F,   n_b = k_b ((1 - e) p_b / W + e / (lights W_light)),   n_c = k_c p_c D(w) F,
 
-F = <g.-w> d^2 / (r^2 <g.l>), rays on a unit of the light's measure, and each adds the lobe's term over n_a + n_b + n_c
-(the balance heuristic of multiple importance sampling). So no contribution is larger than what the best of them would
-give: near a flat mirror n_c follows the lobe itself, however sharp it is.
+F = <g.-w> d^2 / (r^2 <g.l>), rays on a unit of the light's measure. D_a is <n_x.w> / pi, the density of hemisphere
+sampling, or where a glossy receiver's reflection is asked for that of its lobe, (P_x + 1) / (2 pi) <m.w>^P_x, by which
+its picks go as well. Each ray adds the lobe's term over n_a + n_b + n_c (the balance heuristic of multiple importance
+sampling). So no contribution is larger than what the best of them would give: near a flat mirror n_c follows the lobe
+itself, however sharp it is.
 """
 
 import math
@@ -22,15 +24,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numba import types
 
-from refgi.jit import kernel
+from refgi.jit import by_type, kernel
 from refgi.lobes import lobe_gap, lobe_power
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import DIRECTIONAL
-from refgi.truth.cell_walk import Found, column, fill_tops, found_at
+from refgi.truth.cell_walk import Found, Receiver, column, fill_tops, found_at
 from refgi.truth.lobe_cells import LobeCells
+from refgi.truth.lobe_receivers import Lobes
 from refgi.truth.lobe_tree import LobeTree
-from refgi.truth.paths import dot, row
+from refgi.truth.paths import Paths, dot, row
 
 Array = npt.NDArray[Any]
 
@@ -50,6 +54,7 @@ class Beside(NamedTuple):
 
     cells: LobeCells
     receivers: RayReceivers
+    lobes: Lobes | None  # of glossy receivers, where their reflection is asked for
     counts: Counts
     first: int  # receiver of the first ray
     hide: bool  # as in `refgi.truth.paths.Sides`
@@ -63,10 +68,58 @@ class Tops(NamedTuple):
     sums: Array  # (t + 1,) float64: of those before
 
 
+def receiver_at(receivers: Any, lobes: Any, r: Any) -> Any:
+    """Return receiver r as picks see it; `lobes` choose what is compiled."""
+    return _plain(receivers, lobes, r) if lobes is None else _glossy(receivers, lobes, r)
+
+
+def _plain(receivers: Any, lobes: Any, r: Any) -> Any:  # noqa: ARG001
+    return Receiver(column(receivers.position, r), column(receivers.normal, r), None)
+
+
+def _glossy(receivers: Any, lobes: Any, r: Any) -> Any:
+    m, square = column(lobes.mirrored, r), np.float32(1 / (lobes.exponent[r] + 1))
+    lobe = np.float32(m[0]), np.float32(m[1]), np.float32(m[2]), square
+    return Receiver(column(receivers.position, r), column(receivers.normal, r), lobe)
+
+
+@by_type(receiver_at)
+def _by_type(receivers: Any, lobes: Any, r: Any) -> Any:  # noqa: ARG001
+    return _plain if isinstance(lobes, types.NoneType) else _glossy
+
+
 @kernel
-def near_density(directions: float, cos_x: float, image: float, sender: tuple[float, float, float]) -> Any:
-    """Return (n_a + n_c) r^2; `image`: k_c p_c D. `sender`: <g.-w>, d^2 (1 for a directional light), <g.l>."""
-    return (directions * cos_x / np.pi + image) * abs(sender[0]) * sender[1] / max(sender[2], 1e-30)
+def takes(lobes: Lobes | None, r: int) -> bool:
+    """Return whether a receiver has picks: sharp lobes have directions alone."""
+    return True if lobes is None else lobes.exponent[r] <= lobes.widest
+
+
+@kernel
+def direction_density(lobes: Lobes | None, r: int, w: tuple[float, float, float], cosine: float) -> Any:
+    """Return D_a(w), 1/sr; `cosine`: <n_x.w>."""
+    return cosine / np.pi if lobes is None else (lobes.exponent[r] + 1) / (2 * np.pi) * _of_lobe(lobes, r, w)
+
+
+@kernel
+def response(lobes: Lobes | None, r: int, w: tuple[float, float, float], cosine: float) -> Any:
+    """Return what a receiver makes of radiance from w: <n_x.w>, times f_s / s of its lobe where asked for."""
+    return cosine if lobes is None else cosine * (lobes.exponent[r] + 2) / (2 * np.pi) * _of_lobe(lobes, r, w)
+
+
+@kernel
+def _of_lobe(lobes: Lobes, r: int, w: tuple[float, float, float]) -> Any:
+    """Return <m.w>^P."""
+    m = column(lobes.mirrored, r)
+    return lobe_power(lobe_gap(m[0], m[1], m[2], w[0], w[1], w[2]), lobes.exponent[r])
+
+
+@kernel
+def near_density(near: float, image: float, sender: tuple[float, float, float]) -> Any:
+    """Return (n_a + n_c) r^2.
+
+    `near`: N D_a. `image`: k_c p_c D. `sender`: <g.-w>, d^2 (1 for a directional light), <g.l>.
+    """
+    return (near + image) * abs(sender[0]) * sender[1] / max(sender[2], 1e-30)
 
 
 @kernel
@@ -77,14 +130,29 @@ def rays_beside(beside: Beside, k: int, found: Found, r: int, way: tuple[tuple[f
     image = 0.0
     if found.mirror >= 0 and beside.counts.mirrors > 0:
         image = beside.counts.mirrors * found.mirror_chance * image_density(beside, k, found.mirror, r, w)
+    near = beside.counts.directions * direction_density(beside.lobes, r, w, cosine)
     far = even_density(beside.cells, k, found.cell, found.chance, beside.counts.cells)
-    return near_density(beside.counts.directions, cosine, image, sender) + far * length * length
+    return near_density(near, image, sender) + far * length * length
+
+
+@kernel
+def share_beside(beside: Beside, tops: "Tops", k: int, hit: Any, paths: Paths, ray: int,
+                 sender: tuple[float, float, float]) -> float:
+    """Return the share of directions, n_a / (n_a + n_b + n_c), in the lobe at a point and face normal that one hit."""
+    r = beside.first + ray // beside.counts.directions
+    if not takes(beside.lobes, r):
+        return 1.0
+    w, cosine = row(paths.direction, ray), np.float64(paths.cosine[ray])
+    near = near_density(beside.counts.directions * direction_density(beside.lobes, r, w, cosine), 0.0, sender)
+    found = found_for(beside, k, hit[0], hit[1], r, tops)
+    length = np.float64(paths.travelled[ray]) + paths.distance[ray]
+    return near / rays_beside(beside, k, found, r, (w, cosine, length), sender) if near > 0 else 0.0
 
 
 @kernel
 def even_density(cells: LobeCells, k: int, leaf: int, chance: float, picks: int) -> Any:
     """Return n_b in a leaf that is picked with a probability of `chance`."""
-    share = (1 - EVEN) * chance * 4.0 ** cells.corner[leaf, 2] + EVEN / len(cells.squares.kind)
+    share = (1 - EVEN) * chance * math.ldexp(1.0, 2 * cells.corner[leaf, 2]) + EVEN / len(cells.squares.kind)
     return picks * share / cells.squares.measure[k]
 
 
@@ -128,11 +196,11 @@ def tops_for(tree: LobeTree) -> Tops:
 def found_for(beside: Beside, k: int, y: tuple[float, float, float], g: tuple[float, float, float], r: int,
               tops: Tops) -> Found:
     """Return the cells that hold a point for receiver r, whose top groups are computed once."""
-    x, n = column(beside.receivers.position, r), column(beside.receivers.normal, r)
+    to = receiver_at(beside.receivers, beside.lobes, r)
     if tops.receiver[0] != r:
-        fill_tops(beside.cells.tree, x, n, tops.found, tops.sums)
+        fill_tops(beside.cells.tree, to, tops.found, tops.sums)
         tops.receiver[0] = r
-    return found_at(beside.cells, k, y, g, x, n, tops.sums)
+    return found_at(beside.cells, k, y, g, to, tops.sums)
 
 
 @kernel

@@ -17,8 +17,8 @@ Array = npt.NDArray[Any]
 
 
 def with_cells(task: Task) -> Task:
-    """Return a task of irradiance with cells of its senders' lobes."""
-    if task.lobes is not None or not task.picks or not task.scene.lights or not task.surfaces.specular.any():
+    """Return a task with cells of its senders' lobes."""
+    if not task.picks or not task.scene.lights or not task.surfaces.specular.any():
         return task
     return task._replace(cells=lobe_cells(task.scene, task.tracer, task.surfaces, task.lights))
 
@@ -26,11 +26,16 @@ def with_cells(task: Task) -> Task:
 def beside_of(task: Task, first: int) -> Beside:
     """Return what densities of lobes depend on, for rays of the receivers from `first` on."""
     assert task.cells is not None
-    return Beside(task.cells, task.receivers, task.counts, first, task.sides.hide)
+    return Beside(task.cells, task.receivers, task.lobes, task.counts, first, task.sides.hide)
 
 
 def add_cells(task: Task, seed: int, sums: Array) -> None:
-    """Add what lobes of senders send, by rays into picked cells and by directions to images in them, W/m^2."""
+    """Add what lobes of senders send, by rays into picked cells and by directions to images in them.
+
+    `sums` (3, r): irradiance, W/m^2, or with lobes of the receivers radiance, W/m^2/sr.
+    """
+    lobes = task.lobes
+    found = sums if lobes is None else np.zeros_like(sums)
     each, visibility = task.counts.cells + task.counts.mirrors, task.settings.visibility
     for first, last in spans(task, each):
         beside, count = beside_of(task, first), (last - first) * each
@@ -43,8 +48,10 @@ def add_cells(task: Task, seed: int, sums: Array) -> None:
             hidden = hidden_from_camera(task, paths)
             if hidden is not None:
                 shadows.reach[hidden] = 0
-            add_unblocked(task, shadows, first, each, sums, visibility or task.counts.mirrors > 0)
+            add_unblocked(task, shadows, first, each, found, visibility or task.counts.mirrors > 0)
             if visibility:
                 break
             paths.reach[from_lights] = 0  # what light reaches is what it meets first
             pass_through(task.surfaces, task.tracer.grain, paths)
+    if lobes is not None:
+        sums += lobes.specular * found

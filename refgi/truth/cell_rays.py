@@ -3,6 +3,7 @@
 Symbols: as in `refgi.truth.cell_densities`.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,13 +13,13 @@ from refgi.jit import kernel, prange
 from refgi.lobes import lobe_direction
 from refgi.rays import ray_offset
 from refgi.sampling import hash_bits
-from refgi.truth.cell_densities import EVEN, Beside, Counts, even_density, image_of, point_of
+from refgi.truth.cell_densities import EVEN, Beside, Counts, even_density, image_of, point_of, receiver_at, takes
 from refgi.truth.cell_walk import (
     CHUNK,
     Found,
     Path,
+    Receiver,
     cell_at,
-    column,
     fill_tops,
     found_up,
     go_down,
@@ -70,18 +71,21 @@ def _pick_chunk(beside: Beside, first: int, part: tuple[int, int], seed: int, gr
                 np.empty(DEEPEST_GROUP))
     found, sums = np.empty(len(tree.top), np.float32), np.empty(len(tree.top) + 1)
     for i in range(part[0], part[1]):
-        x, n = column(receivers.position, first + i), column(receivers.normal, first + i)
+        to = receiver_at(receivers, beside.lobes, first + i)
         word = hash_bits(np.uint32(receivers.pixel[first + i]) ^ np.uint32(seed))
-        fill_tops(tree, x, n, found, sums)
         ray = i * (counts.cells + counts.mirrors)
-        _pick_rays(beside, (x, n), word, grain, sums, path, ray, picks)
-        _pick_images(beside, (x, n), first + i, word, sums, path, ray + counts.cells, picks)
+        if not takes(beside.lobes, first + i):
+            picks.paths.reach[ray : ray + counts.cells + counts.mirrors] = 0
+            continue
+        fill_tops(tree, to, found, sums)
+        _pick_rays(beside, to, word, grain, sums, path, ray, picks)
+        _pick_images(beside, to, first + i, word, sums, path, ray + counts.cells, picks)
 
 
 @kernel
-def _pick_rays(beside: Beside, receiver: tuple[Any, Any], word: Any, grain: float, sums: Array, path: Path, start: int,
+def _pick_rays(beside: Beside, to: Receiver, word: Any, grain: float, sums: Array, path: Path, start: int,
                picks: Picks) -> None:
-    (x, n), cells, count, total = receiver, beside.cells, beside.counts.cells, sums[len(sums) - 1]
+    cells, count, total = beside.cells, beside.counts.cells, sums[len(sums) - 1]
     lights, shift = len(cells.squares.kind), _uniform(word ^ np.uint32(0x1B56C4E9))
     top, level = -1, 0
     for s in range(count):
@@ -89,21 +93,21 @@ def _pick_rays(beside: Beside, receiver: tuple[Any, Any], word: Any, grain: floa
         picks.paths.reach[start + s] = 0
         if place < EVEN:
             k = min(lights - 1, int(place / EVEN * lights))
-            found = found_up(cells, cell_at(cells, k, u, v), x, n, sums)
+            found = found_up(cells, cell_at(cells, k, u, v), to, sums)
             _send(cells, k, found, (u, v, grain), beside.counts, start + s, picks)
         elif total > 0:
             place = (place - EVEN) / (1 - EVEN) * total
             top, level = next_top(cells.tree, sums, place, top, level, path)
             while cells.tree.child[path.node[level]] >= 0 and path.chance[level] > 0:
-                level = go_down(cells.tree, x, n, level, place, path)
+                level = go_down(cells.tree, to, level, place, path)
             if path.chance[level] > 0:
                 _send_into(cells, path, level, top, sums, (u, v, grain), beside.counts, start + s, picks)
 
 
 @kernel
-def _pick_images(beside: Beside, receiver: tuple[Any, Any], r: int, word: Any, sums: Array, path: Path, start: int,
+def _pick_images(beside: Beside, to: Receiver, r: int, word: Any, sums: Array, path: Path, start: int,
                  picks: Picks) -> None:
-    (x, n), tree, count, total = receiver, beside.cells.tree, beside.counts.mirrors, sums[len(sums) - 1]
+    tree, count, total = beside.cells.tree, beside.counts.mirrors, sums[len(sums) - 1]
     shift, top, level = _uniform(word ^ np.uint32(0x7FEB352D)), -1, 0
     for s in range(count):
         picks.paths.reach[start + s] = 0
@@ -113,7 +117,7 @@ def _pick_images(beside: Beside, receiver: tuple[Any, Any], r: int, word: Any, s
             mirror = np.int64(tree.plane[top, 0])
             if mirror < 0:
                 while tree.mirror[path.node[level], 7] == 0 and tree.child[path.node[level]] >= 0:
-                    level = go_down(tree, x, n, level, place, path)
+                    level = go_down(tree, to, level, place, path)
                 mirror = path.node[level] if tree.mirror[path.node[level], 7] > 0 and path.chance[level] > 0 else mirror
             if mirror >= 0:
                 _send_to_image(beside, mirror, r, _place(~word, s), start + s, picks)
@@ -131,7 +135,7 @@ def _send_into(cells: LobeCells, path: Path, level: int, top: int, sums: Array, 
             mirror, chance = path.node[above], path.chance[above]
     rank = tree.lobe[path.node[level]]
     cell = np.int64(cells.node[rank])
-    side = 2.0 ** -cells.corner[cell, 2]
+    side = math.ldexp(1.0, -cells.corner[cell, 2])
     a, b = (cells.corner[cell, 0] + place[0]) * side, (cells.corner[cell, 1] + place[1]) * side
     found = Found(cell, path.chance[level], mirror, chance)
     _send(cells, cells.light[rank], found, (a, b, place[2]), counts, ray, picks)

@@ -4,6 +4,7 @@ A receiver looks at all top groups of the tree, and goes down from those that it
 what each may send it (`_expected`). Places of picks are evenly spaced with one random shift, in the order of the cells.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,14 @@ CHUNK = 64  # receivers that one parallel iteration owns
 ROUND = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)], np.float64)  # neighbours
 SAME_FACE, OFF_FACE = 0.9, 0.04  # cosine of normals, and square of the sine off the plane, of points of one face
 LEAST = np.float32(1e-30)  # m^2, against 0 / 0
+
+
+class Receiver(NamedTuple):
+    """What picks for a receiver depend on, float32."""
+
+    x: Any  # place
+    n: Any  # normal
+    lobe: Any  # None, or of a glossy receiver (mx, my, mz, w^2): the mirrored view, and the square of the lobe's width
 
 
 class Path(NamedTuple):
@@ -41,10 +50,10 @@ class Found(NamedTuple):
 
 
 @kernel
-def _expected(cell: Any, x: Any, n: Any) -> Any:
-    """Return about what a cell sends a receiver without visibility: flux, cosine, lobe and distance, each widened.
+def _expected(cell: Any, x: Any, n: Any, lobe: Any) -> Any:
+    """Return about what a cell sends a receiver without visibility: flux, cosine, lobes and distance, each widened.
 
-    `cell`: a row of `LobeCells`. `x`, `n`: place and normal. All float32; free of branches.
+    `cell`: a row of `LobeCells`. The rest: of a `Receiver`. All float32; free of branches.
     """
     cx, cy, cz, radius, ax, ay, az, spread, flux, gx, gy, gz, thick, tilt = cell
     zero, one, quarter = np.float32(0), np.float32(1), np.float32(0.25)
@@ -62,14 +71,21 @@ def _expected(cell: Any, x: Any, n: Any) -> Any:
     width = spread + (size / square if size < square else one)
     fall = one / (one + quarter * (gap if gap > zero else zero) / width)
     fall *= fall
-    return flux * cosine * (fall * fall) / (width * (square if square > size else size))
+    sent = flux * cosine * (fall * fall) / (width * (square if square > size else size))
+    if lobe is None:
+        return sent
+    gap = one - (lobe[0] * dx + lobe[1] * dy + lobe[2] * dz) * inverse
+    width = lobe[3] + (size / square if size < square else one)
+    fall = one / (one + quarter * (gap if gap > zero else zero) / width)
+    fall *= fall
+    return sent * (fall * fall) / width
 
 
 @kernel
-def _of_node(tree: LobeTree, node: Any, x: Any, n: Any) -> Any:
+def _of_node(tree: LobeTree, node: Any, to: Receiver) -> Any:
     r = tree.row
     return _expected((r[node, 0], r[node, 1], r[node, 2], r[node, 3], r[node, 4], r[node, 5], r[node, 6], r[node, 7],
-                      r[node, 8], r[node, 9], r[node, 10], r[node, 11], r[node, 12], r[node, 13]), x, n)
+                      r[node, 8], r[node, 9], r[node, 10], r[node, 11], r[node, 12], r[node, 13]), to.x, to.n, to.lobe)
 
 
 @kernel
@@ -79,22 +95,23 @@ def column(rows: Array, i: int) -> tuple[Any, Any, Any]:
 
 
 @kernel
-def fill_tops(tree: LobeTree, x: Any, n: Any, found: Array, sums: Array) -> Any:
+def fill_tops(tree: LobeTree, to: Receiver, found: Array, sums: Array) -> Any:
     """Fill what each top group sends (t,), in SIMD lanes, and the sums (t + 1,) of those before; return the last."""
     c = tree.columns
     for t in range(len(found)):
         found[t] = _expected((c[0, t], c[1, t], c[2, t], c[3, t], c[4, t], c[5, t], c[6, t], c[7, t], c[8, t], c[9, t],
-                              c[10, t], c[11, t], c[12, t], c[13, t]), x, n)
-    sums[0] = 0.0
+                              c[10, t], c[11, t], c[12, t], c[13, t]), to.x, to.n, to.lobe)
+    sums[0] = total = 0.0
     for t in range(len(found)):
-        sums[t + 1] = sums[t] + found[t]
-    return sums[len(found)]
+        total += found[t]
+        sums[t + 1] = total
+    return total
 
 
 @kernel
-def found_at(cells: LobeCells, k: int, y: tuple[float, float, float], g: tuple[float, float, float], x: Any, n: Any,
+def found_at(cells: LobeCells, k: int, y: tuple[float, float, float], g: tuple[float, float, float], to: Receiver,
              sums: Array) -> Found:
-    """Return the cells that hold a point y of face normal g that light k reaches, for a receiver at x with normal n.
+    """Return the cells that hold a point y of face normal g that light k reaches, for a receiver.
 
     `sums`: of `fill_tops`. Where an edge crosses the cell and its ray found another face, the mirror is that of the
     first neighbour on y's face.
@@ -103,16 +120,16 @@ def found_at(cells: LobeCells, k: int, y: tuple[float, float, float], g: tuple[f
     if a < 0:
         return Found(np.int64(k), 0.0, np.int64(-1), 0.0)
     cell = cell_at(cells, k, a, b)
-    own = found_up(cells, cell, x, n, sums)
+    own = found_up(cells, cell, to, sums)
     if on_face(cells, cell, y, g):
         return own
-    side = 2.0 ** -cells.corner[cell, 2]
+    side = math.ldexp(1.0, -cells.corner[cell, 2])
     for i in range(8):
         da, db = a + side * ROUND[i, 0], b + side * ROUND[i, 1]
         if 0 <= da < 1 and 0 <= db < 1:
             other = cell_at(cells, k, da, db)
             if on_face(cells, other, y, g):
-                found = found_up(cells, other, x, n, sums)
+                found = found_up(cells, other, to, sums)
                 return Found(cell, own.chance, found.mirror, found.mirror_chance)
     return Found(cell, own.chance, np.int64(-1), 0.0)
 
@@ -140,7 +157,7 @@ def on_face(cells: LobeCells, cell: int, y: tuple[float, float, float], g: tuple
 
 
 @kernel
-def found_up(cells: LobeCells, cell: int, x: Any, n: Any, sums: Array) -> Found:
+def found_up(cells: LobeCells, cell: int, to: Receiver, sums: Array) -> Found:
     """Return a cell's chance, the product of its groups' shares on the way up, and its mirror's."""
     rank, mirror, chance, mirror_chance, tree = cells.rank[cell], np.int64(-1), 1.0, 1.0, cells.tree
     total = sums[len(sums) - 1]
@@ -150,8 +167,8 @@ def found_up(cells: LobeCells, cell: int, x: Any, n: Any, sums: Array) -> Found:
     while tree.top_of[node] < 0:
         if tree.mirror[node, 7] > 0:
             mirror, mirror_chance = node, 1.0
-        above, own = np.int64(tree.parent[node]), np.float64(_of_node(tree, node, x, n))
-        whole = own + _of_node(tree, 2 * np.int64(tree.child[above]) + 1 - node, x, n)
+        above, own = np.int64(tree.parent[node]), np.float64(_of_node(tree, node, to))
+        whole = own + _of_node(tree, 2 * np.int64(tree.child[above]) + 1 - node, to)
         share = own / whole if own > 0 else 0.0
         chance, mirror_chance, node = chance * share, mirror_chance * share, above
     top = tree.top_of[node]
@@ -192,10 +209,10 @@ def next_top(tree: LobeTree, sums: Array, place: float, top: int, level: int, pa
 
 
 @kernel
-def go_down(tree: LobeTree, x: Any, n: Any, level: int, place: float, path: Path) -> int:
+def go_down(tree: LobeTree, to: Receiver, level: int, place: float, path: Path) -> int:
     """Go on to the child that holds a place; return its level."""
     first = np.int64(tree.child[path.node[level]])
-    one, two = np.float64(_of_node(tree, first, x, n)), np.float64(_of_node(tree, first + 1, x, n))
+    one, two = np.float64(_of_node(tree, first, to)), np.float64(_of_node(tree, first + 1, to))
     share = one / (one + two) if one + two > 0 else -1.0
     middle = path.low[level] + share * (path.high[level] - path.low[level])
     second = share < 1 and (place >= middle or share <= 0)

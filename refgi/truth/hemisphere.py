@@ -20,10 +20,10 @@ from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS, ray_offset
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.scene import LightTable
-from refgi.truth.cell_densities import Beside, Tops, found_for, near_density, rays_beside, tops_for
+from refgi.truth.cell_densities import Beside, share_beside, tops_for
 from refgi.truth.next_event import aim_at_light, toward_light
 from refgi.truth.paths import CHUNK, Paths, Shadows, Sides, dot, hit_point, leaves, row
-from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_pattern, shading_normal
+from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_above, lobe_pattern, shading_normal
 from refgi.truth.textured import diffuse_at
 
 Array = npt.NDArray[Any]
@@ -173,9 +173,9 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
         # pattern times the MIS weight max(0, (G - b) / G)
         diffuse, lobe = max(0.0, dot(n, w) - least), 0.0
         if has_lobe:
-            lobe = lobe_pattern(surfaces, material, n, light, w)
-            if beside is not None:
-                lobe *= _share_beside(beside, tops, k, (y, g), paths, ray, (
+            lobe = lobe_above(lobe_pattern(surfaces, material, n, light, w), glossy, dot(n, w), rho)
+            if beside is not None and lobe > 0:
+                lobe *= share_beside(beside, tops, k, (y, g), paths, ray, (
                     dot(g, w), 1.0 if directional else dot(toward, toward), dot(g, light)))
         most = 0.0
         for c in range(3):
@@ -184,15 +184,3 @@ def _gather(surfaces: Surfaces, lights: LightTable, k: int, limits: tuple[float,
             shadows.contribution[ray, c] = contribution
         if most > 0:
             aim_at_light(lights, k, (y, g, toward), far, lift(surfaces, triangle, y, g, grain), grain, shadows, ray)
-
-
-@kernel
-def _share_beside(beside: Beside, tops: Tops, k: int, hit: Any, paths: Paths, ray: int,
-                  sender: tuple[float, float, float]) -> float:
-    """Return the share of directions, n_a / (n_a + n_b + n_c), in the lobe at a point and face normal that one hit."""
-    r = beside.first + ray // beside.counts.directions
-    w, cosine = row(paths.direction, ray), np.float64(paths.cosine[ray])
-    found = found_for(beside, k, hit[0], hit[1], r, tops)
-    length = np.float64(paths.travelled[ray]) + paths.distance[ray]
-    near = near_density(beside.counts.directions, cosine, 0.0, sender)
-    return near / rays_beside(beside, k, found, r, (w, cosine, length), sender) if near > 0 else 0.0

@@ -62,8 +62,7 @@ def trace_vertices(task: Task, squares: list[Array], densities: tuple[Any, ...])
     parts = []
     for k, (light, square, density) in enumerate(zip(task.scene.lights, squares, densities, strict=True)):
         rays = rays_through(light, task.scene.geometry, square.reshape(-1, 2), per_set, density)
-        part = light_vertices(task.surfaces, task.lights, k, rays, closest_of(task.tracer, rays), settings.shared_bound,
-                              lobes=task.lobes is not None)
+        part = light_vertices(task.surfaces, task.lights, k, rays, closest_of(task.tracer, rays), settings.shared_bound)
         if task.lobes is not None:
             part = with_areas(part, light, footprint(light, task.scene.geometry, settings.light_grid)[0])
         parts.append(part if task.view is None else visible_vertices(task.tracer, task.view, part))

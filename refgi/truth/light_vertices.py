@@ -1,8 +1,8 @@
 """Light vertices: directly lit surface points, found by fresh rays from every light; the senders of the light side.
 
 Phi = rho I(l) Omega for a spot or point light, rho E_perp A_perp for a directional one (papers' calibrated radiometry):
-no cosine and no distance. A point whose material has a lobe appears twice, once for each part. Points come in sets, one
-for each set of rays; within a set diffuse parts stand before lobes, in blocks of their own.
+no cosine and no distance. Points come in sets, one for each set of rays. Lobes, in place of diffuse parts, are what
+cells of light are made of (`refgi.truth.lobe_cells`).
 """
 
 from typing import Any, NamedTuple
@@ -39,7 +39,6 @@ class LightVertices(NamedTuple):
     peak: Array  # (n,) pattern on the axis: 1, or (P + 1) / (2 K)
     bound: Array  # (n,) largest geometry term left to the light side, 1/m^2; for lobes of receivers: `with_areas`
     ray: Array  # (n,) int32: which ray found it, counted through the lights
-    lobe: Array  # (n,) bool: a lobe, not a diffuse part
 
 
 class PointSets(NamedTuple):
@@ -63,20 +62,18 @@ def closest_of(tracer: Tracer, rays: LightRays) -> tuple[Array, Array]:
 
 
 def light_vertices(surfaces: Surfaces, lights: LightTable, k: int, rays: LightRays, hits: tuple[Array, Array],
-                   bound: float, *, lobes: bool) -> LightVertices:
+                   bound: float, *, lobes: bool = False) -> LightVertices:
     """Make light vertices of what one light's rays found.
 
     `surfaces`: the scene's triangles and materials. `hits`: of `closest_of`. `bound`: largest geometry term in units of
-    1 / footprint; inf for no bound. Result: diffuse parts, then `lobes` if the scene has any, each in the order of the
-    rays; power 0 where a ray finds nothing that reflects.
+    1 / footprint; inf for no bound. `lobes`: in place of diffuse parts. Result: in the order of the rays; power 0 where
+    a ray finds nothing that reflects so.
     """
     count = len(hits[0])
-    kinds = 2 if lobes and surfaces.specular.any() else 1
-    points = _allocate(kinds * count)
-    points.ray[:] = np.tile(np.arange(k * count, (k + 1) * count), kinds)
-    points.lobe[count:] = True
+    points = _allocate(count)
+    points.ray[:] = np.arange(k * count, (k + 1) * count)
     _fill_vertices(surfaces, lights, k, (rays.origins, rays.directions, *hits, rays.weight), (rays.measure, bound),
-                   points)
+                   lobes, points)
     return points
 
 
@@ -88,14 +85,14 @@ def join(parts: list[LightVertices], sets: int, per_set: int) -> PointSets:
     together = parts[0] if len(parts) == 1 else LightVertices(
         *(np.concatenate(fields, axis=-1) for fields in zip(_allocate(0), *parts, strict=True)))
     bright = np.flatnonzero(together.power)
-    group = (2 * (together.ray // per_set % sets) + together.lobe)[bright]
-    counts = np.bincount(group, minlength=2 * sets)
+    group = (together.ray // per_set % sets)[bright]
+    counts = np.bincount(group, minlength=sets)
     blocks = np.concatenate([[0], np.cumsum(-(-counts // BLOCK))])
     order = np.argsort(group, kind="stable")
     place = np.arange(len(order)) + np.repeat(blocks[:-1] * BLOCK - (np.cumsum(counts) - counts), counts)
     points = _allocate(int(blocks[-1]) * BLOCK)
     _copy_vertices(together, bright[order], place, points)
-    return PointSets(points, np.stack([blocks[:-2:2], blocks[2::2]], axis=1))
+    return PointSets(points, np.stack([blocks[:-1], blocks[1:]], axis=1))
 
 
 def with_areas(points: LightVertices, light: Light, measure: float) -> LightVertices:
@@ -120,7 +117,7 @@ def _allocate(count: int) -> LightVertices:
     position, axis, normal, facing, colour = (np.zeros((3, count), np.float32) for _ in range(5))
     power, exponent, peak, bound = (np.zeros(count, np.float32) for _ in range(4))
     return LightVertices(position, axis, normal, facing, power, colour, exponent, peak, bound,
-                         np.zeros(count, np.int32), np.zeros(count, np.bool_))
+                         np.zeros(count, np.int32))
 
 
 @kernel
@@ -134,21 +131,21 @@ def _copy_vertices(source: LightVertices, order: Array, place: Array, points: Li
             points.facing[c, j] = source.facing[c, i]
             points.colour[c, j] = source.colour[c, i]
         points.power[j], points.exponent[j], points.peak[j] = source.power[i], source.exponent[i], source.peak[i]
-        points.bound[j], points.ray[j], points.lobe[j] = source.bound[i], source.ray[i], source.lobe[i]
+        points.bound[j], points.ray[j] = source.bound[i], source.ray[i]
 
 
 @kernel(parallel=True)
 def _fill_vertices(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array, Array],
-          scale: tuple[float, float], points: LightVertices) -> None:
-    """Fill the diffuse part of ray i at i and its lobe after all diffuse parts; dark ones keep a power of 0."""
+                   scale: tuple[float, float], lobes: bool, points: LightVertices) -> None:
+    """Fill the diffuse part of ray i, or its lobe, at i; dark ones keep a power of 0."""
     count = len(hits[2])
     for chunk in prange((count + CHUNK - 1) // CHUNK):
-        _fill_span(surfaces, lights, k, hits, scale, points, (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
+        _fill_span(surfaces, lights, k, hits, scale, lobes, points, (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
 
 
 @kernel
 def _fill_span(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array, Array, Array, Array, Array],
-               scale: tuple[float, float], points: LightVertices, span: tuple[int, int]) -> None:
+               scale: tuple[float, float], lobes: bool, points: LightVertices, span: tuple[int, int]) -> None:
     origins, directions, triangle_id, distances, weights = hits
     measure, bound = scale
     for i in range(span[0], span[1]):
@@ -169,24 +166,19 @@ def _fill_span(surfaces: Surfaces, lights: LightTable, k: int, hits: tuple[Array
             light, area = (lights.intensity[k, 0], lights.intensity[k, 1], lights.intensity[k, 2]), measure
         else:
             light, area = radiant_intensity(lights, k, d[0], d[1], d[2]), measure * t * t
-        for part in range(len(points.power) // len(triangle_id)):
-            rho = (diffuse_at(surfaces.textures, surfaces, triangle, y) if part == 0
-                   else row(surfaces.specular, material))
-            # Phi / pi, Phi = rho I(l) Omega
-            share = measure * weights[i] / np.pi
-            flux = (rho[0] * light[0] * share, rho[1] * light[1] * share, rho[2] * light[2] * share)
-            power = max(flux[0], flux[1], flux[2])
-            if power <= 0:
-                continue
-            exponent = 1.0 if part == 0 else surfaces.exponent[material]
-            used = part * len(triangle_id) + i
-            points.power[used] = power
-            points.exponent[used] = exponent
-            points.peak[used] = 1.0 if part == 0 else np.pi * lobe_norm(cos_in, exponent)
-            points.bound[used] = bound / area
-            for c in range(3):
-                points.position[c, used] = y[c]
-                points.axis[c, used] = n[c] if part == 0 else mirrored[c]
-                points.normal[c, used] = n[c]
-                points.facing[c, used] = g[c]
-                points.colour[c, used] = flux[c] / power
+        rho = row(surfaces.specular, material) if lobes else diffuse_at(surfaces.textures, surfaces, triangle, y)
+        # Phi / pi, Phi = rho I(l) Omega
+        share = measure * weights[i] / np.pi
+        flux = (rho[0] * light[0] * share, rho[1] * light[1] * share, rho[2] * light[2] * share)
+        power = max(flux[0], flux[1], flux[2])
+        if power <= 0:
+            continue
+        exponent = surfaces.exponent[material] if lobes else 1.0
+        points.power[i], points.exponent[i], points.bound[i] = power, exponent, bound / area
+        points.peak[i] = np.pi * lobe_norm(cos_in, exponent) if lobes else 1.0
+        for c in range(3):
+            points.position[c, i] = y[c]
+            points.axis[c, i] = mirrored[c] if lobes else n[c]
+            points.normal[c, i] = n[c]
+            points.facing[c, i] = g[c]
+            points.colour[c, i] = flux[c] / power

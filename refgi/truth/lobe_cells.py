@@ -133,12 +133,12 @@ def _sampled(source: _Source, k: int, corner: Array) -> tuple[Lobe, Array, Array
     triangle, distance = closest_of(source.tracer, rays)
     distance[triangle == MISS] = 0
     points = light_vertices(source.surfaces, source.lights, k, rays, (triangle, distance), np.inf, lobes=True)
-    position, axis, facing, normal = (field[:, 5 * m :].T.reshape(5, m, 3).astype(np.float64) for field in
+    position, axis, facing, normal = (field.T.reshape(5, m, 3).astype(np.float64) for field in
                                       (points.position, points.axis, points.facing, points.normal))
-    power = points.power[5 * m :].reshape(5, m)
+    power = points.power.reshape(5, m)
     share = 0.25 ** corner[:, 2]
     angle = HALF_DIAGONAL * np.sqrt(rays.measure * share)  # m for a directional light
-    width = 1 / (points.exponent[5 * m : 6 * m].astype(np.float64) + 1)
+    width = 1 / (points.exponent[:m].astype(np.float64) + 1)
     cosine = np.maximum(-(facing[0] * rays.directions[:m]).sum(axis=1), GRAZING)
     parallel = isinstance(light, DirectionalLight)
     radius = angle / cosine if parallel else angle * distance[:m] / cosine

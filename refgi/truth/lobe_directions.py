@@ -18,11 +18,12 @@ from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import DIRECTIONAL, incident_light
 from refgi.rays import MISS
 from refgi.scene import LightTable
+from refgi.truth.cell_densities import Beside, share_beside, tops_for
 from refgi.truth.hemisphere import shifted, to_far_side
 from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, comes_by_photons, density_on_axis
 from refgi.truth.next_event import aim_at_light, toward_light
 from refgi.truth.paths import CHUNK, Paths, Shadows, Sides, dot, hit_point, leaves, row
-from refgi.truth.surfaces import around, face_cross, lift, lobe_pattern, shading_normal
+from refgi.truth.surfaces import around, face_cross, lift, lobe_above, lobe_pattern, shading_normal
 from refgi.truth.textured import diffuse_at
 
 Array = npt.NDArray[Any]
@@ -76,22 +77,27 @@ def _send(receivers: RayReceivers, lobes: Lobes, first: int, span: tuple[int, in
 
 @kernel(parallel=True)
 def gather_along_lobes(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float, float], sides: Sides,
-                       rays: tuple[int, int], paths: Paths, density: Array, shadows: Shadows) -> None:
+                       rays: tuple[int, int], paths: Paths, density: Array, shadows: Shadows,
+                       beside: Beside | None) -> None:
     """Next-event estimation: write the shadow ray from each hit point to one light, and its contribution.
 
     `limits`: whether light vertices share the light, measure of one light direction (sr or m^2), and the tracer's
     grain. `rays`: first receiver, and rays of each. `density` (n,): as `send_along_lobes` fills it. `shadows`: origins,
-    directions, reach and contribution are filled; the reach is 0 where nothing contributes.
+    directions, reach and contribution are filled; the reach is 0 where nothing contributes. `beside`: None where
+    senders' lobes come by directions alone.
     """
     count = len(paths.reach)
     for chunk in prange((count + CHUNK - 1) // CHUNK):
-        _gather(lobes, lights, k, limits, sides, rays, paths, density, shadows,
+        _gather(lobes, lights, k, limits, sides, rays, paths, density, shadows, beside,
                 (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
 
 
 @kernel
 def _gather(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float, float], sides: Sides,
-            rays: tuple[int, int], paths: Paths, density: Array, shadows: Shadows, span: tuple[int, int]) -> None:
+            rays: tuple[int, int], paths: Paths, density: Array, shadows: Shadows, beside: Beside | None,
+            span: tuple[int, int]) -> None:
+    if beside is not None:
+        tops = tops_for(beside.cells.tree)
     _, measure, grain = limits
     directional, surfaces = lights.kind[k] == DIRECTIONAL, lobes.surfaces
     for ray in range(span[0], span[1]):
@@ -115,18 +121,22 @@ def _gather(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float,
         n = shading_normal(surfaces, triangle, y, g)
         share = 1.0  # of the power heuristic: 1 / (1 + (r^2 / A)^2)
         if limits[0] and density[ray] < np.inf:
-            if cos_out < 0:  # light vertices have all that leaves below its face
-                continue
             length = np.float64(paths.travelled[ray]) + paths.distance[ray]
             a = density[ray] * cos_out * (measure if directional else measure * dot(toward, toward)) / cos_in
             ratio = length * length / a
-            share = 1 / (1 + ratio * ratio)
+            share = 1 / (1 + ratio * ratio) if cos_out > 0 else 0.0  # light vertices have what leaves below its face
         rho, glossy = diffuse_at(surfaces.textures, surfaces, triangle, y), row(
             surfaces.specular, surfaces.material_of_face[triangle])
         diffuse, lobe = share * max(0.0, dot(n, w)), 0.0
         if max(glossy[0], glossy[1], glossy[2]) > 0:
-            lobe = _lobe_share(lobes, rays[0] + ray // rays[1], surfaces.material_of_face[triangle], share)
-            lobe *= lobe_pattern(surfaces, surfaces.material_of_face[triangle], n, light, w)
+            material = surfaces.material_of_face[triangle]
+            lobe = lobe_above(lobe_pattern(surfaces, material, n, light, w), glossy, dot(n, w), rho)
+            if surfaces.exponent[material] >= lobes.photon_exponent:
+                by_photons = comes_by_photons(lobes.exponent[rays[0] + ray // rays[1]], surfaces.exponent[material])
+                lobe = 0.0 if by_photons else lobe
+            elif beside is not None and lobe > 0:
+                lobe *= share_beside(beside, tops, k, (y, g), paths, ray, (
+                    cos_out, 1.0 if directional else dot(toward, toward), cos_in))
         factor, most = cos_in / (np.pi * abs(cos_out)), 0.0
         for c in range(3):
             # radiance = rho F / pi * pattern / <g.w>, F = E_perp <g.l>
@@ -135,12 +145,3 @@ def _gather(lobes: Lobes, lights: LightTable, k: int, limits: tuple[bool, float,
             shadows.contribution[ray, c] = contribution
         if most > 0:
             aim_at_light(lights, k, (y, g, toward), far, lift(surfaces, triangle, y, g, grain), grain, shadows, ray)
-
-
-@kernel
-def _lobe_share(lobes: Lobes, r: int, material: int, share: float) -> Any:
-    """Return which share of a sender's lobe a receiver's directions bring."""
-    sender = lobes.surfaces.exponent[material]
-    if sender < lobes.photon_exponent:
-        return share
-    return 0.0 if comes_by_photons(lobes.exponent[r], sender) else 1.0

@@ -2,12 +2,13 @@
 
 As `refgi.truth.light_side`, with another term: for receiver x and sender i it is, by the power heuristic,
 
-    p_i q_i <n_x.w> (P + 2) / (2 pi) <m.w>^P / (r^2 (1 + (A / r^2)^2)),    A = a_i D <m.w>^P <g_i.-w>,
+    p_i <n_i.-w> <n_x.w> (P + 2) / (2 pi) <m.w>^P / (r^2 (1 + (A / r^2)^2)),    A = a_i D <m.w>^P <g_i.-w>,
 
-p_i q_i the sender's intensity, g_i its face normal, a_i the area that one of the light's rays stands for when they are
-spread evenly, D what the receiver's own directions count on the axis (`density_on_axis`). With A = 0 it is f_s I cos /
-r^2 over s; near a lobe's axis, or near a sender, A bounds it. Computed in float32, everywhere in one order. Receivers
-above `SHARPEST_VERTEX` take nothing.
+p_i the sender's intensity along its normal n_i, g_i its face normal, a_i the area that one of the light's rays stands
+for when they are spread evenly, D what the receiver's own directions count on the axis (`density_on_axis`). With A = 0
+it is f_s I cos / r^2 over s; near a lobe's axis, or near a sender, A bounds it. Computed in float32, everywhere in one
+order. Senders are diffuse: lobes come by cells of light (`refgi.truth.cell_pass`). Receivers above `SHARPEST_VERTEX`
+take nothing.
 """
 
 import math
@@ -32,20 +33,19 @@ ROWS = 12  # of a tile: position, normal, m, P, (P + 2) / (2 pi), D
 
 @kernel
 def _vertex(points: LightVertices, j: int) -> Any:
-    """Return what `_factors` needs of sender j: place, axis, normal, face normal, power, peak, area."""
-    return (points.position[0, j], points.position[1, j], points.position[2, j], points.axis[0, j], points.axis[1, j],
-            points.axis[2, j], points.normal[0, j], points.normal[1, j], points.normal[2, j], points.facing[0, j],
-            points.facing[1, j], points.facing[2, j], points.power[j] * points.peak[j], points.bound[j])
+    """Return what `_factors` needs of sender j: place, normal, face normal, power, area."""
+    return (points.position[0, j], points.position[1, j], points.position[2, j], points.normal[0, j],
+            points.normal[1, j], points.normal[2, j], points.facing[0, j], points.facing[1, j], points.facing[2, j],
+            points.power[j], points.bound[j])
 
 
 @kernel
 def _factors(vertex: Any, tile: Array, i: int) -> Any:
     """Return what a pair's weight is made of, without branches.
 
-    Result: -h of the receiver's lobe, -h of the sender's, p q <n_x.w> without the sender's power of a cosine, r^2, A
-    without the receiver's power. A diffuse sender has its normal for axis: its cosine is 1 - h of that.
+    Result: -h of the receiver's lobe, p <n_i.-w> <n_x.w> (P + 2) / (2 pi), r^2, A without the receiver's power.
     """
-    px, py, pz, ax, ay, az, ux, uy, uz, fx, fy, fz, peak, area = vertex
+    px, py, pz, ux, uy, uz, fx, fy, fz, power, area = vertex
     zero, half = np.float32(0), np.float32(0.5)
     dx, dy, dz = px - tile[0, i], py - tile[1, i], pz - tile[2, i]
     r2 = dx * dx + dy * dy + dz * dz
@@ -57,49 +57,40 @@ def _factors(vertex: Any, tile: Array, i: int) -> Any:
     cos_face = -(fx * wx + fy * wy + fz * wz)
     ex, ey, ez = tile[6, i] - wx, tile[7, i] - wy, tile[8, i] - wz
     h = half * (ex * ex + ey * ey + ez * ez)
-    sx, sy, sz = ax + wx, ay + wy, az + wz
-    h_sender = half * (sx * sx + sy * sy + sz * sz)
-    factor = peak * (cos_x if cos_x > zero else zero) * tile[10, i]
+    factor = power * (cos_x if cos_x > zero else zero) * (leaving if leaving > zero else zero) * tile[10, i]
     factor = factor if h < BELOW_1 else zero
-    factor = factor if h_sender < BELOW_1 else zero
-    factor = factor if leaving > zero else zero
     shared = area * tile[11, i] * (cos_face if cos_face > zero else zero)
-    return (-(h if h < BELOW_1 else BELOW_1), -(h_sender if h_sender < BELOW_1 else BELOW_1), factor, r2, shared)
+    return -(h if h < BELOW_1 else BELOW_1), factor, r2, shared
 
 
 @kernel
 def _sum_terms(points: LightVertices, tile: Array, lanes: int, first: int, parts: Array) -> None:
     """Fill the sums of the terms of each part of senders at receivers of a tile: one loop a function, for SIMD."""
-    power, power_sender, factor = np.empty(TILE, np.float32), np.empty(TILE, np.float32), np.empty(TILE, np.float32)
+    power, factor = np.empty(TILE, np.float32), np.empty(TILE, np.float32)
     square, shared = np.empty(TILE, np.float32), np.empty(TILE, np.float32)
     for p in range(parts.shape[0]):
         for j in range(first + p * PART, first + p * PART + PART):
             if points.power[j] <= np.float32(0):
                 continue
-            vertex, exponent = _vertex(points, j), points.exponent[j]
+            vertex = _vertex(points, j)
             for i in range(lanes):
-                power[i], power_sender[i], factor[i], square[i], shared[i] = _factors(vertex, tile, i)
+                power[i], factor[i], square[i], shared[i] = _factors(vertex, tile, i)
             for i in range(lanes):
                 power[i] = log2p1(power[i])
             for i in range(lanes):
-                power_sender[i] = log2p1(power_sender[i])
-            for i in range(lanes):
                 power[i] = exp2(tile[9, i] * power[i])
             for i in range(lanes):
-                power_sender[i] = exp2(exponent * power_sender[i])
-            for i in range(lanes):
                 ratio = shared[i] * power[i] / square[i]
-                taken = power[i] / (square[i] * (np.float32(1) + ratio * ratio))
-                parts[p, i] += (factor[i] * power_sender[i]) * taken
+                parts[p, i] += factor[i] * (power[i] / (square[i] * (np.float32(1) + ratio * ratio)))
 
 
 @kernel
 def _term(points: LightVertices, j: int, tile: Array, i: int) -> Any:
     """Return the term of one sender at one receiver, bit for bit that which was summed."""
-    h, h_sender, factor, square, shared = _factors(_vertex(points, j), tile, i)
-    power, power_sender = exp2(tile[9, i] * log2p1(h)), exp2(points.exponent[j] * log2p1(h_sender))
+    h, factor, square, shared = _factors(_vertex(points, j), tile, i)
+    power = exp2(tile[9, i] * log2p1(h))
     ratio = shared * power / square
-    return (factor * power_sender) * (power / (square * (np.float32(1) + ratio * ratio)))
+    return factor * (power / (square * (np.float32(1) + ratio * ratio)))
 
 
 @kernel(parallel=True)

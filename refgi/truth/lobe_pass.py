@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.truth.camera_visibility import hidden_from_camera
+from refgi.truth.cell_pass import add_cells, beside_of
 from refgi.truth.hemisphere import scrambled_points
 from refgi.truth.light_grid import footprint
 from refgi.truth.light_pass import add_light_side
@@ -35,6 +36,8 @@ def lobe_pass(task: Task, number: int) -> Array:
     if len(task.receivers.pixel):
         if task.picks:
             add_light_side(task, words[:3], sums)
+        if task.cells is not None:
+            add_cells(task, int(words[2]), sums)
         if task.directions:
             _add_directions(task, words, sums)
         if task.caustics is not None:
@@ -63,6 +66,7 @@ def _add_directions(task: Task, words: Array, sums: Array) -> None:
 def _follow_lobes(task: Task, paths: Paths, density: Array, first: int, sums: Array) -> None:
     """Trace paths to the next surface, next-event estimation there; to every surface along them without visibility."""
     assert task.lobes is not None
+    beside = None if task.cells is None else beside_of(task, first)
     while True:
         task.tracer.fill_closest(paths.origin, paths.direction, paths.reach, paths.triangle_id, paths.distance)
         hidden = hidden_from_camera(task, paths)
@@ -70,7 +74,7 @@ def _follow_lobes(task: Task, paths: Paths, density: Array, first: int, sums: Ar
             measure, _ = footprint(light, task.scene.geometry, task.settings.light_grid)
             shadows = shadow_batch(len(paths.reach))
             gather_along_lobes(task.lobes, task.lights, k, (task.picks > 0, measure, task.tracer.grain),
-                               task.sides, (first, task.directions), paths, density, shadows)
+                               task.sides, (first, task.directions), paths, density, shadows, beside)
             if hidden is not None:
                 shadows.reach[hidden] = 0
             add_unblocked(task, shadows, first, task.directions, sums, True)

@@ -5,8 +5,10 @@ L_s = int f_s(w, w_o) L(w) <n.w> dw with f_s = s (P + 2) / (2 pi) <m.w>^P, m the
 Symbols: P the receiver's exponent, Q a sender's, n_a and n_b how many samples of a pass the directions of the receiver
 and the rays of a light put on a unit of area at the sender, A = r^2 n_a / n_b.
 
-- Diffuse reflection and lobes of a modest exponent: multiple importance sampling by the power heuristic, n_a^2 / (n_a^2
-  + n_b^2) for directions, the rest for light vertices. n_b counts rays that are spread evenly.
+- Diffuse reflection: multiple importance sampling by the power heuristic, n_a^2 / (n_a^2 + n_b^2) for directions, the
+  rest for light vertices. n_b counts rays that are spread evenly.
+- Lobes: directions and cells of light, by the balance heuristic (`refgi.truth.cell_densities`); directions alone
+  where P is above `WIDE` and Q / `BLURRED`, as they are then no wider than what they are to meet.
 - Lobes that are left to photons (the sharpest; with caustics all mirror-like ones): photons, where P is lower than Q by
   `BLURRED` or more; else the receiver's directions alone, which are then no wider than what they are to meet.
 """
@@ -24,6 +26,7 @@ from refgi.truth.surfaces import Surfaces, surfaces
 Array = npt.NDArray[Any]
 
 BLURRED = 4.0  # times the receiver's exponent: senders' lobes as sharp as that, or sharper, come by photons
+WIDE = 60.0  # exponent of receivers up to which, or to 1 / BLURRED of the sharpest sender's, they pick cells
 SHARPEST_VERTEX = 1e7  # exponent above which a receiver takes nothing from light vertices, whose places are float32
 
 
@@ -35,6 +38,7 @@ class Lobes(NamedTuple):
     exponent: Array  # (r,) float64: P
     surfaces: Surfaces  # with every lobe, those of photons among them
     photon_exponent: float  # lobes of senders from here on are left to photons; inf: none
+    widest: float  # exponent of receivers up to which they pick cells of light
 
 
 def glossy_triangles(scene: Scene, position: Array, normal: Array, triangle_id: Array) -> Array:
@@ -66,9 +70,12 @@ def lobes_of(scene: Scene, pixel: Array, position: Array, normal: Array, triangl
     mirrored = 2 * (n * w_o).sum(axis=0) * n - w_o
     material = scene.geometry.material_of_face[triangle_id.reshape(-1)[pixel]]
     table = material_table(scene.materials)
+    by_cells = table.specular.any(axis=1) & (table.ior == 0) & (table.exponent < photon_exponent)
+    sharpest = table.exponent[by_cells].max(initial=0.0)
     return Lobes(np.ascontiguousarray(mirrored / np.linalg.norm(mirrored, axis=0)),
                  np.ascontiguousarray(table.specular[material].T.astype(np.float64)),
-                 np.ascontiguousarray(table.exponent[material], np.float64), surfaces(scene), photon_exponent)
+                 np.ascontiguousarray(table.exponent[material], np.float64), surfaces(scene), photon_exponent,
+                 min(SHARPEST_VERTEX, max(WIDE, sharpest / BLURRED)))
 
 
 def subset_of(lobes: Lobes, chosen: Array) -> Lobes:

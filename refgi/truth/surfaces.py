@@ -25,6 +25,8 @@ from refgi.scene.texture.table import TextureTable
 
 Array = npt.NDArray[Any]
 
+ROUNDING = 2.0**-25  # of a float32 sum
+
 
 class Surfaces(NamedTuple):
     """Triangles and their materials, for kernels."""
@@ -135,6 +137,17 @@ def lift(surfaces: Surfaces, triangle: int, y: tuple[float, float, float], g: tu
     the side to start on. `grain`: the tracer's, m. Result: length, m: the offset from the face.
     """
     return ray_offset(y[0], y[1], y[2], grain) - height_above(surfaces, triangle, y, g)
+
+
+@kernel
+def lobe_above(pattern: float, glossy: tuple[float, float, float], cosine: float,
+               rho: tuple[float, float, float]) -> float:
+    """Return a lobe's pattern, 0 where float32 would not tell it beside what the diffuse part sends the same way.
+
+    `glossy`, `rho`: reflectances of both. `cosine`: <n.w>, the diffuse pattern.
+    """
+    least = ROUNDING * max(0.0, cosine) * min(rho[0], rho[1], rho[2])
+    return pattern if pattern * max(glossy[0], glossy[1], glossy[2]) > least else 0.0
 
 
 @kernel

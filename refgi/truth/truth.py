@@ -20,7 +20,7 @@ from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Scene
 from refgi.skips import left_out
 from refgi.stages import report_progress, stage
-from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_FOR_LOBES, SHARP_LOBE, Film, film
+from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
 from refgi.truth.cell_pass import with_cells
 from refgi.truth.checkpoint import FIRST_LINE, Checkpoint
 from refgi.truth.light_pass import pilot
@@ -221,26 +221,25 @@ def _pass(task: Task, number: int) -> Array:
     return one_pass(task, number) if task.lobes is None else lobe_pass(task, number)
 
 
-def _photons(scene: Scene, shape: tuple[int, ...], settings: TruthSettings,
-             least: float) -> tuple[Film | None, float]:
-    """Return the film of photons, and the exponent, `least`, from which on lobes are left to them; warn if none can be.
+def _photons(scene: Scene, shape: tuple[int, ...], settings: TruthSettings) -> tuple[Film | None, float]:
+    """Return the film of photons, and the exponent from which on lobes are left to them; warn if none can be.
 
     Photons follow lobes without `visibility` or for what the camera sees as little as beyond the first bounce.
     """
     picture = shape[0], shape[1]
     if settings.caustics:
         return film(scene, picture), MIRROR_EXPONENT
-    sharp = [m.name for m in scene.materials if m.is_glossy and not m.is_dielectric and m.exponent >= least]
+    sharp = [m.name for m in scene.materials if m.is_glossy and not m.is_dielectric and m.exponent >= SHARP_LOBE]
     alone = settings.visibility and settings.emitters == "all"
     if sharp and not (alone and settings.bounces == 1):
         what = ("left out beyond the first bounce" if alone else
                 "sampled by chance, which may miss them: standard errors do not show what was never met")
         warnings.warn(RefgiWarning(f"scene {scene.name!r}: the lobes of {len(sharp)} material(s), {sharp[0]!r} first, "
-                                   f"are sharp (exponent {least:g} or more) and {what}"), stacklevel=5)
+                                   f"are sharp (exponent {SHARP_LOBE:g} or more) and {what}"), stacklevel=5)
     count = settings.photons * len(scene.lights)
     if not alone or (not sharp and left_out("truth.photons", lambda: (count, count))):
         return None, math.inf
-    return film(scene, picture, least, longest=2, even_empty=not sharp), least
+    return film(scene, picture, SHARP_LOBE, longest=2, even_empty=not sharp), SHARP_LOBE
 
 
 def _warm_up(prepare: Prepare, scene: Scene, tracer: Any, buffer: tuple[Array, Array, Array],
@@ -272,10 +271,10 @@ def _guided(task: Task) -> Task:
 
 
 def _without_pilot(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
-                   settings: TruthSettings, sharp: float = SHARP_LOBE) -> Task:
+                   settings: TruthSettings) -> Task:
     points = receivers(scene.geometry, position, normal, triangle_id, tracer.grain)
     set_of = sets_of(points.pixel, triangle_id.shape[1], settings.interleave)
-    caustics, left_to_photons = _photons(scene, triangle_id.shape, settings, sharp)
+    caustics, left_to_photons = _photons(scene, triangle_id.shape, settings)
     reflecting = surfaces(scene, left_to_photons)
     view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "visible" else None
     return Task(scene, settings, tracer, reflecting, lights_of(scene), points, set_of, caustics, left_to_photons, view)
@@ -284,7 +283,7 @@ def _without_pilot(scene: Scene, tracer: Any, position: Array, normal: Array, tr
 def _with_lobes(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
                 settings: TruthSettings) -> Task:
     """Return a task of lobes; `triangle_id`: as `glossy_triangles` has it."""
-    task = _without_pilot(scene, tracer, position, normal, triangle_id, settings, SHARP_FOR_LOBES)
+    task = _without_pilot(scene, tracer, position, normal, triangle_id, settings)
     lobes = lobes_of(scene, task.receivers.pixel, position, normal, triangle_id, task.left_to_photons)
     count = settings.photons * len(scene.lights)
     if task.caustics is not None and not settings.caustics and not meets_photons(lobes) and left_out(

@@ -90,7 +90,7 @@ def _unknown(kit: Kit, cases: list[CaseManifest], output: Path) -> tuple[str, ..
              if place.is_dir() and place.name not in (*ids, *OF_A_KIT)]
     for case in cases:
         files = sorted((output / case.id).glob("*"))
-        found += [f"{case.id}/{file.name}: no array of this case{did_you_mean(file.name, case.arrays)}"
+        found += [f"{case.id}/{file.name}: no array of this case{did_you_mean(file.stem, case.arrays)}"
                   for file in files if file.is_file() and (file.suffix != ".npy" or file.stem not in case.arrays)]
     return tuple(found)
 

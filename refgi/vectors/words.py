@@ -1,15 +1,15 @@
 """What people read of a verdict."""
 
-import difflib
 from collections.abc import Iterable
 
+from refgi.errors import nearest
 from refgi.vectors.manifest import ArrayVerdict, Cause, CommonCause, Result, StageVerdict
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return a hint at the nearest name, or nothing where none is near."""
-    near = difflib.get_close_matches(name, list(known), n=1)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    near = nearest(name, known)
+    return f"; did you mean {near!r}?" if near else ""
 
 
 def story(stage: StageVerdict) -> list[str]:

@@ -111,6 +111,13 @@ def test_float64_and_threads(tmp_path):
 
 
 @pytest.mark.usefixtures("never_computes")
+def test_strict_refuses_what_a_mesh_lacks(tmp_path):
+    mesh = tmp_path / "mesh.obj"
+    mesh.write_text("mtllib gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
+    assert refused(run(mesh, "--strict", "--out", tmp_path / "a.exr"), "line 1: mtllib", "gone.mtl: no such file")
+
+
+@pytest.mark.usefixtures("never_computes")
 @pytest.mark.parametrize(("arguments", "words"), [
     (["cornel_box"], ["did you mean 'cornell_box'"]),
     (["no/such/file.json"], ["no/such/file.json"]), (["a" * 5000], ["expected one of cornell_box"]),

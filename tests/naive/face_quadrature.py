@@ -2,7 +2,9 @@
 
     E(x) = sum_lamps int_A I / d^2 <g.l> V(y, lamp) p(y, l, w) <n.w> / r^2 V(x, y) dA,
 
-with p the diffuse part and the lobe of `tests.naive.light_tracing.pattern`, w from y to x. A face is cut into four
+with p the diffuse part and the lobe of `tests.naive.light_tracing.pattern`, w from y to x. Of a glossy receiver it is
+the integral with <m.w>^P <n.w> in place of <n.w>, m its mirrored view: (P + 2) / (2 pi) of that is what a white lobe
+reflects. A face is cut into four
 until its integral by seven points (degree 5) and that of its quarters agree. What seven points could pass over is cut
 first: cells that are long beside the scene, a spot's cone or their distance from receiver or lamp, and cells whose lobe
 is not flat between corners: with e = r - w a lobe is (1 - e^2 / 2)^P, a highlight around e = 0 of a width 1 / sqrt(P).
@@ -33,11 +35,13 @@ WEIGHTS = np.array([0.225, *(0.132394152788506,) * 3, *(0.125939180544827,) * 3]
 
 
 class Receivers(NamedTuple):
-    """Points (n, 3) with their shading normals and their faces' normals on the same side."""
+    """Points (n, 3) with their shading normals and their faces' normals on the same side; lobes, exponent 0: none."""
 
     position: np.ndarray
     normal: np.ndarray
     facing: np.ndarray
+    mirrored: np.ndarray  # m
+    exponent: np.ndarray  # (n,)
 
 
 class Cells(NamedTuple):
@@ -49,12 +53,36 @@ class Cells(NamedTuple):
     value: np.ndarray  # (m, 3) by seven points; NaN: not yet known
 
 
-def receivers_of(frame):
-    """Return the covered pixels of a G-buffer, in picture order."""
-    buffer = frame.gbuffer
-    seen = buffer.covered
+def receivers_of(frame, lobes=False):
+    """Return the covered pixels of a G-buffer, in picture order; with `lobes` those of glossy materials alone."""
+    buffer, scene = frame.gbuffer, frame.scene
+    seen = glossy_of(frame) if lobes else buffer.covered
     position, normal = (plane[:, seen].T.astype(float) for plane in (buffer.position, buffer.normal))
-    return Receivers(position, unit(normal), face_normals(frame.scene.geometry, buffer.triangle_id[seen], normal))
+    n, triangles = unit(normal), buffer.triangle_id[seen]
+    facing = face_normals(scene.geometry, triangles, normal)
+    if not lobes:
+        return Receivers(position, n, facing, n, np.zeros(len(n)))
+    to_eye = unit(np.asarray(scene.camera.eye, float) - position)
+    exponent = np.array([m.exponent for m in scene.materials])[scene.geometry.material_of_face[triangles]]
+    return Receivers(position, n, facing, 2 * (n * to_eye).sum(axis=1, keepdims=True) * n - to_eye, exponent)
+
+
+def glossy_of(frame):
+    """Return which pixels (h, w) see a material with a lobe from the side of its normal."""
+    buffer, scene = frame.gbuffer, frame.scene
+    glossy = np.array([any(m.specular) for m in scene.materials])[scene.geometry.material_of_face]
+    to_eye = np.asarray(scene.camera.eye, float)[:, None, None] - buffer.position
+    return buffer.covered & glossy[buffer.triangle_id] & ((to_eye * buffer.normal).sum(axis=0) > 0)
+
+
+def reflected(scene, receivers, specular, **options):
+    """Return the radiance (n, 3) that receivers' lobes of reflectance `specular` (n, 3) reflect, and how far it moved.
+
+    Further options as for `irradiance`.
+    """
+    factor = specular * ((receivers.exponent + 2) / (2 * np.pi))[:, None]
+    value, moved = irradiance(scene, receivers, **options)
+    return factor * value, factor * moved
 
 
 def irradiance(scene, receivers, tolerance=1e-4, tracer=None):
@@ -158,11 +186,18 @@ def _must_be_cut(scene, lamp, receivers, cells):
     glossy = np.flatnonzero(~result & (exponent >= 0))
     e = np.stack([_off_axis(scene, lamp, cells.face[glossy], cells.corners[glossy, k], x[glossy])
                   for k in range(3)], axis=1)
+    result[glossy] = _is_peaked(e, exponent[glossy])
+    rest = np.flatnonzero(~result & (receivers.exponent[cells.receiver] > 0))
+    m, exponent = receivers.mirrored[cells.receiver[rest]], receivers.exponent[cells.receiver[rest]]
+    result[rest] = _is_peaked(m[:, None] - unit(cells.corners[rest] - x[rest, None]), exponent)
+    return result
+
+
+def _is_peaked(e, exponent):
+    """Tell where a lobe (1 - e^2 / 2)^P is not flat between corners; `e` (n, 3, 3): of each corner."""
     spread = np.linalg.norm(e - np.roll(e, 1, axis=1), axis=2).max(axis=1)
     nearest = np.maximum(0, np.linalg.norm(e, axis=2).min(axis=1) - spread)
-    peak = np.maximum(0, 1 - nearest**2 / 2) ** exponent[glossy]
-    result[glossy] = (peak > NEGLIGIBLE) & (spread > FLAT / np.sqrt(exponent[glossy] + 1))
-    return result
+    return (np.maximum(0, 1 - nearest**2 / 2) ** exponent > NEGLIGIBLE) & (spread > FLAT / np.sqrt(exponent + 1))
 
 
 def _off_axis(scene, lamp, face, y, x):
@@ -193,6 +228,8 @@ def _density(scene, tracer, lamp, receivers, face, y):
     flux = _perpendicular(lamp, toward, distance) * (g * toward).sum(axis=1)[:, None]
     sent = pattern(scene, Vertices(y, face, toward, flux, g, n), -w) * flux
     cosine = np.where((w * receivers.facing).sum(axis=1) > 0, np.maximum(0, (w * receivers.normal).sum(axis=1)), 0)
+    along = np.maximum(0, 1 - ((receivers.mirrored - w) ** 2).sum(axis=1) / 2)
+    cosine = np.where(receivers.exponent > 0, along**receivers.exponent, 1.0) * cosine
     result = sent * (cosine / r2)[:, None]
     counts = np.flatnonzero(result.any(axis=1))
     start, x, up = y[counts], receivers.position[counts], receivers.facing[counts]

@@ -147,7 +147,7 @@ def pattern(scene, vertices, v):
 def received(scene, receivers, vertices, visibility):
     """Return what receivers get of all vertices, (n, 3): every pair, receiver by receiver."""
     count = len(vertices.flux)
-    position, normal, facing = (np.repeat(part, count, axis=0) for part in receivers)
+    position, normal, facing = (np.repeat(part, count, axis=0) for part in receivers[:3])
     each = Vertices(*(np.tile(part, (len(receivers[0]), *(1,) * (part.ndim - 1))) for part in vertices))
     toward = each.position - position
     r2 = (toward**2).sum(axis=1)

@@ -23,7 +23,7 @@ from refgi.scene import (
     material_table,
     merge,
 )
-from refgi.scene.load import default_camera, default_light
+from refgi.scene.placed import default_camera, default_light
 from refgi.scene.repair import lights_with_power, repaired, zero_area
 from refgi.scene.transform import affine, transformed_all
 

@@ -7,6 +7,7 @@ import pytest
 
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene.obj import read_obj
+from refgi.scene.strictness import strictness
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
@@ -52,12 +53,13 @@ def test_materials_are_floats_in_order_of_use(tmp_path: Path) -> None:
             "usemtl too_bright\nf 1 2 4\nusemtl unheard\nf 2 3 4\nusemtl shiny\nf 2 3 4\n")
     with pytest.warns(RefgiWarning, match=r"colours.mtl: 1 of 3 materials with diffuse \+ specular .* over 1"):
         meshes = read_obj(written(tmp_path, text)).meshes
-    shiny, matt, bright, unheard = (mesh.material for mesh in meshes)
+    shiny, matt, bright, unheard, again = (mesh.material for mesh in meshes)
     assert matt.diffuse == (0.1, 0.2, 0.0001)
     assert (shiny.specular, shiny.exponent, shiny.emission) == ((0.5, 0.5, 0.5), 40, (1, 2, 3))
     assert not bright.is_glossy
     assert unheard.diffuse == (0.5, 0.5, 0.5)
-    assert [len(mesh.faces) for mesh in meshes] == [2, 1, 1, 1]
+    assert again == shiny
+    assert [len(mesh.faces) for mesh in meshes] == [1, 1, 1, 1, 1]
 
 
 @pytest.mark.parametrize(("tail", "said"), [
@@ -68,7 +70,7 @@ def test_materials_are_floats_in_order_of_use(tmp_path: Path) -> None:
     ("mtllib absent.mtl\nf 1 2 3\n", "absent.mtl: no such file"),
 ])
 def test_each_fault_names_file_and_line(tmp_path: Path, tail: str, said: str) -> None:
-    with pytest.raises(InputError) as error:
+    with pytest.raises(InputError) as error, strictness(True):
         read_obj(written(tmp_path, SQUARE + tail))
     assert str(tmp_path) in str(error.value)
     assert said in str(error.value)
@@ -107,9 +109,11 @@ def test_vertex_colours_are_passed_over_once_with_a_count(tmp_path: Path) -> Non
 def test_normals_belong_to_their_corners_in_every_material(tmp_path: Path) -> None:
     text = SQUARE + ("vn 1 0 0\nvn 0 1 0\nvn 0 0 1\nusemtl a\nf 1//1 2//2 3//3\nusemtl b\nf 1//3 3//2 4//1\n"
                      "vn 0 0 -1\nusemtl a\nf 1//4 2//4 4//4\n")
-    a, b = read_obj(written(tmp_path, text)).meshes
+    a, b, c = read_obj(written(tmp_path, text)).meshes
     assert a.normals is not None
     assert b.normals is not None
-    assert a.normals[a.faces].tolist() == [[[1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 0, -1]] * 3]
+    assert c.normals is not None
+    assert a.normals[a.faces].tolist() == [[[1, 0, 0], [0, 1, 0], [0, 0, 1]]]
     assert b.normals[b.faces].tolist() == [[[0, 0, 1], [0, 1, 0], [1, 0, 0]]]
+    assert c.normals[c.faces].tolist() == [[[0, 0, -1]] * 3]
     assert b.vertices[b.faces].tolist() == [[[0, 0, 0], [1, 1, 0], [0, 1, 0]]]

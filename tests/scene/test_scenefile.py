@@ -350,3 +350,23 @@ def test_loading_writes_nothing(tmp_path: Path) -> None:
     with pytest.raises(InputError):
         load_scene(tmp_path / "bad.json")
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_extras_hold_what_other_programs_need_and_unknown_keys_are_refused(tmp_path: Path) -> None:
+    extras = {"editor": {"zoom": [1, None, "x"]}, "version": 2.5}
+    objects = [SCENE["objects"][0] | {"extras": "any"}]
+    materials = {"paint": SCENE["materials"]["paint"] | {"extras": extras}}
+    lights = [SCENE["lights"][0] | {"extras": []}]
+    scene = load_scene(write_scene(tmp_path, extras=extras, objects=objects, materials=materials, lights=lights,
+                                   camera=SCENE["camera"] | {"extras": 1}))
+    plain = load_scene(write_scene(tmp_path))
+    assert (scene.materials, scene.lights, scene.camera) == (plain.materials, plain.lights, plain.camera)
+    with pytest.raises(InputError, match="editor: unknown key"):
+        load_scene(write_scene(tmp_path, editor=1))
+
+
+def test_utf_16_is_named(tmp_path: Path) -> None:
+    path = write_scene(tmp_path)
+    path.write_text(path.read_text(), encoding="utf-16")
+    with pytest.raises(InputError, match=r"sample\.json: expected text in UTF-8, got UTF-16"):
+        load_scene(path)

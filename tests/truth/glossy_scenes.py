@@ -1,7 +1,8 @@
 """Small scenes of glossy senders of every exponent: near and far, flat and curved, and lamps of every kind.
 
 All lie in a room of 2 m, or beside one; pictures are 24 x 18 pixels. `reference` holds the irradiance of every pixel by
-`tests.naive.face_quadrature`, stored in glossy_references.npz; `python -m tests.truth.glossy_scenes` makes it again.
+`tests.naive.face_quadrature`, or what a scene's own lobes reflect to the eye, stored in glossy_references.npz; `python
+-m tests.truth.glossy_scenes` makes it again.
 """
 
 import dataclasses
@@ -15,7 +16,7 @@ import numpy as np
 from refgi.frame import Frame
 from refgi.scene import Camera, DirectionalLight, Material, Mesh, PointLight, Scene, SpotLight, merge
 from refgi.scene.builtin.surfaces import sphere
-from tests.naive.face_quadrature import irradiance, receivers_of
+from tests.naive.face_quadrature import glossy_of, irradiance, receivers_of, reflected
 from tests.truth.scenes import rectangle
 
 REFERENCES = Path(__file__).with_name("glossy_references.npz")
@@ -149,29 +150,51 @@ def frame(name):
     return Frame(SCENES[name](name), dtype=np.float64)
 
 
+BY_LOBES = ("corner", "corner_600_900", "lamp_close_1000", "ball_and_block", "sun_on_blocks", "mirror_floor")
+EVERY = [*((name, False) for name in SCENES), *((name, True) for name in BY_LOBES)]  # name, and whether by lobes
+
+
 @cache
-def reference(name):
-    """Return a scene's irradiance (3, h, w), stored for the receivers (6, n) that it was made of."""
+def reference(name, lobes=False):
+    """Return a scene's irradiance (3, h, w), or with `lobes` the radiance that pixels' lobes reflect.
+
+    It is stored for the receivers (6, n) that it was made of.
+    """
     with np.load(REFERENCES) as stored:
-        to, values = receivers_of(frame(name)), stored[name]
+        to, values = receivers_of(frame(name), lobes), stored[_key(name, lobes)]
     found = np.concatenate([to.position, to.normal], axis=1)
     if found.shape != (len(values), 6) or np.abs(found - values[:, :6]).max() > 1e-6:
         raise AssertionError(f"{REFERENCES.name} holds other receivers of {name}: make it again")
-    picture = np.zeros((3, *frame(name).gbuffer.covered.shape))
-    picture[:, frame(name).gbuffer.covered] = values[:, 6:].T
+    seen = glossy_of(frame(name)) if lobes else frame(name).gbuffer.covered
+    picture = np.zeros((3, *seen.shape))
+    picture[:, seen] = values[:, 6:].T
     return picture
+
+
+def oracle(name, lobes=False, some=slice(None), tolerance=1e-4):
+    """Return receivers (6, n) of a scene, what they get, and how far that moved last."""
+    to, scene = receivers_of(frame(name), lobes), frame(name).scene
+    to = type(to)(*(field[some] for field in to))
+    if not lobes:
+        return to, *irradiance(scene, to, tolerance)
+    seen = frame(name).gbuffer.triangle_id[glossy_of(frame(name))][some]
+    specular = np.array([m.specular for m in scene.materials])[scene.geometry.material_of_face[seen]]
+    return to, *reflected(scene, to, specular, tolerance=tolerance)
+
+
+def _key(name, lobes):
+    return f"{name}, lobes" if lobes else name
 
 
 def main(names):
     """Compute the references of scenes by name, of all without names."""
-    for name in names or SCENES:
-        to = receivers_of(frame(name))
-        value, moved = irradiance(frame(name).scene, to)
+    for name, lobes in [one for one in EVERY if one[0] in (names or SCENES)]:
+        to, value, moved = oracle(name, lobes)
         stored = dict(np.load(REFERENCES)) if REFERENCES.exists() else {}
-        stored[name] = np.concatenate([to.position, to.normal, value], axis=1)
-        np.savez_compressed(REFERENCES, **{key: stored[key] for key in SCENES if key in stored})
-        print(f"{name}: {len(value)} receivers, mean {value.mean(axis=0)}, moved by {(moved / value.mean()).max():.1e}",
-              flush=True)
+        stored[_key(name, lobes)] = np.concatenate([to.position, to.normal, value], axis=1)
+        np.savez_compressed(REFERENCES, **{key: stored[key] for key in sorted(stored)})
+        print(f"{_key(name, lobes)}: {len(value)} receivers, mean {value.mean(axis=0)}, moved by "
+              f"{(moved / value.mean()).max():.1e}", flush=True)
 
 
 if __name__ == "__main__":

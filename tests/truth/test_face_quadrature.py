@@ -11,9 +11,9 @@ from refgi.scene import DirectionalLight, Material, PointLight, SpotLight
 from refgi.scene.builtin.surfaces import sphere
 from tests.form_factors import polygon_form_factor
 from tests.naive import light_tracing
-from tests.naive.face_quadrature import Receivers, irradiance
+from tests.naive.face_quadrature import Receivers, irradiance, reflected
 from tests.naive.radiometry import gauss_legendre, lobe_fraction
-from tests.naive.receiver_lobes import unit
+from tests.naive.receiver_lobes import tilted_albedo, unit
 from tests.truth.scenes import floor, rectangle, scene
 
 TOLERANCE = 1e-4  # relative, what is asked of the oracle
@@ -28,7 +28,7 @@ def glossy(exponent, diffuse=(0.0, 0.0, 0.0)):
 
 def facing(points, normals):
     points, normals = (np.asarray(v, float).reshape(-1, 3) for v in (points, normals))
-    return Receivers(points, unit(normals), unit(normals))
+    return Receivers(points, unit(normals), unit(normals), unit(normals), np.zeros(len(points)))
 
 
 def found(room, points, normals):
@@ -45,6 +45,20 @@ def test_a_lobe_of_one_straight_down_is_diffuse():
                           ((0.5, 0.01, 0.01), (0, 0, -1))):
         expected = 0.9 * RHO * DOWN.irradiance * polygon_form_factor(point, normal, corners)
         np.testing.assert_allclose(found(scene([plate], DOWN), [point], [normal])[0], expected, rtol=TOLERANCE)
+
+
+@pytest.mark.parametrize(("exponent", "tilt"), [(2.0, 0.0), (2.0, 0.5), (40.0, 0.3), (1e6, 0.5)])
+def test_a_receiver_s_lobe_over_a_large_floor(exponent, tilt):
+    """Radiance rho E / pi from everywhere below, s = 1: ((P + 2) / 2 pi) int <m.w>^P <n.w> dw of it comes to the eye.
+
+    The floor fills all of a lobe of 1e6, and of the others but for what lies beyond 400 times its height.
+    """
+    room, m = scene([floor(400.0, RED)], DOWN), unit(np.array([(math.sin(tilt), -math.cos(tilt), 0.0)]))
+    to = facing([(2.31, 0.5, -1.47)], [(0, -1, 0)])._replace(mirrored=m, exponent=np.array([exponent]))
+    value, moved = reflected(room, to, np.ones((1, 3)), tolerance=TOLERANCE)
+    assert (moved <= TOLERANCE * value).all()
+    share = tilted_albedo(exponent, tilt)
+    np.testing.assert_allclose(value[0], share * np.array((0.6, 0.5, 0.4)) * DOWN.irradiance / math.pi, rtol=5e-4)
 
 
 def test_a_narrow_spot_on_a_large_floor():

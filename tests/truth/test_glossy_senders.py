@@ -1,5 +1,7 @@
 """Truth of glossy senders against the oracle of `glossy_scenes`: means, and claimed over true variance over seeds.
 
+Of irradiance, and of what glossy receivers reflect of it.
+
 Squared deviations are from the oracle and not from the runs' own mean: light that no run has met is then a deviation of
 every run, and not a small variance.
 """
@@ -12,8 +14,9 @@ from scipy.stats import f
 
 from benchmarks.truth_glossy import claimed_over_true
 from refgi.truth import TruthSettings, trace_truth
-from tests.naive.face_quadrature import TOGETHER, irradiance, receivers_of
-from tests.truth.glossy_scenes import EXPONENTS, SCENES, frame, reference
+from refgi.truth.truth import trace_lobes
+from tests.naive.face_quadrature import TOGETHER, glossy_of
+from tests.truth.glossy_scenes import EVERY, EXPONENTS, SCENES, frame, oracle, reference
 
 CERTAIN = 1e-4  # a value beyond the quantiles of this tail comes once in 10,000 runs
 DARK = 1e-3  # of the picture's mean: blocks below it see light in the far tails of lobes alone
@@ -28,14 +31,14 @@ ALONE = [("diffuse", "hemisphere"), ("diffuse", "light"), ("sun_on_blocks", "hem
 
 
 @cache
-def run(name, seed, passes, estimator="combined"):
-    settings = TruthSettings(samples=passes * _per_pass(name, estimator), seed=seed, estimator=estimator)
-    return trace_truth(frame(name), settings)
+def run(name, seed, passes, estimator="combined", *, lobes=False):
+    settings = TruthSettings(samples=passes * _per_pass(name, estimator, lobes), seed=seed, estimator=estimator)
+    return (trace_lobes if lobes else trace_truth)(frame(name), settings)
 
 
 @cache
-def _per_pass(name, estimator):
-    shortest = trace_truth(frame(name), TruthSettings(samples=1, estimator=estimator))
+def _per_pass(name, estimator, lobes):
+    shortest = (trace_lobes if lobes else trace_truth)(frame(name), TruthSettings(samples=1, estimator=estimator))
     return int(shortest.samples.max()) // shortest.passes
 
 
@@ -45,9 +48,9 @@ def levels(result):
             "picture": (result.picture_mean, result.picture_variance)}
 
 
-def expected(name):
+def expected(name, lobes):
     """Return the oracle's means over pixels, blocks and picture."""
-    oracle, seen = reference(name), frame(name).gbuffer.covered
+    oracle, seen = reference(name, lobes), glossy_of(frame(name)) if lobes else frame(name).gbuffer.covered
     pad = [(0, -size % 8) for size in seen.shape]
     blocks, counts = (np.pad(np.where(seen, plane, 0.0), pad).reshape(
         (pad[0][1] + seen.shape[0]) // 8, 8, (pad[1][1] + seen.shape[1]) // 8, 8).sum(axis=(1, 3))
@@ -57,29 +60,30 @@ def expected(name):
     return {"pixel": oracle, "block": blocks / np.maximum(counts, 1), "picture": oracle[:, seen].mean(axis=1)}
 
 
-def bright(name, level):
+def bright(name, level, lobes):
     """Tell which pixels, blocks and channels count."""
-    value = expected(name)[level]
-    return value > DARK * expected(name)["picture"].reshape(3, *(1,) * (value.ndim - 1))
+    value = expected(name, lobes)[level]
+    return value > DARK * expected(name, lobes)["picture"].reshape(3, *(1,) * (value.ndim - 1))
 
 
-def squares(name, result):
+def squares(name, result, lobes=False):
     """Return squared deviations from the oracle over what a run states: of bright blocks, of the picture."""
     found = {}
     for level in ("block", "picture"):
         mean, variance = levels(result)[level]
-        counts = bright(name, level)
-        found[level] = ((mean - expected(name)[level])[counts] ** 2 / variance[counts])
+        counts = bright(name, level, lobes)
+        found[level] = ((mean - expected(name, lobes)[level])[counts] ** 2 / variance[counts])
     return found
 
 
 @pytest.mark.feature("REF-03")
-@pytest.mark.parametrize("name", SCENES)
-def test_means_are_those_of_the_oracle(name, evidence):
-    z2 = squares(name, run(name, 1, LONG_RUN))
+@pytest.mark.feature("REF-26")
+@pytest.mark.parametrize(("name", "lobes"), EVERY)
+def test_means_are_those_of_the_oracle(name, lobes, evidence):
+    z2 = squares(name, run(name, 1, LONG_RUN, lobes=lobes), lobes)
     worst = {level: float(np.sqrt(values.max())) for level, values in z2.items()}
-    evidence(f"{name}, P = {EXPONENTS[name]}: blocks off by {worst['block']:.1f} standard errors at most, the picture "
-             f"by {worst['picture']:.1f}; chi-square of a block {z2['block'].mean():.2f}")
+    evidence(f"{name}, P = {EXPONENTS[name]}{', lobes' * lobes}: blocks off by {worst['block']:.1f} standard errors at "
+             f"most, the picture by {worst['picture']:.1f}; chi-square of a block {z2['block'].mean():.2f}")
     assert z2["picture"].max() < f.isf(CERTAIN, 1, LONG_RUN - 1)
     assert z2["block"].max() < f.isf(CERTAIN / z2["block"].size, 1, LONG_RUN - 1)
     assert z2["block"].mean() < f.isf(CERTAIN, 6, LONG_RUN - 1)  # of 27 that go together, as if there were 6
@@ -114,11 +118,11 @@ def test_claimed_variance_is_the_true_one(name, level, evidence):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SCENES)
-def test_the_stored_oracle_is_what_is_computed(name):
+@pytest.mark.parametrize(("name", "lobes"), EVERY)
+def test_the_stored_oracle_is_what_is_computed(name, lobes):
     """A few receivers of each scene: what is stored is what the quadrature gives today, at a finer tolerance."""
-    to = receivers_of(frame(name))
-    chosen = np.linspace(0, len(to.position) - 1, max(4, TOGETHER // 1000)).astype(int)
-    value, _ = irradiance(frame(name).scene, type(to)(*(field[chosen] for field in to)), 3e-5)
-    stored = reference(name)[:, frame(name).gbuffer.covered].T[chosen]
-    np.testing.assert_allclose(stored, value, rtol=3e-4, atol=1e-4 * stored.mean())
+    seen = glossy_of(frame(name)) if lobes else frame(name).gbuffer.covered
+    stored = reference(name, lobes)[:, seen].T
+    chosen = np.linspace(0, len(stored) - 1, max(4, TOGETHER // 1000)).astype(int)
+    value = oracle(name, lobes, chosen, 3e-5)[1]
+    np.testing.assert_allclose(stored[chosen], value, rtol=3e-4, atol=1e-4 * stored.mean())

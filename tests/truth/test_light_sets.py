@@ -116,7 +116,6 @@ def test_sets_hold_diffuse_parts_in_whole_blocks():
     assert starts.shape == (4, 2)
     assert np.array_equal(starts[1:, 0], starts[:-1, 1])
     assert starts[-1, 1] * BLOCK == len(points.power)
-    assert not points.lobe.any()
     rays = []
     for first, last in starts * BLOCK:
         lit = points.power[first:last] > 0
@@ -202,7 +201,3 @@ def test_same_bits_for_threads_and_batches_with_many_sets(frame):
         assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(first, again, strict=True))
 
 
-def test_a_scene_without_lobes_has_no_light_vertices_of_them(frame):
-    task = frame_task(frame, TruthSettings(estimator="light"))
-    points, _ = fresh_points(task, np.random.default_rng(0))
-    assert not points.lobe.any()

@@ -1,7 +1,4 @@
-"""The outer layer of glTF: GLB chunks, the JSON document, and buffers from chunks, files or data URIs.
-
-Typed views of glTF buffers, every bound checked before a byte is read.
-"""
+"""The outer layer of glTF: GLB chunks, the JSON document, and buffers from chunks, files or data URIs."""
 
 import base64
 import binascii
@@ -13,19 +10,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from refgi.errors import InputError, expect, shortened
-from refgi.scene.files import read_bytes
-from refgi.scene.model import Array
+from refgi.scene.files import expect_utf8, read_bytes
 
 MAGIC = b"glTF"
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 # Nothing else that is required by a file can be passed over without drawing something wrong.
-READABLE_EXTENSIONS = {"KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_mesh_quantization",
+READABLE_EXTENSIONS = {"EXT_mesh_gpu_instancing",
+                       "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_mesh_quantization",
                        "KHR_materials_ior", "KHR_materials_unlit", "KHR_texture_transform"}
-COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
 class Document:
@@ -47,7 +40,7 @@ class Document:
     def __init__(self, path: Path) -> None:
         self.path = path
         content = read_bytes(path)
-        text, self._chunk = _chunks(content, path) if content[:4] == MAGIC else (content, None)
+        text, self._chunk = _chunks(content, path) if content[:4] == MAGIC else (expect_utf8(content, path), None)
         self.tree = _parsed(text, path)
         self._buffers: dict[int, bytes] = {}
         self._items: dict[str, list[dict[str, Any]]] = {}
@@ -92,6 +85,11 @@ class Document:
         if not (isinstance(found, list | tuple) and len(found) == len(default) and _are_finite(found)):
             expect(False, f"{self.path}: {where}.{key}", f"{len(default)} finite numbers up to 1e+300", found)
         return tuple(map(float, found))
+
+    def all_numbers(self, owner: dict[str, Any], key: str, where: str) -> tuple[float, ...]:
+        """Return the finite numbers `owner[key]`, however many, none when absent."""
+        found = owner.get(key, [])
+        return self.numbers(owner, key, where, (0.0,) * len(found)) if isinstance(found, list) and found else ()
 
     def number(self, owner: dict[str, Any], key: str, where: str, default: float) -> float:
         """Return the finite number `owner[key]`."""
@@ -189,46 +187,3 @@ def _are_finite(values: Sequence[Any]) -> bool:
     """Return whether all of one or more values are numbers of JSON whose products stay finite."""
     numbers = {int, float}.issuperset(map(type, values))
     return numbers and min(values) > -1e300 and max(values) < 1e300 and not math.isnan(sum(values))
-
-
-def accessor(document: Document, index: Any, kind: str, referrer: str) -> Array:
-    """Return the elements of an accessor.
-
-    `kind`: ``"SCALAR"``, ``"VEC3"`` ...: what the referrer needs. `referrer`: the key that names the accessor. Returns
-    (count,) or (count, width): in the file's component type, or float64 where the accessor is normalised. Raises
-    `InputError` if a key is missing or any byte lies outside its buffer.
-    """
-    entry = document.item("accessors", index, referrer)
-    where = f"accessors[{index}]"
-    path = document.path
-    expect(entry.get("type") == kind, f"{path}: {where}.type", kind, entry.get("type"))
-    code = entry.get("componentType")
-    known = isinstance(code, int) and code in COMPONENTS
-    expect(known, f"{path}: {where}.componentType", f"one of {sorted(COMPONENTS)}", code)
-    expect("sparse" not in entry, f"{path}: {where}.sparse", "a dense accessor", "a sparse one")
-    expect("bufferView" in entry, f"{path}: {where}.bufferView", "an index", None)
-    dtype = np.dtype(COMPONENTS[code])  # type: ignore[index]
-    elements = _view(document, entry, where, dtype, WIDTHS[kind])
-    if entry.get("normalized") is True and dtype.kind != "f":
-        elements = np.maximum(elements / np.iinfo(dtype).max, -1.0)
-    return elements if WIDTHS[kind] > 1 else elements[:, 0]
-
-
-def _view(document: Document, entry: dict[str, Any], where: str, dtype: np.dtype[Any], width: int) -> Array:
-    """Return (count, width) elements of an accessor after checking that they lie inside view and buffer."""
-    path = document.path
-    view = document.item("bufferViews", entry["bufferView"], f"{where}.bufferView")
-    place = f"bufferViews[{entry['bufferView']}]"
-    content = document.buffer(document.integer(view, "buffer", place))
-    start = document.integer(view, "byteOffset", place, 0)
-    length = document.integer(view, "byteLength", place)
-    expect(start + length <= len(content), f"{path}: {place}", f"a range inside the buffer's {len(content)} bytes",
-           f"{start} to {start + length}")
-    size = dtype.itemsize * width
-    stride = document.integer(view, "byteStride", place, size)
-    expect(stride >= size and stride <= 1024, f"{path}: {place}.byteStride", f"{size} to 1024", stride)
-    count = document.integer(entry, "count", where)
-    offset = document.integer(entry, "byteOffset", where, 0)
-    end = offset + stride * (count - 1) + size if count else offset
-    expect(end <= length, f"{path}: {where}", f"a range inside the view's {length} bytes", f"{offset} to {end}")
-    return np.ndarray((count, width), dtype, content, start + offset, (stride, dtype.itemsize))

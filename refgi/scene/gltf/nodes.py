@@ -39,27 +39,40 @@ def scene_nodes(document: Document) -> Nodes:
 
     Raises `InputError` if a reference leads nowhere or to a node with another parent, or a matrix is not usable.
     """
-    numbers, parent = _order(document)
+    return _placed(document, _roots(document))
+
+
+def all_nodes(document: Document) -> Nodes:
+    """Walk all nodes of a document, those of its default scene among others; raises as `scene_nodes`."""
+    return _placed(document, _parentless(document))
+
+
+def _placed(document: Document, roots: list[int]) -> Nodes:
+    numbers, parent = _order(document, roots)
     nodes = document.items("nodes")
     world = np.tile(np.eye(4), (len(numbers), 1, 1))
     keys = [_fill_local(world[k], document, nodes[number], f"nodes[{number}]") for k, number in enumerate(numbers)]
-    expect_affine(world, lambda k: f"{document.path}: nodes[{numbers[k]}]{keys[k]}")
+    # a scale of 0, 0, 0 hides the meshes of a node and of all below it
+    hidden = np.asarray(~world[:, :3, :3].any(axis=(1, 2)) & (world[:, 3] == (0, 0, 0, 1)).all(axis=1))
+    shown = np.flatnonzero(~hidden)
+    expect_affine(world[shown], lambda k: f"{document.path}: nodes[{numbers[shown[k]]}]{keys[shown[k]]}")
     with np.errstate(over="ignore", invalid="ignore"):  # judged below, with the node's name
         for k, above in enumerate(parent):
             if above >= 0:
                 world[k] = world[above] @ world[k] if keys[k] else world[above]
-    for k in np.flatnonzero(~invertible(world))[:1].tolist():
+                hidden[k] |= hidden[above]
+    for k in np.flatnonzero(~(hidden | invertible(world)))[:1].tolist():
         expect(False, f"{document.path}: nodes[{numbers[k]}]",
                "a finite, invertible product with its parents' matrices", world[k].ravel().tolist())
     return Nodes(numbers, parent, world)
 
 
-def _order(document: Document) -> tuple[list[int], list[int]]:
+def _order(document: Document, roots: list[int]) -> tuple[list[int], list[int]]:
     """Return the nodes, depth first and children in order, and the position of each one's parent."""
     numbers: list[int] = []
     parent: list[int] = []
     visited: set[int] = set()
-    pending = [(root, -1) for root in reversed(_roots(document))]
+    pending = [(root, -1) for root in reversed(roots)]
     while pending:
         number, above = pending.pop()
         node = document.item("nodes", number, "a node reference")
@@ -78,6 +91,10 @@ def _roots(document: Document) -> list[int]:
     if scenes:
         index = document.tree.get("scene", 0)
         return _indices(document, document.item("scenes", index, "scene"), "nodes", f"scenes[{index}]")
+    return _parentless(document)
+
+
+def _parentless(document: Document) -> list[int]:
     nodes = document.items("nodes")
     children = {c for i, node in enumerate(nodes) for c in _indices(document, node, "children", f"nodes[{i}]")}
     return [index for index in range(len(nodes)) if index not in children]
@@ -115,6 +132,11 @@ def _rotation(quaternion: tuple[float, ...], where: str) -> tuple[Vector, Vector
     length = math.hypot(*quaternion)
     expect(length > 0, where, "a quaternion that is not zero", quaternion)
     x, y, z, w = (c / length for c in quaternion)
+    return rotation_rows(x, y, z, w)
+
+
+def rotation_rows(x: Any, y: Any, z: Any, w: Any) -> tuple[Any, Any, Any]:
+    """Return the rows of the rotations of unit quaternions, numbers or arrays (k,)."""
     return ((1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
             (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
             (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)))

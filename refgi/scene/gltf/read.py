@@ -6,6 +6,7 @@ the material's choice of set and its `KHR_texture_transform` at once, as both ar
 
 import dataclasses
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,15 @@ import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect
 from refgi.scene.files import Contents
-from refgi.scene.gltf.container import Document, accessor
+from refgi.scene.gltf.accessors import accessor
+from refgi.scene.gltf.container import Document
+from refgi.scene.gltf.deform import Deformer, Pose, pose_of
+from refgi.scene.gltf.instances import instances
 from refgi.scene.gltf.nodes import node_camera, node_light, scene_nodes
 from refgi.scene.gltf.textures import Look, base_colour, emissive, transformed
 from refgi.scene.mesh import as_float64, expect_memory
 from refgi.scene.model import Array, Camera, Light, Material, Mesh, Rgb
-from refgi.scene.transform import transformed_all
+from refgi.scene.transform import IDENTITY, invertible, transformed_all
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 CUTOFF = 0.5  # glTF's default of alphaCutoff
@@ -41,7 +45,7 @@ def read_gltf(path: Path) -> Contents:
     Raises
     ------
     InputError
-        If the file is damaged or needs what is not read (compressed meshes, sparse accessors).
+        If the file is damaged or needs what is not read (compressed meshes).
     """
     document = Document(path)
     return _Reader(document).contents()
@@ -60,37 +64,57 @@ class _Reader:
         self.blended = 0  # materials
         self.materials: list[Material] = [self._material(index) for index in range(len(document.items("materials")))]
         self._looks: dict[int, Look | None] = {}
-        self._shapes: dict[int, list[Mesh]] = {}
+        self._shapes: dict[tuple[int, Pose], list[Mesh]] = {}
+        self._nodes = scene_nodes(document)
+        self._deformer = Deformer(document, self._nodes, self._pass_over)
 
     def contents(self) -> Contents:
-        nodes = scene_nodes(self.document)
         shapes: list[Mesh] = []
-        placed_by: list[int] = []
-        for k, index in enumerate(nodes.number):
+        matrices: list[Array] = []
+        for k, index in enumerate(self._nodes.number):
             node, where = self.document.items("nodes")[index], f"nodes[{index}]"
-            found = self._shapes_of(node, where)
-            shapes += found
-            placed_by += [k] * len(found)
-            self._view_and_light(node, nodes.world[k], where)
+            if "mesh" in node:
+                pose = pose_of(self.document, node, where)
+                placed = self._placements(node, pose, self._nodes.world[k], where)
+                found = self._shapes_of(node, where, pose, len(placed))
+                shapes += found * len(placed)
+                matrices += [matrix for matrix in placed for _ in found]
+            self._view_and_light(node, self._nodes.world[k], where)
         for what, count in self.passed_over.items():
             warnings.warn(RefgiWarning(f"{self.path}: {count} {what} passed over"), stacklevel=4)
         if self.blended:
             text = f"material(s) of alphaMode BLEND taken as MASK with a cutoff of {CUTOFF}: no partial transparency"
             warnings.warn(RefgiWarning(f"{self.path}: {self.blended} {text}"), stacklevel=4)
-        meshes = transformed_all(shapes, nodes.world[placed_by]) if shapes else []
+        meshes = transformed_all(shapes, np.array(matrices)) if shapes else []
         return Contents(tuple(meshes), tuple(self.cameras), tuple(self.lights))
 
-    def _shapes_of(self, node: dict[str, Any], where: str) -> list[Mesh]:
-        """Return the meshes of a node, not yet in the world."""
-        if "mesh" not in node:
-            return []
-        found = self._mesh(node["mesh"], f"{where}.mesh")
-        self.vertices += sum(len(mesh.vertices) for mesh in found)
-        self.faces += sum(len(mesh.faces) for mesh in found)
+    def _placements(self, node: dict[str, Any], pose: Pose, matrix: Array, where: str) -> Sequence[Array]:
+        """Return world from mesh, (4, 4) each, for all times that a node's mesh is drawn."""
+        placed = instances(self.document, node, matrix, where)
+        if pose.skin is not None:  # in the world by its joints
+            self._pass_over("skinned mesh(es)' instances", int(placed is not None))
+            return (IDENTITY,)
+        self._pass_over("skin(s) of meshes without joints", int("skin" in node))
+        if not matrix[:3, :3].any():
+            return ()
+        if placed is None:
+            return (matrix,)
+        good = invertible(placed)
+        self._pass_over("instance(s) without size", int(np.count_nonzero(~good)))
+        return list(placed[good])
+
+    def _shapes_of(self, node: dict[str, Any], where: str, pose: Pose, count: int) -> list[Mesh]:
+        """Return the meshes of a node that is drawn so many times, not yet in the world unless they follow a skin."""
+        found = self._mesh(node["mesh"], f"{where}.mesh", pose)
+        self.vertices += count * sum(len(mesh.vertices) for mesh in found)
+        self.faces += count * sum(len(mesh.faces) for mesh in found)
         expect_memory(self.vertices, self.faces, f"{self.path}: {where}.mesh")
         return found
 
     def _view_and_light(self, node: dict[str, Any], matrix: Array, where: str) -> None:
+        if not matrix[:3, :3].any():
+            self._pass_over("camera(s) or light(s) of zero scale", int("camera" in node or "extensions" in node))
+            return
         if camera := node_camera(self.document, node, matrix, where):
             self.cameras.append(camera)
         elif "camera" in node:
@@ -98,16 +122,17 @@ class _Reader:
         if light := node_light(self.document, node, matrix, where):
             self.lights.append(light)
 
-    def _mesh(self, index: Any, referrer: str) -> list[Mesh]:
+    def _mesh(self, index: Any, referrer: str, pose: Pose) -> list[Mesh]:
         entry = self.document.item("meshes", index, referrer)
-        if index not in self._shapes:
+        if (index, pose) not in self._shapes:
             name = self.document.name(entry, f"meshes[{index}]")
             primitives = self.document.objects(entry, "primitives", f"meshes[{index}]")
-            read = (self._primitive(p, f"meshes[{index}].primitives[{k}]", name) for k, p in enumerate(primitives))
-            self._shapes[index] = [mesh for mesh in read if mesh is not None]
-        return self._shapes[index]
+            read = (self._primitive(p, f"meshes[{index}].primitives[{k}]", name, pose)
+                    for k, p in enumerate(primitives))
+            self._shapes[index, pose] = [mesh for mesh in read if mesh is not None]
+        return self._shapes[index, pose]
 
-    def _primitive(self, entry: dict[str, Any], where: str, name: str) -> Mesh | None:
+    def _primitive(self, entry: dict[str, Any], where: str, name: str, pose: Pose) -> Mesh | None:
         mode = entry.get("mode", TRIANGLES)
         if mode not in (TRIANGLES, STRIP, FAN):
             self._pass_over("primitive(s) without triangles")
@@ -120,6 +145,7 @@ class _Reader:
         normals = None
         if "NORMAL" in attributes:
             normals = accessor(self.document, attributes["NORMAL"], "VEC3", f"{where}.attributes.NORMAL")
+        vertices, normals = self._deformer.deformed(entry, vertices, normals, pose, where)
         corners = np.arange(len(vertices), dtype=np.int64)
         if "indices" in entry:
             indices = accessor(self.document, entry["indices"], "SCALAR", f"{where}.indices")
@@ -207,8 +233,9 @@ class _Reader:
             return CUTOFF
         return self.document.number(entry, "alphaCutoff", where, CUTOFF)
 
-    def _pass_over(self, what: str) -> None:
-        self.passed_over[what] = self.passed_over.get(what, 0) + 1
+    def _pass_over(self, what: str, count: int = 1) -> None:
+        if count:
+            self.passed_over[what] = self.passed_over.get(what, 0) + count
 
 
 def _triangles(corners: Array, mode: int, where: str) -> Array:

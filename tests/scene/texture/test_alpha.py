@@ -293,5 +293,6 @@ def test_obj_s_factor_and_what_is_not_read(tmp_path: Path) -> None:
     bare = obj(tmp_path, "newmtl a\nmap_d leaf.png\n", "f 1 2 3\n")
     scene = loaded(bare, "map_d cut out")
     assert scene.geometry.cut is None  # alpha 1 where there is no picture
-    with pytest.raises(InputError, match=r"m\.mtl: line 2: map_d: .*gone\.png"):
-        loaded(obj(tmp_path, "newmtl a\nmap_d gone.png\n"))
+    gone = obj(tmp_path, "newmtl a\nmap_d gone.png\n")
+    with pytest.warns(RefgiWarning), pytest.raises(InputError, match=r"m\.mtl: line 2: map_d: .*gone\.png"):
+        load_scene(gone, strict=True)

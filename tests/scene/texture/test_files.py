@@ -18,6 +18,7 @@ from refgi.scene.model import Scene
 from refgi.scene.motion import moved, with_own_vertices
 from refgi.scene.obj import read_obj
 from refgi.scene.repair import repaired
+from refgi.scene.strictness import strictness
 from refgi.scene.texture.image import Image
 from refgi.scene.transform import transformed_all
 from tests.scene.samples import BUFFER, glb_bytes, gltf_tree, write_scene
@@ -238,9 +239,19 @@ def test_obj_faces_without_coordinates_and_options_that_are_not_read(tmp_path: P
 
 def test_an_obj_texture_that_is_missing_names_line_and_image(tmp_path: Path) -> None:
     path = obj(tmp_path, "newmtl a\nmap_Kd woad.png\nnewmtl unused\nmap_Kd never.png\n")
-    with pytest.raises(InputError, match=r"m\.mtl: line 2: map_Kd: .*woad\.png: no such file; did you mean 'wood"):
+    said = r"m\.mtl: line 2: map_Kd: .*woad\.png: no such file; did you mean 'wood"
+    with pytest.raises(InputError, match=said), strictness(True):
         read_obj(path)
+    with pytest.warns(RefgiWarning, match=r"1 texture\(s\) of map_Kd and map_d not there, left out: woad\.png"):
+        assert read_obj(path).meshes[0].material == Material("a")  # grey, as without Kd
     read_obj(obj(tmp_path, "newmtl a\nKd 1 1 1\nnewmtl unused\nmap_Kd never.png\n"))
+
+
+def test_without_its_textures_a_material_has_its_colour_and_no_holes(tmp_path: Path) -> None:
+    path = obj(tmp_path, "newmtl a\nKd 0.1 0.2 0.3\nmap_Kd woad.png\nmap_d leaf.png\nd 0.5\n")
+    with pytest.warns(RefgiWarning) as said:
+        assert read_obj(path).meshes[0].material == Material("a", (0.1, 0.2, 0.3))
+    assert "2 texture(s) of map_Kd and map_d not there, left out: woad.png, leaf.png" in str(said[-1].message)
 
 
 def painted_scene(folder: Path, reflectance: dict[str, Any], mesh: str = "square.glb") -> Path:

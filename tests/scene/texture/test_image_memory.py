@@ -10,6 +10,7 @@ import pytest
 from refgi.errors import InputError
 from refgi.scene import load_scene
 from refgi.scene.mesh import BYTES_OF_TEXEL
+from refgi.scene.obj import read_obj
 from tests.scene.samples import BUFFER, glb_bytes, gltf_tree, write_scene
 
 COUNT, WIDTH, HEIGHT = 3, 50, 40
@@ -57,7 +58,27 @@ def beside(folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("made", [inside, beside])
+def library(folder: Path) -> Path:
+    """An OBJ of a triangle for each image."""
+    text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n"
+    materials = ""
+    for number in range(COUNT):
+        (folder / f"{number}.png").write_bytes(picture(number))
+        materials += f"newmtl m{number}\nmap_Kd {number}.png\n"
+        text += f"usemtl m{number}\nf 1/1 2/1 3/1\n"
+    (folder / "a.mtl").write_text(materials + "newmtl unused\nmap_Kd 0.png\nnewmtl other\nmap_Kd gone.png\n")
+    (folder / "a.obj").write_text(text)
+    return folder / "a.obj"
+
+
+def read(path: Path) -> None:
+    if path.suffix == ".obj":
+        read_obj(path)
+    else:
+        load_scene(path)
+
+
+@pytest.mark.parametrize("made", [inside, beside, library])
 def test_all_of_them_are_judged_before_one_is_decoded(tmp_path, monkeypatch, made):
     path = made(tmp_path)
     for key, amount in (("refgi.scene.texture.image.available_bytes", NEEDED - 1),
@@ -67,14 +88,14 @@ def test_all_of_them_are_judged_before_one_is_decoded(tmp_path, monkeypatch, mad
             patch.setattr("refgi.scene.texture.image._read", lambda *_: pytest.fail("an image was decoded"))
             with pytest.raises(InputError, match=f"{COUNT} images that fit in .* memory, got '"
                                                  f"{COUNT * WIDTH * HEIGHT:,} texels"):
-                load_scene(path)
+                read(path)
 
 
-@pytest.mark.parametrize("made", [inside, beside])
+@pytest.mark.parametrize("made", [inside, beside, library])
 def test_each_counts_once(tmp_path, monkeypatch, made):
     path = made(tmp_path)
     monkeypatch.setattr("refgi.scene.texture.image.available_bytes", lambda: NEEDED)
-    load_scene(path)
+    read(path)
 
 
 def test_an_image_that_no_material_shows_does_not_count(tmp_path, monkeypatch):

@@ -1,0 +1,166 @@
+"""Camera and lamp for a mesh that has none: where much of the mesh is seen, and where what is seen is lit.
+
+What is seen from a place is estimated from points all over the mesh: in each cell of a coarse picture the nearest one
+is seen, and with it those of which it does not lie in front of the plane.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from refgi.scene.light import SpotLight
+from refgi.scene.model import Array, Camera, Geometry, Vector
+
+VFOV = math.radians(35.0)
+SMALLEST_RADIUS = 1e-9  # m; eye and target of a camera must differ
+FULL_IRRADIANCE = math.pi  # W/m^2 at the middle of the mesh: an albedo's radiance is then the albedo itself
+LIGHT_DISTANCE = 4.0  # radii of the bounding sphere
+# From the middle of the mesh towards the eye: front right, and where that shows little, the other corners and sides.
+VIEWS = ((0.55, 0.4, 1.0), (-0.55, 0.4, 1.0), (0.55, 0.4, -1.0), (-0.55, 0.4, -1.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0),
+         (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.3, 1.0, 0.5), (0.3, -1.0, 0.5))
+LIGHT_DIRECTION = (-0.8, 1.1, 0.7)  # from the middle towards the lamp: front left, above
+MUCH_MORE = 1.2  # of the mesh that another view must show to be taken
+ENOUGH_LIT, LEAST_LIT = 0.33, 0.1  # of what the camera sees: to take a place at once, and at all
+POINTS, CELLS = 2048, 24  # on the mesh; a side of the coarse picture
+MOST_FACES = 1 << 14  # that points are put on
+IN_FRONT = 0.02  # radii; what is further in front of a point's plane, on its way to the eye, hides it
+# of a sequence that fills a cube evenly, whatever period the order of the faces has
+STEP = np.array((0.8191725133961645, 0.6710436067037893, 0.5497004779019703))
+
+
+class Points(NamedTuple):
+    """Points all over a mesh, each for the same area."""
+
+    position: Array  # (k, 3) m
+    normal: Array  # (k, 3) of their faces; either side
+    radius: float  # of the bounding sphere, m
+
+
+def default_camera(geometry: Geometry) -> Camera:
+    """Return a camera with the whole bounding box in view, and much of the mesh: into an open box from its open side.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Not empty.
+
+    Returns
+    -------
+    Camera
+        512 x 512 pixels.
+    """
+    middle, radius = _sphere(geometry)
+    cameras = [Camera(_vector(middle + _unit(view) * (radius / math.sin(VFOV / 2))), _vector(middle), vfov=VFOV)
+               for view in VIEWS]
+    points = _points(geometry)
+    shares = [float(np.count_nonzero(_seen(points, np.array(camera.eye)))) / POINTS for camera in cameras]
+    best = int(np.argmax(shares))
+    return cameras[best if shares[best] > MUCH_MORE * shares[0] else 0]
+
+
+def default_light(geometry: Geometry, camera: Camera | None = None) -> SpotLight:
+    """Return a spot light that lights what a camera sees: its cone holds the bounding box, or it is at an eye in there.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Not empty.
+    camera : Camera, optional
+        The camera; a placed one where absent.
+
+    Returns
+    -------
+    SpotLight
+        White, with an irradiance of pi W/m^2 at the middle.
+    """
+    camera = default_camera(geometry) if camera is None else camera
+    middle, radius = _sphere(geometry)
+    points, eye, (low, high) = _points(geometry), np.array(camera.eye), geometry.bounds
+    seen = _seen(points, eye)
+    if ((eye > low) & (eye < high)).all():
+        return _at_the_eye(camera, points, seen)
+    # the usual place, then others nearer and nearer to the eye's direction
+    towards = _unit(eye - middle) if np.any(eye != middle) else _unit(VIEWS[0])
+    places = [middle + _unit((1 - share) * _unit(LIGHT_DIRECTION) + share * towards) * (LIGHT_DISTANCE * radius)
+              for share in (0.0, 0.4, 0.7, 0.9)]
+    lit: list[float] = []
+    for place in places:
+        lit.append(_lit(points, seen, eye, place))
+        if lit[-1] >= ENOUGH_LIT:
+            break
+    if max(lit) > LEAST_LIT or not seen.any():
+        return _spot(places[int(np.argmax(lit))], middle, 1.2 * math.asin(1 / LIGHT_DISTANCE))
+    return _at_the_eye(camera, points, seen)
+
+
+def _at_the_eye(camera: Camera, points: Points, seen: Array) -> SpotLight:
+    """Return a lamp for the inside of what is closed: where the eye is, bright enough for what is seen."""
+    eye, target = np.array(camera.eye), np.array(camera.target)
+    distance = np.linalg.norm(points.position[seen] - eye, axis=1)
+    far = float(np.median(distance)) if len(distance) else points.radius
+    return _spot(eye, eye + _unit(target - eye) * max(far, SMALLEST_RADIUS), math.radians(60.0))
+
+
+def _spot(place: Array, target: Array, outer: float) -> SpotLight:
+    power = FULL_IRRADIANCE * float(np.sum((target - place) ** 2))
+    return SpotLight(_vector(place), _vector(target - place), outer / 1.2, outer, (power, power, power))
+
+
+def _points(geometry: Geometry) -> Points:
+    faces = geometry.faces
+    if len(faces) > MOST_FACES:
+        faces = faces[(np.arange(MOST_FACES) * STEP[0] % 1 * len(faces)).astype(np.int64)]
+    a, b, c = (geometry.vertices[faces[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+    area = np.linalg.norm(across, axis=1)
+    place, u, v = (np.arange(POINTS)[:, None] * STEP % 1).T
+    face = np.minimum(np.searchsorted(np.cumsum(area), place * area.sum()), len(faces) - 1)
+    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+    a, b, c = a[face], b[face], c[face]
+    normal = across[face] / np.maximum(area[face], np.finfo(np.float64).tiny)[:, None]
+    return Points(a + u[:, None] * (b - a) + v[:, None] * (c - a), normal, _sphere(geometry)[1])
+
+
+def _seen(points: Points, eye: Array) -> Array:
+    """Return which points a place sees, (k,) bool, on the six sides of a cube around it."""
+    offset = points.position - eye
+    size = np.abs(offset)
+    axis = np.argmax(size, axis=1)
+    depth = np.take_along_axis(offset, axis[:, None], axis=1)[:, 0]
+    others = np.take_along_axis(offset, (axis[:, None] + np.array((1, 2))) % 3, axis=1)
+    nearest = np.maximum(np.abs(depth), np.finfo(np.float64).tiny)
+    side = 2 * axis + (depth > 0)
+    place = others / nearest[:, None]
+    low, high = place.min(axis=0), place.max(axis=0)
+    width = max(float(np.max(high - low)), SMALLEST_RADIUS) / CELLS
+    cell = np.minimum(((place - low) / width).astype(np.int64), CELLS - 1)
+    key = (side * CELLS + cell[:, 0]) * CELLS + cell[:, 1]
+    far_first = np.argsort(-np.einsum("ij,ij->i", offset, offset))
+    nearest_in = np.zeros(6 * CELLS * CELLS, np.int64)
+    nearest_in[key[far_first]] = far_first  # the last one assigned stays
+    to_eye = -np.einsum("ij,ij->i", points.normal, offset)
+    to_nearest = np.einsum("ij,ij->i", points.normal, points.position[nearest_in[key]] - points.position)
+    return np.asarray(np.sign(to_eye) * to_nearest <= IN_FRONT * points.radius)
+
+
+def _lit(points: Points, seen: Array, eye: Array, lamp: Array) -> float:
+    """Return the share of the seen points that a lamp lights on the side that is seen."""
+    to_eye = np.einsum("ij,ij->i", points.normal, eye - points.position)
+    to_lamp = np.einsum("ij,ij->i", points.normal, lamp - points.position)
+    lit = seen & (to_eye * to_lamp > 0) & _seen(points, lamp)
+    return float(np.count_nonzero(lit)) / max(1, int(np.count_nonzero(seen)))
+
+
+def _sphere(geometry: Geometry) -> tuple[Array, float]:
+    low, high = geometry.bounds
+    return (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, SMALLEST_RADIUS)
+
+
+def _unit(vector: "Array | tuple[float, ...]") -> Array:
+    return np.asarray(np.asarray(vector) / np.linalg.norm(vector))
+
+
+def _vector(values: Array) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -11,7 +11,8 @@ import warnings
 from pathlib import Path
 
 from refgi.jit import Kernel
-from refgi.jit.ahead import LIST, Specialisation, text_of
+from refgi.jit.ahead import LIST, Specialisation
+from refgi.jit.typetext import text_of
 
 DTYPES = ("float32", "float64")
 SCENE = "cornell_box"

@@ -104,8 +104,9 @@ def _plain(x: float) -> float:
 
 def _write_kernel(folder: Path, turn: int) -> Path:
     """Write a compiled kernel, as far as the cache knows."""
-    made = SimpleNamespace(library=SimpleNamespace(has_dynamic_globals=False), _reduce=lambda: ("code", 1000 * [turn]))
-    with patch.dict(os.environ, REFGI_CACHE_DIR=str(folder)):
+    made = SimpleNamespace(library=SimpleNamespace(has_dynamic_globals=False))
+    packed = patch("refgi.jit.cache.packed", lambda _: bytes([turn % 256]) * 1000)
+    with patch.dict(os.environ, REFGI_CACHE_DIR=str(folder)), packed:
         cache, signature = KernelCache(_plain), types.float64(types.float64)
         cache.save_overload(signature, made)
         return cache.path(signature)

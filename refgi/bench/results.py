@@ -6,13 +6,13 @@ import json
 import math
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import pydantic
 
 from refgi.bench.error import Error
 from refgi.bench.split_text import tables_of
-from refgi.compare.report import number
+from refgi.compare.report import number, require_environment
 from refgi.image import write_text
 
 FORMAT = "bench 1"
@@ -65,6 +65,22 @@ class Run(_Strict):
     hashes: tuple[tuple[str, str], ...] = ()  # stages in the order in which they ended, and of each one's output
     in_equal_time: float | None = None  # rmse over that of the path tracer in equal time: above 1 it is beaten
     front: bool = False  # nothing measured here is both faster and nearer
+
+    @pydantic.field_validator("errors")
+    @classmethod
+    def judged(cls, errors: dict[str, Figures]) -> dict[str, Figures]:
+        """Refuse a run that no truth judges."""
+        if "truth" not in errors:
+            raise ValueError("expected errors against the truth")
+        return errors
+
+    @pydantic.field_validator("times")
+    @classmethod
+    def timed(cls, times: tuple[float, ...]) -> tuple[float, ...]:
+        """Refuse a run without a time."""
+        if not times:
+            raise ValueError("expected the time of a frame")
+        return times
 
     @property
     def label(self) -> str:
@@ -177,6 +193,12 @@ class Result(_Strict):
     environment: dict[str, Any]
     scenes: tuple[SceneResult, ...]
     paths: tuple[PathResult, ...] = ()  # of a batch along a path
+
+    @pydantic.model_validator(mode="after")
+    def on_a_machine(self) -> Self:
+        """Refuse an environment that a page cannot name."""
+        require_environment(self.environment)
+        return self
 
 
 def figures_of(error: Error, *, in_doubt: bool = False) -> Figures:

@@ -66,7 +66,9 @@ def bars(splits: Sequence[Split]) -> str:
         right.set(xlabel="share of the square, %")
         left.invert_yaxis()
         handles, labels = _legend(names)
-        figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=9)
+        legend = figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=9)
+        for text in (*left.get_yticklabels(), *legend.get_texts()):
+            text.set_parse_math(False)  # a name is no formula
 
     return figure_svg(draw, (WIDTH, HEIGHT + max(len(splits) * ROW, len(names) * LEGEND_ROW)), "Error split")
 

@@ -18,6 +18,7 @@ from refgi.compare.report import number
 from refgi.errors import expect
 from refgi.image import read_exr
 from refgi.provenance import Record
+from refgi.scene.files import is_there
 
 Array = npt.NDArray[Any]
 Planes = dict[str, Array]
@@ -88,7 +89,7 @@ def _file(run: Run, folder: Path) -> Path | None:
     path = PurePosixPath(run.picture)
     expect(not path.is_absolute() and ".." not in path.parts, f"{folder / 'results.json'}: picture",
            "a file inside its folder", run.picture)
-    return folder / path
+    return folder / path if is_there(folder / path) else None
 
 
 def _read(file: Path, scene: SceneResult) -> tuple[Planes, Record]:

@@ -25,12 +25,27 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments : sequence of str, optional
         Those of the process where absent.
     """
+    _open_standard_files()
     try:
         VerbGroup.refgi().main(arguments, prog_name="refgi")
     except SystemExit as end:
         if end.code in SIGNALLED:
             _leave(end.code)
         raise
+
+
+def _open_standard_files() -> None:
+    """Put the null device where stdin, stdout or stderr are closed: the next file to be opened would take the number.
+
+    What a library prints would then end up in a picture.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+    if sys.stderr is None:  # of which a message to nobody would otherwise go to stdout
+        sys.stderr = os.fdopen(2, "w", closefd=False)
 
 
 def _leave(code: int) -> NoReturn:

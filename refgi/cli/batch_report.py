@@ -205,10 +205,10 @@ def require_memory(jobs: "Sequence[Job]", common: "Common", workers: int) -> Non
     InputError
         If more is needed than available; names both.
     """
-    from refgi.cli.memory import available_bytes
+    from refgi import memory
     from refgi.errors import expect
 
-    needed, available = memory_needed(jobs, common, workers), available_bytes()
+    needed, available = memory_needed(jobs, common, workers), memory.available_bytes()
     expect(available is None or needed <= available, "--workers",
            f"so few that about {needed:,} bytes of memory are there, or a smaller size", f"{available} available")
 

@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -10,16 +10,14 @@ from refgi.cli.options import machine, seen, shadows, speech
 from refgi.cli.session import DONE, FAILED, Session, progress
 from refgi.cli.settings import preset
 
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-INDIRECT = ("irradiance.R", "irradiance.G", "irradiance.B")
-RADIANCE = ("R", "G", "B")
+INDIRECT = "irradiance."  # channels that hold it begin with that
 
 
 @click.command("check")
 @click.argument("picture")
 @click.option("--against", "against", required=True, metavar="SCENE", help="The scene that the picture shows.")
+@click.option("--layer", metavar="NAME", help="What its channels' names begin with, such as ViewLayer.Combined.")
+@click.option("--part", metavar="NAME", help="Name or number of its part in a file of several.")
 @seen
 @click.option("--method", default="truth", show_default=True, help="What it is judged by; `refgi info` lists methods.")
 @preset
@@ -31,16 +29,16 @@ RADIANCE = ("R", "G", "B")
 @speech
 @click.pass_obj
 def _check(
-    session: Session, /, picture: str, against: str, method: str, preset: str, pairs: tuple[str, ...],
-    tolerance: float, dtype: str, rsm_resolution: int, shadows: str | None, threads: int | None, seed: int | None,
-    **options: Any,
+    session: Session, /, picture: str, against: str, layer: str | None, part: str | None, method: str, preset: str,
+    pairs: tuple[str, ...], tolerance: float, dtype: str, rsm_resolution: int, shadows: str | None,
+    threads: int | None, seed: int | None, **options: Any,
 ) -> int:
     """Judge a port's PICTURE by a method on SCENE.
 
     PICTURE is an EXR of linear values.
 
     Channels irradiance.R, .G, .B are compared with indirect irradiance (W/m^2), else R, G, B with radiance. The scene
-    is rendered at the picture's size.
+    is rendered at the size of the picture's display window; of a crop its own pixels are compared, overscan is cut.
 
     Exit codes: 0 within the tolerance or the noise, 1 not, or by a truth whose error is not to be trusted.
     """
@@ -51,13 +49,15 @@ def _check(
     from refgi.cli.view import View
     from refgi.cli.warm import warm_up
     from refgi.errors import expect
+    from refgi.image.picture import read_colour
     from refgi.methods import render
     from refgi.truth.result import doubt_of_both
     from refgi.vectors.pictures import judge_picture
 
-    got, kind = _read(Path(picture))
+    found = read_colour(Path(picture), (INDIRECT, ""), layer, part)
+    kind = "indirect irradiance" if INDIRECT in found.names[0] else "radiance"
     settings = settings_for(method, pairs, seed, preset)
-    size = (got.shape[2], got.shape[1])
+    size = found.size
     expect(options["size"] in (None, size), "--size", f"{size[0]}x{size[1]} as the picture", options["size"])
     scene = View(scene=against, **{**options, "size": size}).load()
     require_memory(scene, dtype, rsm_resolution, traced=method == "truth", settings={method: settings})
@@ -68,12 +68,14 @@ def _check(
     variance = None if made.estimate is None else made.estimate.variance_of_mean
     if kind == "radiance" and variance is not None:
         variance = variance * (made.frame.gbuffer.albedo / math.pi) ** 2  # L = albedo / pi E
-    verdict = judge_picture(got, made.radiance if kind == "radiance" else made.irradiance, variance,
+    pixels = (slice(None), found.rows, found.columns)
+    right = made.radiance if kind == "radiance" else made.irradiance
+    verdict = judge_picture(found.planes, right[pixels], None if variance is None else variance[pixels],
                             tolerance=tolerance)
     lobes = made.lobe_estimate if kind == "radiance" else None
     doubt = "" if made.estimate is None else doubt_of_both(made.estimate, lobes)
     what = "is not" if not verdict.close else "is not known to be" if doubt else "is"
-    lines = [f"{picture}: {kind} {what} that of {scene.name} by {method}", verdict.said,
+    lines = [f"{picture}: {kind} {what} that of {scene.name} by {method}", f"{verdict.said}{found.part_said}",
              *([f"{method}: {doubt}"] if doubt else []), *(f"likely: {one}" for one in verdict.causes)]
     session.result("\n".join(lines), {"picture": picture, "scene": scene.name, "method": method, "compared": kind,
                                       **verdict._asdict(), "trusted": not doubt})
@@ -81,18 +83,3 @@ def _check(
 
 
 command = _check
-
-
-def _read(file: Path) -> "tuple[npt.NDArray[Any], str]":
-    """Return a picture's planes and what they are."""
-    import numpy as np
-
-    from refgi.errors import InputError
-    from refgi.image.exr import read_exr
-
-    channels = read_exr(file)[0]
-    for names, kind in ((INDIRECT, "indirect irradiance"), (RADIANCE, "radiance")):
-        if all(name in channels for name in names):
-            return np.stack([channels[name] for name in names]), kind
-    raise InputError(f"{file}: expected channels {', '.join(RADIANCE)} or {', '.join(INDIRECT)}, got "
-                     f"{', '.join(channels)}", file=str(file), key="channels")

@@ -155,8 +155,11 @@ def _is_there(path: Path) -> bool:
 
 
 def _spare(asked: Path, files: Iterable[Path], permission: Permission) -> None:
-    """Refuse to overwrite what refgi did not write."""
+    """Refuse to overwrite what refgi did not write, and pipes and the like, which stay what they are."""
     for file in files:
+        if file.exists() and not file.is_file():
+            raise InputError(f"--out {asked}: expected a new name or a file, got {file}, which is neither",
+                             file=str(file))
         if not permission.force and file.exists() and not is_from_refgi(file):
             raise InputError(f"--out {asked}: {file} is there and not from refgi; --force overwrites it",
                              file=str(file))

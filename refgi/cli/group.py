@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 import click
 
 from refgi import __version__
-from refgi.cli.room import require_room
+from refgi.cli.room import require_room, require_threads
 from refgi.cli.session import DONE, FAILED, INTERRUPTED, TERMINATED, USAGE, Fault, Session
 from refgi.errors import InputError, RefgiError, nearest
 
@@ -133,6 +133,7 @@ class VerbGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the verb, and the nearest one for the message where there is none of that name."""
         require_room(args[0])
+        require_threads()
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:

@@ -1,11 +1,10 @@
 """A picture that will not fit in memory is refused before it is begun."""
 
-import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from refgi.errors import InputError
+from refgi.memory import available_bytes
 from refgi.method import Extent
 from refgi.methods import find_method
 from refgi.scene import PointLight, Scene
@@ -57,18 +56,6 @@ def map_count(scene: Scene) -> int:
     return sum(6 if isinstance(light, PointLight) else 1 for light in scene.lights)
 
 
-def available_bytes() -> int | None:
-    """Return the memory that is free for use, of the machine or of the container, whichever is less.
-
-    Returns
-    -------
-    int or None
-        Bytes; None where it cannot be told.
-    """
-    found = [amount for amount in (_machine_bytes(), _container_bytes()) if amount is not None]
-    return min(found) if found else None
-
-
 def require_memory(scene: Scene, dtype: str, rsm_resolution: int, *, traced: bool = False, compared: int = 0,
                    settings: Mapping[str, Any] | None = None) -> None:
     """Refuse a picture of the camera's size that will not fit.
@@ -105,21 +92,3 @@ def require_memory(scene: Scene, dtype: str, rsm_resolution: int, *, traced: boo
         of = f", {added:,} of them for the settings of {most}" if added else ""
         raise InputError(f"size: {width}x{height} needs about {needed + added:,} bytes of memory{of}, {available:,} "
                          "are available")
-
-
-def _machine_bytes() -> int | None:
-    try:
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                return int(line.split()[1]) * 1024
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (OSError, ValueError, AttributeError):
-        return None
-
-
-def _container_bytes() -> int | None:
-    group = Path("/sys/fs/cgroup")
-    try:
-        return int((group / "memory.max").read_text()) - int((group / "memory.current").read_text())
-    except (OSError, ValueError):  # no container, or one without a limit ("max")
-        return None

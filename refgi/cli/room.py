@@ -1,16 +1,33 @@
-"""A limit of address space (`ulimit -v`) too small for the libraries is refused before they are loaded.
+"""What the libraries would fail at when they are loaded is refused before.
 
-Without room OpenBLAS asks for memory without end, and LLVM and Embree end the process with no word of refgi's.
+That is a limit of address space (`ulimit -v`) too small for them: without room OpenBLAS asks for memory without end,
+and LLVM and Embree end the process with no word of refgi's. And a number of threads that Numba cannot start.
 """
 
+import os
 import sys
 from pathlib import Path
 
-from refgi.errors import InputError
+from refgi.errors import InputError, expect
 
 COMPUTING = frozenset({"render", "sequence", "compare", "bench", "batch", "choose", "vectors", "explain", "warm"})
 LIBRARIES = 600 << 20  # bytes: with NumPy, SciPy, LLVM, Embree and a small picture 650 MiB in all, some of it loaded
 KERNELS = 64 << 20  # ... where the libraries are loaded; a small picture by sii takes 32 MiB
+
+THREADS, MOST_THREADS = "NUMBA_NUM_THREADS", 4096  # a million end the process
+
+
+def require_threads() -> None:
+    """Refuse a value of NUMBA_NUM_THREADS that Numba cannot read or start.
+
+    Raises
+    ------
+    InputError
+        If it is no whole number, or too small or large.
+    """
+    asked = os.environ.get(THREADS)
+    usable = asked is None or (asked.strip().isdecimal() and 1 <= int(asked[:20]) <= MOST_THREADS)
+    expect(usable, THREADS, f"a whole number from 1 to {MOST_THREADS}", asked)
 
 
 def require_room(verb: str) -> None:

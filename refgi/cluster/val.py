@@ -2,7 +2,6 @@
 
 from typing import TYPE_CHECKING, Any
 
-import numba
 import numpy.typing as npt
 
 from refgi.cluster.adaptive import MOST_TEXELS, count_for_error, group_lights
@@ -14,6 +13,7 @@ from refgi.cluster.lighting.glossy import clustered_radiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters, Clusters, Csm, ValSettings
+from refgi.jit import thread_count
 from refgi.lights.selection import choose_lights, footprints, light_areas
 from refgi.lights.settings import most_lights, with_clamp
 from refgi.method import Extent
@@ -251,7 +251,7 @@ def extra_bytes(settings: ValSettings, extent: Extent) -> int:
     depth = 2 * count * sides * texels * float_bytes  # twice: maps on which there is nothing are dropped by a copy
     filtered = 0
     if isinstance(settings.visibility, Csm):
-        at_once = min(count, numba.get_num_threads() + 1)  # one of them is read from
+        at_once = min(count, thread_count() + 1)  # one of them is read from
         filtered = at_once * texels * _filtered_bytes(settings.visibility, float_bytes)
     return depth + filtered + size[0] * size[1] * LISTED_FLOATS * float_bytes
 

@@ -8,9 +8,12 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from refgi.errors import shortened
+
 INK, LINE, CARD = "#010203", "#010204", "#010205"  # stand-ins, replaced by the page's own colours
 METHOD_COLOURS = [f"#0102{16 + i:02x}" for i in range(7)]
 MARKERS = "os^DvpX"
+LONGEST_NAME = 60  # characters in a legend
 MARK = "mark:"  # what stands before a name that a mark leads to, until the plot is whole
 MOST_MARKED = 64  # points of a curve that are marked; more would hide it
 
@@ -168,7 +171,7 @@ def _draw_curves(plot: Any, curves: Sequence[Curve], axes: Axes) -> None:
         points = [(x, y) for x, y in zip(curve.x, curve.y, strict=True) if _drawable(x, y, axes)]
         marked = {"marker": MARKERS[number % len(MARKERS)], "markersize": 5, "markerfacecolor": colour,
                   "linewidth": 1.6}
-        plot.plot([x for x, _ in points], [y for _, y in points], color=colour, label=curve.name,
+        plot.plot([x for x, _ in points], [y for _, y in points], color=colour, label=_shown(curve.name),
                   **(marked if len(points) <= MOST_MARKED or not curve.joined else {"linewidth": 1.1}),
                   linestyle=((0, (4, 3)) if curve.dashed else "-") if curve.joined else "none")
         _draw_bars(plot, curve, colour, axes)
@@ -185,7 +188,15 @@ def _draw_curves(plot: Any, curves: Sequence[Curve], axes: Axes) -> None:
         plot.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     else:
         plot.set_ylim(bottom=0)
-    plot.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, fontsize=9, facecolor=CARD)
+    legend = plot.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, fontsize=9, facecolor=CARD)
+    for text in legend.get_texts():
+        text.set_parse_math(False)  # a name is no formula
+
+
+def _shown(name: str) -> str:
+    """Return a name as legends take it: short, in print, and not with the underscore by which one is hidden."""
+    short = shortened(name, LONGEST_NAME)
+    return f"\u200b{short}" if short[:1] in ("", "_") else short
 
 
 def _draw_bars(plot: Any, curve: Curve, colour: str, axes: Axes) -> None:
@@ -207,7 +218,7 @@ def _draw_links(plot: Any, curve: Curve, axes: Axes) -> None:
 def _linked(svg: str, texts: Mapping[str, str]) -> str:
     """Return a plot whose marks lead to rows of the page's table, and by its script to pictures, each with its text."""
     def link(match: re.Match[str]) -> str:
-        name, text = match[1], html.escape(texts[match[1]])
+        name, text = match[1], html.escape(texts[html.unescape(match[1])])
         return f'<a href="#row-{name}" data-picture="{name}" aria-label="{text}"><title>{text}</title>'
 
     return re.sub(rf'<a xlink:href="{MARK}([^"]*)"[^>]*>', link, svg)

@@ -60,7 +60,8 @@ def environment() -> dict[str, Any]:
         With the keys versions, platform, cpu, simd and threads.
     """
     import llvmlite.binding
-    import numba
+
+    from refgi.jit import thread_count
 
     features = llvmlite.binding.get_host_cpu_features()
     return {
@@ -68,5 +69,5 @@ def environment() -> dict[str, Any]:
         "platform": f"{platform.system()} {platform.machine()}",
         "cpu": llvmlite.binding.get_host_cpu_name(),
         "simd": [name for name in SIMD if features.get(name)],
-        "threads": numba.get_num_threads(),
+        "threads": thread_count(),
     }

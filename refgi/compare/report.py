@@ -177,6 +177,24 @@ def machine(environment: Mapping[str, Any]) -> str:
     return f"{environment['platform']}, {environment['cpu']}, {environment['threads']} threads"
 
 
+def require_environment(environment: Mapping[str, Any]) -> None:
+    """Refuse what a result was made on where it is not all that a page needs.
+
+    Parameters
+    ----------
+    environment : mapping
+        Of a results.json.
+
+    Raises
+    ------
+    ValueError
+        If something is missing.
+    """
+    missing = [key for key in ("platform", "cpu", "threads", "versions") if key not in environment]
+    if missing or not isinstance(environment["versions"], dict) or "refgi" not in environment["versions"]:
+        raise ValueError(f"environment: expected {', '.join(missing) or 'versions, that of refgi among them'}")
+
+
 def ledger_cells(ledger: Any) -> list[tuple[str, ...]]:
     """Write a ledger as cells of a table.
 

@@ -13,18 +13,28 @@ import json
 import os
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import InputError, expect
 from refgi.image.whole import MARK, canonical_json, is_text, whole_file
+from refgi.memory import available_bytes
 
 Array = npt.NDArray[Any]
 Channels = dict[str, Array]
+
+
+class Part(NamedTuple):
+    """One picture of a file."""
+
+    name: str
+    header: dict[str, Any]
+    channels: Channels  # (h, w) of the data window
+
 
 LONGEST_COMPLAINT = 1000  # bytes
 _STDERR = threading.Lock()  # one process has one stderr
@@ -86,19 +96,79 @@ def read_exr(path: str | Path) -> tuple[Channels, dict[str, Any]]:
         If the file is missing, is not an EXR, was cut short or differs from what was written.
     """
     path = Path(path)
+    first = read_parts(path)[0]
+    return first.channels, verified(first, path)
+
+
+def read_parts(path: Path) -> list[Part]:
+    """Read all parts of an EXR, with their planes as the file has them.
+
+    Parameters
+    ----------
+    path : Path
+        Any program's.
+
+    Returns
+    -------
+    list of Part
+        One or more.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is not an EXR, was cut short, is deep, has channels without a value for each pixel, or
+        says that it holds more than memory does.
+    """
     expect(path.is_file(), "path", "a file", str(path))
     import OpenEXR
 
     try:
-        with _complaints() as complaints, OpenEXR.File(str(path), separate_channels=True) as file:
-            channels = {name: np.ascontiguousarray(channel.pixels) for name, channel in file.channels().items()}
-            text = file.header().get(MARK)
+        with _complaints() as complaints:
+            with OpenEXR.File(_source(path), header_only=True) as file:
+                headers = [part.header for part in file.parts]
+                for header in headers:
+                    _expect_flat(header, path)
+                _expect_room(headers, path)
+            with OpenEXR.File(_source(path), separate_channels=True) as file:
+                parts = [_part(part) for part in file.parts]
         if complaints:  # rows that cannot be decoded stay black, and nothing is raised
             raise ValueError(complaints[0])
+    except InputError:
+        raise
     except Exception as error:  # OpenEXR raises RuntimeError, but also IndexError or TypeError on damaged headers
         raise InputError(f"{path}: not a readable EXR: {error}") from error
-    expect(bool(channels), str(path), "an EXR with whole pixel data", "none: cut short or damaged")
-    return channels, _verified(text, channels, path)
+    expect(all(part.channels for part in parts) and bool(parts), str(path), "an EXR with whole pixel data",
+           "none: cut short or damaged")
+    return parts
+
+
+def _source(path: Path) -> str | BinaryIO:
+    """Return what OpenEXR opens: a name in UTF-8, else the content."""
+    return str(path) if is_text(str(path)) else io.BytesIO(path.read_bytes())
+
+
+def _part(part: Any) -> Part:
+    channels = {name: np.ascontiguousarray(channel.pixels) for name, channel in part.channels.items()}
+    return Part(str(part.header.get("name", "")), dict(part.header), channels)
+
+
+def _expect_flat(header: Mapping[str, Any], path: Path) -> None:
+    """Refuse what OpenEXR for Python cannot give as one value a pixel and channel."""
+    kind = str(header.get("type", "")).rpartition(".")[2]
+    expect(not kind.startswith("deep"), f"{path}: type", "an image of one value a pixel, not deep", kind)
+    sparse = [channel.name for channel in header["channels"] if (channel.xSampling, channel.ySampling) != (1, 1)]
+    expect(not sparse, f"{path}: channels", "a value for each pixel, not every other", sparse)
+
+
+def _expect_room(headers: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Refuse a file whose headers say that its pixels, held twice for a moment, do not fit in memory."""
+    needed = 0
+    for header in headers:
+        (left, top), (right, bottom) = (map(int, corner) for corner in header["dataWindow"])
+        needed += 2 * 4 * len(header["channels"]) * (right - left + 1) * (bottom - top + 1)
+    available = available_bytes()
+    if available is not None and needed > available:
+        raise InputError(f"{path}: its pixels need about {needed:,} bytes of memory, {available:,} are available")
 
 
 @contextlib.contextmanager
@@ -146,7 +216,9 @@ def _signed(attributes: Mapping[str, Any], planes: Channels) -> str:
     return canonical_json({**attributes, DIGEST: _digest(attributes, planes)})
 
 
-def _verified(text: Any, channels: Channels, path: Path) -> dict[str, Any]:
+def verified(part: Part, path: Path) -> dict[str, Any]:
+    """Return the attributes of a picture, empty where it is another program's; `InputError` where it was changed."""
+    text, channels = part.header.get(MARK), part.channels
     if text is None:
         return {}
     try:

@@ -224,7 +224,7 @@ def is_from_refgi(path: str | Path) -> bool:
     has_mark = {".exr": _exr, ".png": _png, ".json": _json, ".html": _page, ".csv": _table,
                 ".md": _table, ".truth": _truth}.get(path.suffix.lower())
     try:
-        return has_mark is not None and has_mark(path)
+        return has_mark is not None and path.is_file() and has_mark(path)
     except Exception:  # a damaged header makes OpenEXR raise nearly anything
         return False
 

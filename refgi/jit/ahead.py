@@ -1,8 +1,7 @@
 """Compile kernels ahead, in as many processes as there are cores.
 
 `signatures.txt` lists which specialisations the methods need at their defaults: a line holds a kernel, its argument
-types and what needs them. Types are written as expressions: `float32[:, ::1]`, `(int64, none)`,
-`named('package.module.Class', float32, ...)` for a named tuple, `omitted(1.0)` for a default value.
+types as `refgi.jit.typetext` writes them, and what needs them.
 """
 
 import importlib
@@ -14,10 +13,9 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from numba import types
+from refgi.jit.typetext import types_of
 
 LIST = Path(__file__).with_name("signatures.txt")
-LAYOUTS = {"C": (":", "::1"), "F": ("::1", ":"), "A": (":", ":")}  # first and last axis as Numba writes them
 
 Progress = Callable[[str, float], None]
 
@@ -35,7 +33,7 @@ class Specialisation(NamedTuple):
     def find(self) -> tuple[Any, tuple[Any, ...]]:
         """Return the kernel and the argument types."""
         module, _, name = self.kernel.rpartition(".")
-        return getattr(importlib.import_module(module), name), types_of(self.arguments)
+        return getattr(importlib.import_module(module), name), types_of(self.arguments, importlib.import_module)
 
 
 def read_list(path: Path = LIST) -> list[Specialisation]:
@@ -80,7 +78,7 @@ def _is_kept(one: Specialisation) -> bool:
     try:
         kernel, arguments = one.find()
         kept: bool = kernel._cache.path(arguments).exists()
-    except (ImportError, AttributeError, TypeError, NameError):
+    except (ImportError, AttributeError, TypeError, ValueError):
         return True
     return kept
 
@@ -126,68 +124,3 @@ def cores() -> int:
         1 or more.
     """
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def text_of(kind: Any) -> str:
-    """Write an argument type as an expression.
-
-    Parameters
-    ----------
-    kind : numba type
-        The type.
-
-    Returns
-    -------
-    str
-        What `types_of` reads.
-
-    Raises
-    ------
-    TypeError
-        If there is no expression for it.
-    """
-    if isinstance(kind, types.Array):
-        first, last = LAYOUTS[kind.layout]
-        axes = [last] if kind.ndim == 1 else [first, *[":"] * (kind.ndim - 2), last]
-        plain = f"{text_of(kind.dtype)}[{', '.join(axes)}]"
-        return plain if kind.mutable else f"readonly({plain})"
-    if isinstance(kind, types.BaseTuple):
-        items: Any = kind
-        parts = [text_of(item) for item in items]
-        if (named := getattr(kind, "instance_class", None)) is not None:
-            return f"named({', '.join([repr(f'{named.__module__}.{named.__qualname__}'), *parts])})"
-        return f"({', '.join(parts)},)"
-    if isinstance(kind, types.Omitted):
-        return f"omitted({kind.value!r})"
-    if isinstance(kind, types.Number | types.Boolean | types.NoneType):
-        return "boolean" if kind == types.boolean else str(kind)
-    raise TypeError(f"{kind}: no expression for this type")
-
-
-def types_of(text: str) -> tuple[Any, ...]:
-    """Read argument types.
-
-    Parameters
-    ----------
-    text : str
-        Expressions of types with commas between them.
-
-    Returns
-    -------
-    tuple of numba types
-        The types.
-    """
-    known = {name: getattr(types, name) for name in dir(types)} | {
-        "named": _named, "omitted": types.Omitted, "readonly": lambda kind: kind.copy(readonly=True)}
-    return tuple(map(_with_tuples, eval(f"({text},)" if text else "()", {"__builtins__": {}}, known)))
-
-
-def _named(name: str, *kinds: Any) -> Any:
-    module, _, qualname = name.rpartition(".")
-    fields = tuple(map(_with_tuples, kinds))
-    owner = getattr(importlib.import_module(module), qualname)
-    return types.BaseTuple.from_types(fields, owner)
-
-
-def _with_tuples(kind: Any) -> Any:
-    return types.BaseTuple.from_types(tuple(map(_with_tuples, kind))) if isinstance(kind, tuple) else kind

@@ -19,18 +19,15 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils as untyped_cgutils
 from numba.extending import intrinsic
-from numba.np.ufunc import parallel as untyped_parallel
 
 from refgi.jit.dispatch import Kernel
+from refgi.jit.launcher import BYTES, INT, emit_launch, start_threads, thread_count
 
 cgutils: Any = untyped_cgutils
-threading: Any = untyped_parallel
 
 BANDS_PER_THREAD = 4  # so that a thread with cheap iterations takes over some of one with dear ones
 FIRST, LAST, LAUNCH, BAND, COUNTED = "first_", "last_", "launch_", "band_", "count_"  # names in the functions made
 
-BYTES = ir.IntType(8).as_pointer()
-INT = ir.IntType(64)
 NEXT, COUNT, SIZE, FAILED, FIRST_ARGUMENT = range(5)  # fields of the record that threads share
 
 
@@ -43,7 +40,7 @@ def threads(count: int | None) -> Iterator[None]:
     count : int or None
         Threads, 1 to the number Numba started with.
     """
-    before = numba.get_num_threads()
+    before = thread_count()
     try:
         if count is not None:
             numba.set_num_threads(count)
@@ -140,7 +137,7 @@ def _launch(_: Any, function: Any, count: Any, arguments: Any) -> Any:
         for i, value in enumerate(fields):
             builder.store(value, cgutils.gep_inbounds(builder, shared, 0, i))
         worker = _worker(context, builder, record, result.fndesc)
-        _start(builder, worker, shared, builder.icmp_signed("<", size, wanted), workers)
+        emit_launch(builder, worker, builder.bitcast(shared, BYTES), builder.icmp_signed("<", size, wanted), workers)
         failed = builder.load(cgutils.gep_inbounds(builder, shared, 0, FAILED))
         with builder.if_then(builder.icmp_signed("!=", failed, INT(0)), likely=False):
             context.call_conv.return_user_exc(builder, MemoryError, ("a kernel failed in one of its bands",))
@@ -150,11 +147,6 @@ def _launch(_: Any, function: Any, count: Any, arguments: Any) -> Any:
 
 
 launch: Any = intrinsic(_launch)
-
-
-def start_threads() -> None:
-    """Start Numba's threads and make their functions known to LLVM."""
-    threading._launch_threads()
 
 
 def _size_of_bands(builder: Any, count: Any, workers: Any) -> Any:
@@ -195,20 +187,3 @@ def _worker(context: Any, builder: Any, record: Any, called: Any) -> Any:
     inner.position_at_end(done)
     inner.ret_void()
     return function
-
-
-def _start(builder: Any, worker: Any, shared: Any, several: Any, workers: Any) -> None:
-    """Emit the call of a worker by this thread, or by all where there are several bands."""
-    data = builder.bitcast(shared, BYTES)
-    with builder.if_else(builder.and_(several, builder.icmp_signed(">", workers, INT(1)))) as (on_all, alone):
-        with on_all:
-            bases, steps, counts = (cgutils.alloca_once(builder, type_) for type_ in (BYTES, INT, INT))
-            builder.store(BYTES(None), bases)
-            builder.store(INT(1), steps)
-            builder.store(workers, counts)
-            kind = ir.FunctionType(ir.VoidType(), [BYTES] * 5 + [INT] * 3)
-            parallel_for = cgutils.get_or_insert_function(builder.module, kind, "numba_parallel_for")
-            pointers = [builder.bitcast(pointer, BYTES) for pointer in (worker, bases, counts, steps)]
-            builder.call(parallel_for, [*pointers, data, INT(0), INT(1), workers])
-        with alone:
-            builder.call(worker, [BYTES.as_pointer()(None), INT.as_pointer()(None), INT.as_pointer()(None), data])

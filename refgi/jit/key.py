@@ -21,7 +21,7 @@ import numba
 import numpy as np
 
 LIBRARIES = sys.stdlib_module_names | {"llvmlite", "numba", "numpy"}  # known by their versions
-COMPILERS = ("dispatch.py", "bands.py")  # of this package
+COMPILERS = ("dispatch.py", "bands.py", "launcher.py")  # of this package
 # of the environment, where it is set: what Numba compiles for and how
 TARGET = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE", "NUMBA_OPT",
           "NUMBA_SLP_VECTORIZE")

@@ -11,6 +11,7 @@ from refgi.image import read_exr
 from refgi.methods import find_method
 from refgi.provenance.content import camera_from, geometry_digest, light_from, materials_digest
 from refgi.provenance.record import VERSION, Record, program, versions
+from refgi.provenance.schema import require_sound
 from refgi.scene import Scene, builtin_scenes, load_scene
 from refgi.scene.files import is_there
 from refgi.settings import Settings, flat, of_record
@@ -59,7 +60,8 @@ def read_record(path: Path) -> Record:
     Raises
     ------
     InputError
-        If the file is missing, damaged, not from refgi, or holds no record of a picture.
+        If the file is missing, damaged, not from refgi, or holds no record of a picture, or one with a key that this
+        version does not know.
     """
     with blame(file=str(path)):
         record = read_exr(path)[1]
@@ -68,6 +70,7 @@ def read_record(path: Path) -> Record:
                "an EXR of refgi without one")
         expect(record["provenance"] == VERSION, f"{path}: provenance", f"version {VERSION} of the record",
                record["provenance"])
+        require_sound(record, path)
     return record
 
 
@@ -96,16 +99,23 @@ def job_of(record: Mapping[str, Any], path: Path, scene: str | None = None) -> J
     Warns
     -----
     RefgiWarning
-        If the picture was made by another version.
+        If the picture was made by another version, or with a file that its record names and that is left alone.
     """
     with blame(file=str(path)):
         _warn_of_other_versions(record, path)
+        if (checkpoint := record["settings"].get("checkpoint")) is not None:
+            warnings.warn(RefgiWarning(f"{path}: checkpoint {checkpoint!r}: neither read nor written; only --out is"),
+                          stacklevel=2)
         try:
-            wanted = find_method(record["method"]).settings
-            return Job(_same_scene(record["scene"], path, scene), record["method"],
-                       _settings(wanted, record["settings"], path), dict(record["options"]), record["exposure"],
-                       record.get("estimate", {}).get("passes"), _frame(record, path), _still(record, path))
-        except (KeyError, TypeError, AttributeError) as error:
+            settings = _settings(find_method(record["method"]).settings, record["settings"], path)
+            passes = record.get("estimate", {}).get("passes")
+            if passes is None and getattr(settings, "checkpoint", None) is not None:
+                settings = dataclasses.replace(settings, checkpoint=None)  # a stranger's file may name any of ours
+            return Job(_same_scene(record["scene"], path, scene), record["method"], settings, dict(record["options"]),
+                       record["exposure"], passes, _frame(record, path), _still(record, path))
+        except InputError:
+            raise
+        except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
             raise InputError(f"{path}: expected a whole record, got one without {error}") from error
 
 

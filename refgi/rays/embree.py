@@ -18,10 +18,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from refgi.jit import thread_count
 from refgi.rays.cutouts import Filter, RayHoles, mark_holes
 from refgi.rays.offsets import STEPS
 from refgi.rays.traversal import Calls, closest_hits, occlusions
@@ -182,7 +182,7 @@ class RunBackend:
     @staticmethod
     def _share(fill: Callable[[slice], None], count: int) -> None:
         pieces = [slice(i, min(i + _RUN_CHUNK, count)) for i in range(0, count, _RUN_CHUNK)]
-        with ThreadPoolExecutor(numba.get_num_threads()) as pool:
+        with ThreadPoolExecutor(thread_count()) as pool:
             list(pool.map(fill, pieces))
 
 

@@ -21,6 +21,7 @@ from refgi.scene.model import Array, Material, Mesh
 from refgi.scene.mtl import Maps, read_library
 from refgi.scene.polygons import triangles_of
 from refgi.scene.strictness import is_strict
+from refgi.scene.texture.image import expect_all_fit
 from refgi.scene.vertexcolours import WHITE, factors
 
 NOT_POLYGONS = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "free-form surfaces"}
@@ -197,6 +198,9 @@ class _Reader:
         first = np.searchsorted(vertex, np.arange(len(starts) + 1) * len(key)).tolist()
         ends = np.append(starts[1:], len(kind)).tolist()
         colours = self._colours()
+        shown = {names[number] for number in corners.material[starts[textured[starts] & placed[starts]]]}
+        expect_all_fit((found.path for name in shown for found in self.maps[name][:2] if found),
+                       f"{self.path}: textures")
         for k, (start, end) in enumerate(zip(starts.tolist(), ends, strict=True)):
             part, faces = slice(first[k], first[k + 1]), slice(start, end)
             name = names[corners.material[start]]

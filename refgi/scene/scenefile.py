@@ -19,7 +19,7 @@ from refgi.scene.obj import read_obj
 from refgi.scene.ply import read_ply
 from refgi.scene.reading import wants_lamps
 from refgi.scene.repair import lights_with_power, repaired_all, warn_of_flat_faces, warn_of_unit
-from refgi.scene.texture.image import image_file
+from refgi.scene.texture.image import expect_all_fit, image_file
 from refgi.scene.texture.texture import Texture
 from refgi.scene.transform import transformed_all
 from refgi.stages import skip
@@ -60,6 +60,7 @@ def _materials(entry: "SceneFile", path: Path) -> dict[str, Material]:
     """Return the named materials with their images, or raise one error with all that cannot be read."""
     faults: list[str] = []
     materials: dict[str, Material] = {}
+    expect_all_fit((path.parent / one for one in map(_image_of, entry.materials.values()) if one), f"{path}: materials")
     for name, material in entry.materials.items():
         try:
             materials[name] = _built(material, name, path.parent)
@@ -67,6 +68,11 @@ def _materials(entry: "SceneFile", path: Path) -> dict[str, Material]:
             faults.append(f"{path}: materials.{shortened(name)}.diffuse.texture: {error}")
     _raise_if_any(faults)
     return materials
+
+
+def _image_of(entry: "MaterialEntry") -> str | None:
+    """Return the file of a material's image, None where it has none."""
+    return getattr(getattr(entry, "diffuse", None), "texture", None)
 
 
 def _built(entry: "MaterialEntry", name: str, folder: Path) -> Material:

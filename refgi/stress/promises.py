@@ -61,7 +61,7 @@ class Asked(NamedTuple):
     source: str = ""
 
 
-def asked(method: str, change: Change, scene: Scene) -> Asked:
+def asked(method: str, change: Change, scene: Scene, size: tuple[int, int] | None = None) -> Asked:
     """Return how a method is asked for a change.
 
     Parameters
@@ -72,6 +72,8 @@ def asked(method: str, change: Change, scene: Scene) -> Asked:
         The change.
     scene : Scene
         The scene as it is: some lamps' maps do not turn with it.
+    size : (int, int), optional
+        Width and height of the picture, pixels; absent: one that any promise holds for.
 
     Returns
     -------
@@ -87,6 +89,8 @@ def asked(method: str, change: Change, scene: Scene) -> Asked:
         raise NotPromisedError(SILENT[method, change.name])
     if method not in WITHOUT_MAPS and (why := _other_maps(change.name, scene)):
         raise NotPromisedError(why)
+    if (method, change.name) == ("hssil", "mirrored") and size is not None:
+        _require_whole_texels(*size)
     few = FEW.get(method, ())
     if method == "hssil" and change.name == "flux x 2^-60":
         return Asked("rounding", few, limit=LEAST, kind="derived", source=SUBNORMAL)
@@ -103,6 +107,17 @@ def asked(method: str, change: Change, scene: Scene) -> Asked:
     if change.name in DRAWN_ANEW or (method, change.name) == ("multires", "turned"):
         return rounded._replace(settings=EVERY.get(method, few), options=SMALL_MAP)
     return rounded
+
+
+def _require_whole_texels(width: int, height: int) -> None:
+    """Refuse a width that texels of the coarsest level do not divide: counted from the left, they are not mirrored."""
+    from refgi.sssil.pyramid.levels import useful_levels
+    from refgi.sssil.settings import HssilSettings
+
+    sampling = HssilSettings().sampling
+    texel = 2 ** (sampling.first_level + useful_levels((height, width), sampling) - 1)
+    if width % texel:
+        raise NotPromisedError(f"a width of {width} pixels is no multiple of the {texel} of its coarsest texels")
 
 
 def _other_maps(change: str, scene: Scene) -> str:

@@ -120,7 +120,8 @@ class _Method:
     def after(self, change: Change, changed: Changed, *, whole: bool) -> Iterator[Found]:
         """Yield the row of one change, and that of the surfaces it shows with the first method."""
         try:
-            how = asked(self._method, change, self._scene)
+            size = self._size["width"], self._size["height"]
+            how = asked(self._method, change, self._scene, size)
             if math.isinf(how.limit) and not self._unknown:
                 raise NotPromisedError("no limit was observed yet")
         except NotPromisedError as why:

@@ -2,13 +2,14 @@
 
 import hashlib
 import io
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from refgi.errors import InputError
+from refgi.errors import InputError, shortened
 from refgi.vectors.bugfile import FILE as BUGS
 from refgi.vectors.bugfile import Bugs
 from refgi.vectors.manifest import KIT, CaseManifest, KitManifest, read_model
@@ -71,28 +72,37 @@ class Kit:
         """Yield the manifests of the cases asked for."""
         for entry in self.manifest.cases:
             if not asked.cases or entry.id.startswith(asked.cases):
-                file = self.folder / entry.manifest
+                file = inside(self.folder, entry.manifest)
                 self._bytes(file, entry.sha256)
                 try:
-                    yield read_model(CaseManifest, file)
+                    manifest = read_model(CaseManifest, file)
                 except InputError as error:
                     raise DamagedError(str(error), file=str(file)) from error
+                for name in (manifest.id, *manifest.arrays):  # by these names a port's files are looked for
+                    if not _is_name(name):
+                        raise DamagedError(f"{file}: expected names of files, got {shortened(repr(name))}",
+                                           file=str(file))
+                unknown = {name for step in manifest.stages for name in step.writes} - set(manifest.arrays)
+                if unknown:
+                    raise DamagedError(f"{file}: expected an entry for each array that a stage writes, got none of "
+                                       f"{shortened(', '.join(sorted(unknown)))}", file=str(file))
+                yield manifest
 
     def array(self, case: CaseManifest, name: str) -> Array:
         """Return an expected array, checked by its hash."""
         entry = case.arrays[name]
-        file = self.folder / "cases" / case.id / entry.file
+        file = inside(self.folder, "cases", case.id, entry.file)
         self._bytes(file, entry.sha256)
         return read_array(file)
 
     def extra(self, case: CaseManifest, file: str) -> Array:
         """Return an array that is no case's own: a bound, a mask."""
-        return read_array(self.folder / "cases" / case.id / file)
+        return read_array(inside(self.folder, "cases", case.id, file))
 
     def bugs(self, case: CaseManifest) -> Bugs:
         """Return the likely bugs of a case, checked by their hash and read once."""
         if case.id not in self._bugs:
-            file = self.folder / "cases" / case.id / BUGS
+            file = inside(self.folder, "cases", case.id, BUGS)
             try:
                 self._bugs[case.id] = Bugs(self._bytes(file, case.bugs_sha256))
             except ValueError as error:
@@ -110,6 +120,28 @@ class Kit:
         return content
 
 
+def inside(folder: Path, *names: str) -> Path:
+    """Return a file of a kit.
+
+    Raises
+    ------
+    DamagedError
+        If its name, or a link on the way, leads out of the kit.
+    """
+    file = folder.joinpath(*names)
+    try:
+        if file.resolve().is_relative_to(folder.resolve()):
+            return file
+    except (OSError, RuntimeError, ValueError) as error:  # a name with a null, or links in a circle
+        raise DamagedError(f"{shortened(repr(str(file)))}: cannot be read: {error}", file=str(folder)) from error
+    raise DamagedError(f"{folder}: expected files inside the kit, got {shortened(repr('/'.join(names)))}",
+                       file=str(folder))
+
+
+def _is_name(name: str) -> bool:
+    return name not in ("", ".", "..") and not set(name) & set("/\\\0:")
+
+
 def read_array(file: Path) -> Array:
     """Return an .npy file's array.
 
@@ -120,17 +152,32 @@ def read_array(file: Path) -> Array:
     """
     try:
         content = io.BytesIO(file.read_bytes())
-        whole = content.getbuffer().nbytes
-        has_header = content.read(len(MAGIC)) == MAGIC
+        if content.read(len(MAGIC)) != MAGIC:
+            raise DamagedError(f"{file}: expected an .npy file, got one without its header", file=str(file))
         content.seek(0)
-        array: Array = np.lib.format.read_array(content, allow_pickle=False) if has_header else np.zeros(0)
-    except (OSError, ValueError, EOFError) as error:
+        expected, got = _bytes_said(content), content.getbuffer().nbytes - content.tell()
+        if got != expected:
+            raise DamagedError(f"{file}: expected the {expected:,} bytes that its header says, got {got:,}",
+                               file=str(file))
+        content.seek(0)
+        array: Array = np.lib.format.read_array(content, allow_pickle=False)
+    except DamagedError:
+        raise
+    except Exception as error:  # a header is an expression of Python, and raises nearly any
         raise DamagedError(f"{file}: cannot be read as .npy: {_reason(error)}", file=str(file)) from error
-    if not has_header:
-        raise DamagedError(f"{file}: expected an .npy file, got one without its header", file=str(file))
-    if content.tell() < whole:
-        raise DamagedError(f"{file}: {whole - content.tell()} bytes more than its header says", file=str(file))
     return array
+
+
+def _bytes_said(content: io.BytesIO) -> int:
+    """Return how many bytes of elements the header says that there are, and go past it."""
+    version = np.lib.format.read_magic(content)
+    if version not in ((1, 0), (2, 0), (3, 0)):
+        raise ValueError(f"version {version[0]}.{version[1]}")
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, kind = read(content)
+    if kind.hasobject or min(shape, default=0) < 0:
+        raise ValueError(f"elements of {kind} in a shape {shape}")
+    return math.prod(shape) * kind.itemsize
 
 
 def find_array(output: Path, case: str, name: str) -> Path | None:

@@ -240,9 +240,65 @@ def test_another_version_is_warned_of_and_a_setting_it_does_not_know_refused(tmp
     rewritten(file, settings=record["settings"] | {"lights": "many"})
     assert refused(run("--again", file), "SiiSettings")
     rewritten(file, settings=record["settings"], options={})
-    assert run("--again", file).exit_code in (1, 2)
+    assert refused(run("--again", file), "options.dtype: Field required", "options.rsm_resolution: Field required")
     rewritten(file, scene={})
-    assert refused(run("--again", file), "a whole record")
+    assert refused(run("--again", file), "scene.camera: Field required")
+
+
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"sparkle": 1}, "sparkle: Extra inputs are not permitted"),
+    ({"provenance": "2"}, "expected version 2 of the record, got '2'"),
+    ({"provenance": 1}, "expected version 2 of the record, got 1"),
+    ({"exposure": "bright"}, "exposure: Input should be a valid number"),
+    ({"exposure": -1}, "exposure: Input should be greater than 0"),
+    ({"method": ["sii"]}, "method: Input should be a valid string"),
+    ({"method": "magic"}, "magic"),
+    ({"versions": []}, "versions: Input should be a valid dictionary"),
+    ({"refgi": {}}, "refgi.version: Field required"),
+    ({"frames": 0}, "frames: Input should be greater than or equal to 1"),
+    ({"frames": 2, "temporal": None}, "a whole record"),
+    ({"estimate": {"passes": 1e30}}, "estimate.passes"),
+    ({"options": {"dtype": "int8", "rsm_resolution": 16}}, "options.dtype"),
+    ({"options": {"dtype": "float32", "rsm_resolution": 16, "speed": 1}}, "options.speed"),
+])
+def test_a_record_of_other_keys_or_kinds_is_an_input_error(tmp_path, changes, words):
+    file = tmp_path / "a.exr"
+    run("cornell_box", *TINY, *SII, "--out", file)
+    rewritten(file, **changes)
+    assert refused(run("--again", file), words)
+
+
+@pytest.mark.parametrize("changes", [
+    {"options": {"dtype": "float32", "rsm_resolution": 65536}}, {"scene": {"width": 65536, "height": 65536}},
+    {"scene": {"source": "cornell_sphere:faces=100000000000"}}])
+def test_sizes_of_a_record_are_judged_before_they_are_made(tmp_path, changes):
+    file = tmp_path / "a.exr"
+    run("cornell_box", *TINY, *SII, "--out", file)
+    record = read_exr(file)[1]
+    for key, value in changes.items():
+        camera = record["scene"]["camera"] | {name: value[name] for name in ("width", "height") if name in value}
+        rest = {name: value[name] for name in ("source",) if name in value}
+        changes = {key: record["scene"] | {"camera": camera} | rest} if key == "scene" else {key: value}
+    rewritten(file, **changes)
+    result = run("--again", file)
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) == 1, result.stderr
+    assert "needs about" in result.stderr or "faces" in result.stderr
+
+
+@pytest.mark.parametrize("bounded", [True, False])
+def test_a_stranger_s_record_writes_to_out_alone(tmp_path, bounded):
+    file, ours = tmp_path / "a.exr", tmp_path / "ours" / "notes.truth"
+    ours.parent.mkdir()
+    run("cornell_box", *TINY, "--method", "truth", "--set", "light_grid=8", "--set", "samples=48", "--out", file)
+    record = read_exr(file)[1]
+    estimate = record["estimate"] if bounded else {key: value for key, value in record["estimate"].items()
+                                                   if key != "passes"}
+    rewritten(file, settings=record["settings"] | {"checkpoint": str(ours)}, estimate=estimate)
+    result = run("--again", file, "--out", tmp_path / "b.exr")
+    assert result.exit_code == 0, result.output
+    assert f"checkpoint '{ours}': neither read nor written" in result.stderr
+    assert list(ours.parent.iterdir()) == []
 
 
 def test_pixels_that_are_not_the_same_are_told_and_fail(tmp_path):

@@ -218,7 +218,7 @@ def test_files_of_others_are_spared(tmp_path, plan, did):
 
 
 def test_more_processes_than_there_is_memory_for(tmp_path, plan, monkeypatch):
-    monkeypatch.setattr("refgi.cli.memory.available_bytes", lambda: 1000)
+    monkeypatch.setattr("refgi.memory.available_bytes", lambda: 1000)
     done = run(plan, "--out", tmp_path / "out", "--workers", "3")
     assert done.exit_code == 2
     assert "--workers" in done.stderr

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from numba import types
 
-from refgi.jit.ahead import LIST, read_list, text_of, types_of
+from refgi.jit.ahead import LIST, read_list
+from refgi.jit.typetext import text_of, types_of
 from refgi.methods import BUILT_IN
 
 ROOT = Path(__file__).parents[2]

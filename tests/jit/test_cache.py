@@ -1,7 +1,10 @@
 """Property tests of the kernel cache: it follows what a kernel reaches, and mends what is damaged."""
 
+import hashlib
 import os
+import pickle
 import shutil
+import stat
 import subprocess
 import sys
 import textwrap
@@ -34,11 +37,15 @@ def write_inner(folder: Path, expression: str) -> None:
         f"from refgi.jit import kernel\n\n@kernel\ndef inner(x):\n    return {expression}\n")
 
 
-def run(folder: Path) -> str:
+def run(folder: Path, said: str = "") -> str:
+    """Return what a new process computes and how many kernels it found; it says one line of `said`, or nothing."""
     call = CALL.replace("o.outer.stats.cache_hits.total()", "sum(o.outer.stats.cache_hits.values())")
     environment = os.environ | {"REFGI_CACHE_DIR": str(folder.parent / "cache"), "PYTHONPATH": str(folder.parent)}
     done = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+    warned = [line for line in done.stderr.splitlines() if "Warning" in line]
+    assert len(warned) == bool(said), done.stderr
+    assert said in done.stderr
     return done.stdout.strip()
 
 
@@ -100,3 +107,137 @@ def test_kernels_run_as_plain_python(package):
     call = "import package_a.outer as o; print(o.outer(1.5))"
     done = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "5.0", done.stderr
+
+
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+def plant(file: Path, content: bytes) -> None:
+    """Put a file under a kernel's name, with the digest that anyone can compute."""
+    file.write_bytes(content + hashlib.sha256(content).digest())
+
+
+class Payload:
+    def __init__(self, mark: Path) -> None:
+        self.mark = mark
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.mark),)
+
+
+@pytest.mark.parametrize("form", ["pickle", "class", "module", "constant"])
+def test_no_word_of_a_planted_file_is_run(package, tmp_path, form):
+    run(package)
+    file, = (tmp_path / "cache").glob("outer.*.kernel")
+    mark, trap = tmp_path / "ran", tmp_path / "trap_of_cache.py"
+    trap.write_text(f"import os\nos.mkdir({str(mark)!r})\nclass Pair(tuple): _fields = ()\n")
+    head, _, rest = file.read_bytes()[:-32].partition(b"\n")[2].partition(b"\n")
+    planted = {
+        "pickle": pickle.dumps(Payload(mark)),
+        "class": head.replace(b'"returns": "float64"', b'"returns": "named(\'trap_of_cache.Pair\',)"'),
+        "module": head.replace(b'"package_a.outer"', b'"trap_of_cache"'),
+        "constant": head.replace(b"[]]", b'["trap_of_cache"]]')}[form]
+    assert planted != head
+    plant(file, planted if form == "pickle" else b"refgi kernel 2\n" + planted + b"\n" + rest)
+    assert run(package) == "5.0 0"
+    assert not mark.exists()
+    assert run(package) == "5.0 1"
+
+
+def test_the_folder_is_made_for_its_owner_alone(package):
+    run(package)
+    assert mode(package.parent / "cache") == 0o700
+    assert {mode(file) for file in (package.parent / "cache").iterdir()} == {0o600}
+
+
+@pytest.mark.parametrize("bits", [0o770, 0o707, 0o720, 0o702, 0o1777])
+def test_a_folder_that_others_can_write_is_refused(package, bits):
+    run(package)
+    folder = package.parent / "cache"
+    folder.chmod(bits)
+    before = {file: file.read_bytes() for file in folder.iterdir()}
+    assert run(package, "cache: compiled kernels cannot be kept (other users can write to it)") == "5.0 0"
+    assert {file: file.read_bytes() for file in folder.iterdir()} == before
+    folder.chmod(0o755)  # readable by all: what nobody else can have written is used
+    assert run(package) == "5.0 1"
+
+
+def test_a_kernel_that_others_can_write_is_not_run(package):
+    run(package)
+    file, = (package.parent / "cache").iterdir()
+    file.chmod(0o620)
+    assert run(package, "other users can write to it: this compiled kernel is not run") == "5.0 0"
+    assert mode(file) == 0o600
+    assert run(package) == "5.0 1"
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away")
+@pytest.mark.parametrize("what", ["file", "folder"])
+def test_what_another_user_owns_is_not_run(package, what):
+    run(package)
+    folder = package.parent / "cache"
+    file, = folder.iterdir()
+    os.chown(folder if what == "folder" else file, 65534, 65534)
+    said = f"{(folder if what == 'folder' else file).name}: "
+    said += "compiled kernels cannot be kept (it belongs" if what == "folder" else "it belongs to another user"
+    assert run(package, said) == "5.0 0"
+    assert file.stat().st_uid == 0  # made anew, or left alone
+    assert run(package, said if what == "folder" else "") == ("5.0 0" if what == "folder" else "5.0 1")
+
+
+def test_processes_that_compile_ahead_share_the_folder_that_takes_the_place(package):
+    (package.parent / "cache").mkdir(mode=0o777)
+    (package.parent / "cache").chmod(0o777)
+    code = ("import os, warnings\nwarnings.simplefilter('ignore')\n"
+            "from refgi.jit.ahead import *\n"
+            "few = read_list()[-2:]\n"
+            "if __name__ == '__main__':\n"
+            "    missing(few)\n"
+            "    warnings.simplefilter('error')\n"
+            "    compile_ahead(few, processes=1)\n"
+            "    print(len(missing(few)))\n")
+    environment = os.environ | {"REFGI_CACHE_DIR": str(package.parent / "cache")}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert (done.stdout.strip(), done.stderr) == ("0", "")
+
+
+RESULTS = """\
+    from typing import NamedTuple
+    import numpy as np
+    from refgi.jit import kernel
+
+    class Pair(NamedTuple):
+        sums: np.ndarray
+        count: int
+
+    @kernel
+    def pair(a):
+        return Pair(a + a, len(a))
+
+    @kernel
+    def mixed(a):
+        return a.sum(), (len(a), a > 1), a[:, None]
+
+    @kernel
+    def text(a):
+        return str(len(a))
+    """
+
+
+def test_every_kind_of_result_comes_back_from_the_disk(package):
+    (package / "results.py").write_text(textwrap.dedent(RESULTS))
+    code = ("import numpy as np, package_a.results as r\n"
+            "a = np.arange(3, dtype=np.float32)\n"
+            "p, (total, (count, larger), column) = r.pair(a), r.mixed(a)\n"
+            "print(type(p) is r.Pair, p.sums, p.sums.dtype, p.count, total, count, larger, column.shape, r.text(a),\n"
+            "      [sum(one.stats.cache_hits.values()) for one in (r.pair, r.mixed, r.text)])\n")
+    environment = os.environ | {"REFGI_CACHE_DIR": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
+
+    def said(hits):
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == f"True [0. 2. 4.] float32 3 3.0 3 [False False  True] (3, 1) 3 {hits}"
+        assert done.stderr.count("a compiled kernel cannot be kept (unicode_type: no text for this type)") == 1
+
+    said([0, 0, 0])
+    said([1, 1, 0])

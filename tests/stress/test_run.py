@@ -12,7 +12,7 @@ from refgi.errors import InputError
 from refgi.jit import most_threads
 from refgi.scene import PointLight
 from refgi.stress import promises
-from refgi.stress.changes import CHANGES, Changed
+from refgi.stress.changes import CHANGES, Changed, NotPromisedError
 from refgi.stress.judge import Seen, bits_apart, estimates_apart, means_apart, rmse_apart, same_surface, unsound
 from refgi.stress.run import Silence, stress
 
@@ -126,6 +126,26 @@ def test_what_is_not_promised_is_said(box):
     assert silent == [Silence("sii", "turned", "a point lamp's map stands along the world's axes")]
     with pytest.raises(InputError, match="change: expected one of"):
         list(stress(box, ["sii"], changes=["melted"], **SIZE))
+
+
+@pytest.mark.parametrize(("width", "height", "texel"), [(63, 40, 2), (62, 40, None), (62, 62, 4), (64, 41, None),
+                                                        (36, 27, None), (268, 132, 8), (272, 131, None)])
+def test_a_mirrored_pyramid_is_promised_where_texels_divide_the_width(box, width, height, texel):
+    """Texels of level k are 2^k pixels wide from the left: mirrored, another would begin at the other edge."""
+    change = next(one for one in CHANGES if one.name == "mirrored")
+    if texel is None:
+        assert promises.asked("hssil", change, box, (width, height)).promise == "rounding"
+        return
+    with pytest.raises(NotPromisedError, match=f"a width of {width} pixels is no multiple of the {texel} of its"):
+        promises.asked("hssil", change, box, (width, height))
+
+
+@pytest.mark.parametrize(("width", "height"), [(31, 24), (36, 23)])
+def test_odd_sizes_promise_what_holds(box, width, height):
+    silent = []
+    rows = list(stress(box, ["hssil"], width=width, height=height, changes=["mirrored"], silent=silent.append))
+    assert [one.method for one in silent] == (["hssil"] if width == 31 else [])
+    assert all(found.row.passed for found in rows), rows
 
 
 def test_every_limit_has_a_source(box):

@@ -179,8 +179,8 @@ def test_damaged_kits_and_outputs_are_told(kit, port, tmp_path):
     port.kit = kit
     file = port.folder / "sii-warp-a" / "rsm0.flux.npy"
     whole = file.read_bytes()
-    for content, said in ((b"no array", "without its header"), (whole[:-5], "cannot be read"),
-                          (b"", "without its header"), (whole + b"more", "4 bytes more than its header says")):
+    for content, said in ((b"no array", "without its header"), (whole[:-5], "bytes that its header says, got"),
+                          (b"", "without its header"), (whole + b"more", "bytes that its header says, got")):
         file.write_bytes(content)
         result = port.check()
         assert (result.exit_code, result.first) == (DAMAGED, ("sii-warp-a", "rsm0.flux"))

@@ -8,12 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import get_num_threads
 
 from refgi.cluster.clustering.rounds import LINES, TILE, Metric, Rounds, iterate, move_to_means, sort_lights
 from refgi.cluster.settings import Distance
 from refgi.errors import expect
-from refgi.jit import threads
+from refgi.jit import thread_count, threads
 from refgi.skips import left_out
 from refgi.stages import skip, stage
 
@@ -152,7 +151,7 @@ def _run(
     lights: Array, areas: Array, distance: Distance, weights: tuple[float, float], diagonal: float, rounds: int
 ) -> Clustering:
     with threads(1 if lights.shape[1] * areas.shape[1] <= SMALL else None):
-        state = _state(lights, areas, get_num_threads())
+        state = _state(lights, areas, thread_count())
         objective = np.zeros(rounds + 1)
         done = iterate(state, _metric(distance, weights, diagonal, _span(state)), rounds, objective)
     return Clustering(areas[:3].copy(), areas[3:].copy(), state.members, state.of, done, objective[: done + 1])

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -39,6 +38,7 @@ from refgi.cluster.visibility.search_region import scale_of
 from refgi.cluster.visibility.series import series
 from refgi.cluster.visibility.shadow import filter_channels, shadow_of
 from refgi.errors import expect
+from refgi.jit import thread_count
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.pairs.tiles import clear, receiving
 from refgi.skips import left_out
@@ -217,7 +217,7 @@ def _filters(maps: "ShadowMaps | None", chosen: Array, settings: "ValSettings") 
         return
     csm, box = settings.visibility, "val_alpha_over_pi" in settings.as_published
     assert isinstance(csm, Csm)
-    workers, depth = numba.get_num_threads(), maps.depth
+    workers, depth = thread_count(), maps.depth
     scratch = None
     if csm.prefilter == "mip":
         scratch = allocate_mips(min(workers, len(chosen)), depth.shape[1], depth.dtype, csm)

@@ -7,12 +7,11 @@ plane is the face's, whatever normal the cosine is taken with: above an interpol
 import math
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.jit import kernel, prange
+from refgi.jit import kernel, prange, thread_count
 from refgi.radiometry import DIRECTIONAL, FOR_FLOAT32, POINT, SPOT, falloff_in_float64, incident_light
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.reflective import Rsm
@@ -87,7 +86,7 @@ def shadow_map_visibility(
     depth, map_position = rsm.resolve("depth", "position")
     shadow_map = ShadowMap(depth.reshape(-1), map_position.reshape(3, -1), -1.0 if bias is None else bias)
     receivers = SurfacePoints(position, normal, covered)
-    _shadow_lookup(rsm.projection, receivers, shadow_map, numba.get_num_threads(), visible)
+    _shadow_lookup(rsm.projection, receivers, shadow_map, thread_count(), visible)
     if interpolated:
         _hide_turned_away(light_table((rsm.light,)), position, normal, visible)
     return visible

@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.jit import thread_count
 from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, resolve_at, resolve_materials
 from refgi.rsm.buffers.colours import tint
 from refgi.rsm.buffers.facing import facing_normals
@@ -286,7 +286,7 @@ def _resolve(
     if set(names) <= OF_MATERIALS:
         resolve_materials(surface, triangle_id, planes.albedo, planes.material_id)
     else:
-        resolve(surface, projection, triangle_id, channels, planes, allocate(numba.get_num_threads()))
+        resolve(surface, projection, triangle_id, channels, planes, allocate(thread_count()))
     paint(geometry, materials, projection, triangle_id, planes.albedo)
     tint(geometry, projection, triangle_id, planes.albedo)
     return {name: getattr(planes, name) for name in names}

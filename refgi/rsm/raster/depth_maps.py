@@ -2,11 +2,11 @@
 
 from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.jit import thread_count
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.paraboloid import CutChunks, Ignored, cut_chunks, draw_distances
 from refgi.rsm.raster.projection import Projection, paraboloid_projection
@@ -75,6 +75,6 @@ def distance_maps(
     """
     n, none = projection.width, np.zeros(projection.maps)
     distance = plane((projection.maps * n, n), dtype)
-    workers = numba.get_num_threads()
+    workers = thread_count()
     found = draw_distances(projection, triangles, ignored or Ignored(none, none), workers, distance, cut)
     return distance.reshape(-1, n, n), *found

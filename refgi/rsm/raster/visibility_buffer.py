@@ -9,11 +9,10 @@ to the lowest id.
 
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel, prange
+from refgi.jit import kernel, prange, thread_count
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.bands import bands, part_of, project_all
 from refgi.rsm.raster.batch import EMPTY, Part, draw, unpack
@@ -96,7 +95,7 @@ def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | No
     cut = None if geometry.cut is None else Cut(geometry.faces[geometry.cut.face], geometry.cut, None, None)
     height, width = projection.shape
     visibility = Visibility(plane((height, width), np.int32), plane((height, width), np.float32))
-    workers = numba.get_num_threads()
+    workers = thread_count()
     if projection.kind == PARABOLOID:
         draw_paraboloids(projection, vertices, faces, workers, visibility.inverse_depth, visibility.triangle_id,
                          cut_chunks(geometry))
@@ -134,7 +133,7 @@ def _draw_clusters(
     placed, starts = place(projection, clusters), np.zeros(-(-height // rows) + 1, np.int64)
     members = list_clusters(placed.rect, np.argsort(-placed.nearest, kind="stable"), rows, starts)
     lists, passed = ClusterLists(starts, members, rows), np.zeros(len(starts) - 1, np.int64)
-    keys = plane((numba.get_num_threads(), rows * (width + LANES)), np.int64)
+    keys = plane((thread_count(), rows * (width + LANES)), np.int64)
 
     def draw_all(passing: bool) -> tuple[int, int]:
         _draw_bands(projection, clusters, placed, lists, cut, passing, keys, passed, visibility)

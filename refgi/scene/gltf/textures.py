@@ -3,7 +3,10 @@
 Image, sampler, set of texture coordinates, KHR_texture_transform.
 """
 
+import contextlib
 import math
+import weakref
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +15,7 @@ from refgi.errors import InputError, expect, shortened
 from refgi.scene.gltf.container import Document
 from refgi.scene.gltf.extensions import IMAGES, packed
 from refgi.scene.gltf.materials import GLOSSY
-from refgi.scene.texture.image import Image, decoded
+from refgi.scene.texture.image import Image, decoded, expect_all_fit
 from refgi.scene.texture.texture import Filter, Texture, Wrap
 from refgi.scene.values import Array
 
@@ -21,6 +24,8 @@ WRAPS: dict[int, Wrap] = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 FILTERS: dict[int, Filter] = {9728: "nearest", 9729: "bilinear", 9984: "trilinear", 9985: "trilinear",
                               9986: "trilinear", 9987: "trilinear"}
 LARGEST_SET = 15  # of texture coordinates
+
+_judged: "weakref.WeakSet[Document]" = weakref.WeakSet()  # documents whose images fit in memory
 
 
 class Look(NamedTuple):
@@ -108,12 +113,32 @@ def _code(document: Document, owner: dict[str, Any], key: str, where: str, known
 
 
 def _image(document: Document, index: Any, referrer: str) -> Image:
+    if document not in _judged:
+        expect_all_fit(_used_images(document), f"{document.path}: images")
+        _judged.add(document)
+    return decoded(*_content(document, index, referrer))
+
+
+def _content(document: Document, index: Any, referrer: str) -> tuple[bytes, str]:
+    """Return the bytes of an image's file, and how messages name it."""
     entry, where = document.item("images", index, referrer), f"images[{index}]"
     uri = entry.get("uri")
     name = f"{document.path}: {where}"
     if uri is None:
         expect("bufferView" in entry, f"{name}", "a uri or a bufferView", sorted(entry))
-        return decoded(document.view(entry["bufferView"], f"{where}.bufferView"), name)
+        return document.view(entry["bufferView"], f"{where}.bufferView"), name
     expect(isinstance(uri, str), f"{name}.uri", "a string", uri)
     content = document.from_uri(uri, where)
-    return decoded(content, name if uri.startswith("data:") else f"{name}: {shortened(uri, 200)}")
+    return content, name if uri.startswith("data:") else f"{name}: {shortened(uri, 200)}"
+
+
+def _used_images(document: Document) -> Iterator[bytes]:
+    """Yield the images that materials may show, as far as they are there; what is wrong is told when one is shown."""
+    for material in document.items("materials"):
+        glossy = material.get("extensions", {}).get(GLOSSY) if isinstance(material.get("extensions"), dict) else None
+        owners: Any = ((glossy, "diffuseTexture"), (material.get("pbrMetallicRoughness"), "baseColorTexture"),
+                       (material, "emissiveTexture"))
+        for owner, key in owners:
+            with contextlib.suppress(InputError, KeyError, TypeError, AttributeError):
+                texture = document.item("textures", owner[key]["index"], "texture")
+                yield _content(document, texture["source"], "image")[0]

@@ -6,17 +6,20 @@ everywhere; `linear` applies the curve texel by texel through a table of all cod
 a file are ignored, as glTF asks for.
 """
 
+import contextlib
 import functools
 import hashlib
 import io
 import warnings
 import weakref
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from refgi.errors import InputError, expect
+from refgi.memory import available_bytes
 from refgi.scene.values import Array
 
 MOST_TEXELS = 1 << 27  # of one image: 16384 x 8192
@@ -174,14 +177,37 @@ def _codes(content: bytes, where: str) -> tuple[Array, str, Array | None]:
             raise InputError(f"{where}: damaged or cut short: {error}") from error
 
 
-def _expect_size(size: tuple[int, int], where: str) -> None:
-    from refgi.scene.mesh import BYTES_OF_TEXEL, physical_memory
+def expect_all_fit(images: Iterable[Path | bytes], where: str) -> None:
+    """Raise `InputError` naming `where` unless images that are to be decoded fit in memory together, by their headers.
 
+    `images`: files, or what is in them; each counts once. What has no header is left to be told when it is decoded.
+    """
+    from PIL import Image as Pictures
+
+    texels, known = 0, set()
+    for one in images:
+        with warnings.catch_warnings(), contextlib.suppress(Exception):
+            warnings.simplefilter("ignore")
+            if hash(one) not in known and (isinstance(one, bytes) or one.is_file()):
+                with Pictures.open(io.BytesIO(one) if isinstance(one, bytes) else one, formats=(*FORMATS, "TGA")) as it:
+                    texels += it.width * it.height
+                known.add(hash(one))
+    _expect_memory(texels, where, f"{len(known)} images that fit", f"{texels:,} texels")
+
+
+def _expect_size(size: tuple[int, int], where: str) -> None:
     texels = size[0] * size[1]
     expect(texels <= MOST_TEXELS, where, f"at most {MOST_TEXELS:,} texels", f"{size[0]} x {size[1]}")
-    present = physical_memory()
-    expect(texels * BYTES_OF_TEXEL <= present, where, f"an image that fits in {present / 2**30:.1f} GiB of memory",
-           f"{size[0]} x {size[1]} ({texels * BYTES_OF_TEXEL / 2**30:.1f} GiB)")
+    _expect_memory(texels, where, "an image that fits", f"{size[0]} x {size[1]}")
+
+
+def _expect_memory(texels: int, where: str, expected: str, got: str) -> None:
+    from refgi.scene.mesh import BYTES_OF_TEXEL, physical_memory
+
+    left = available_bytes()
+    present = min(physical_memory(), float("inf") if left is None else left)
+    expect(texels * BYTES_OF_TEXEL <= present, where, f"{expected} in {present / 2**30:.1f} GiB of memory",
+           f"{got} ({texels * BYTES_OF_TEXEL / 2**30:.1f} GiB)")
 
 
 def _read(picture: Any, content: bytes) -> tuple[Array, Array | None]:

@@ -2,7 +2,6 @@
 
 import hashlib
 import os
-import pickle
 import subprocess
 import warnings
 
@@ -20,7 +19,7 @@ from benchmarks.stability.faults import (
 )
 from benchmarks.stability.victims import VICTIMS, Victim
 from refgi.errors import InputError, RefgiWarning
-from refgi.jit import cache
+from refgi.jit import cache, kernelfile
 
 # writes 100 kB, and takes 64 MB for it
 COMMAND = """
@@ -89,7 +88,7 @@ def test_a_read_only_folder_cannot_be_written(tmp_path):
     (tmp_path / "disk" / "a").write_text("x")
 
 
-NO_DIGEST = "import refgi.jit.cache as c; c._verified = lambda content: content"
+NO_DIGEST = "import refgi.jit.kernelfile as k; k.verified = lambda content: memoryview(content)[:-k.DIGEST]"
 
 
 def test_a_damaged_kernel_that_is_not_noticed_is_a_breach(monkeypatch):
@@ -110,12 +109,14 @@ def test_cold_starts_that_do_not_share_are_found():
 
 
 def test_the_digest_stands_at_the_end_of_a_file():
-    content = pickle.dumps((1, 2))
+    content = kernelfile.FORMAT + b"{}\n"
     whole = content + hashlib.sha256(content).digest()
-    assert pickle.loads(cache._verified(whole)) == (1, 2)
-    for damaged in (content, b"", whole[:-1], whole + b"\0", b"\0" + whole[1:], whole[:-1] + bytes([whole[-1] ^ 1])):
+    assert kernelfile.verified(whole) == content
+    other = b"another format\n"
+    for damaged in (content, b"", whole[:-1], whole + b"\0", b"\0" + whole[1:], whole[:-1] + bytes([whole[-1] ^ 1]),
+                    other + hashlib.sha256(other).digest()):
         with pytest.raises(ValueError, match="damaged"):
-            cache._verified(damaged)
+            kernelfile.verified(damaged)
 
 
 def test_a_full_disk_leaves_nothing_in_the_cache(tmp_path, monkeypatch):
@@ -123,20 +124,19 @@ def test_a_full_disk_leaves_nothing_in_the_cache(tmp_path, monkeypatch):
         class library:  # noqa: N801
             has_dynamic_globals = False
 
-        def _reduce(self):
-            return ()
-
     def full(*_):
         raise OSError(28, "No space left on device")
 
     kept = cache.KernelCache(lambda x: x)
     monkeypatch.setattr(kept, "path", lambda _: tmp_path / "a.kernel")
+    monkeypatch.setattr(cache, "packed", lambda _: b"code")
     monkeypatch.setattr(cache.Path, "replace", full)
     with pytest.warns(RefgiWarning, match="cannot be kept"):
         kept.save_overload(None, Compiled())
     assert list(tmp_path.iterdir()) == []
     monkeypatch.undo()
     monkeypatch.setattr(kept, "path", lambda _: tmp_path / "a.kernel")
+    monkeypatch.setattr(cache, "packed", lambda _: b"code")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         kept.save_overload(None, Compiled())

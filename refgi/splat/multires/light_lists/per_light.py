@@ -8,11 +8,10 @@ batches, whose lists fit in a fixed number of bytes however many lights there ar
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
-from refgi.jit import kernel, prange, threads
+from refgi.jit import kernel, prange, thread_count, threads
 from refgi.pairs.glossy import glossy_radiance
 from refgi.pairs.glossy_sum import receiver_lobes_of
 from refgi.pairs.irradiance import Receivers, checked
@@ -259,7 +258,7 @@ def _each_light(
 def _batch_lists(lights: int, points: Array) -> SubsplatLists:
     """Return lists for as many lights as fit in BATCH_BYTES, and at least for one for each thread."""
     one = max(1, points.shape[1] * (8 + 3 * points.itemsize))
-    count = min(max(BATCH_BYTES // one, numba.get_num_threads()), max(lights, 1))
+    count = min(max(BATCH_BYTES // one, thread_count()), max(lights, 1))
     return empty_lists(count, points.shape[1], points.dtype)
 
 

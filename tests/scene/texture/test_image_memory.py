@@ -34,7 +34,7 @@ def inside(folder: Path, shown: int = COUNT) -> Path:
         tree["images"].append({"bufferView": 3 + number, "mimeType": "image/png"})
         buffer += picture(number)
         colour = {"baseColorTexture": {"index": number}} if number < shown else {}
-        tree["materials"].append({"pbrMetallicRoughness": colour})
+        tree["materials"].append({"pbrMetallicRoughness": colour | {"metallicFactor": 0}})
         first = tree["meshes"][0]["primitives"][0]
         primitives.append(first | {"material": number, "attributes": first["attributes"] | {"TEXCOORD_0": 2}})
     tree["textures"] = [{"source": number} for number in (*range(COUNT), 0)]

@@ -15,7 +15,6 @@ from refgi.scene.reading import Emissive, LightUnit, reading_as
 from refgi.scene.repair import lights_with_power, repaired_all, warn_of_flat_faces, warn_of_unit
 from refgi.scene.scenefile import READERS, read_mesh_file, read_scene_file
 from refgi.scene.source import reading, source_of
-from refgi.scene.strictness import strictness
 from refgi.stages import stage
 
 
@@ -65,7 +64,7 @@ def load_scene(
     30
     """
     try:
-        with reading() as files, strictness(strict), reading_as(light_unit, emissive):
+        with reading() as files, reading_as(light_unit, emissive, strict=strict):
             scene = _found(source, camera, lights)
     except MemoryError as error:
         raise InputError(f"{shortened(str(source))}: does not fit in memory", file=str(source)) from error

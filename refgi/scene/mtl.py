@@ -19,7 +19,7 @@ from refgi.scene.files import is_there
 from refgi.scene.lines import TEXTURES, colour_of, lines_of, numbers_of
 from refgi.scene.material import reflects_too_much
 from refgi.scene.model import Material, Rgb
-from refgi.scene.strictness import is_strict
+from refgi.scene.reading import is_strict
 from refgi.scene.texture.image import Image, image_file
 from refgi.scene.texture.texture import Texture
 

@@ -20,7 +20,7 @@ from refgi.scene.mesh import expect_all_sound
 from refgi.scene.model import Array, Material, Mesh
 from refgi.scene.mtl import Maps, read_library
 from refgi.scene.polygons import triangles_of
-from refgi.scene.strictness import is_strict
+from refgi.scene.reading import is_strict
 from refgi.scene.texture.image import expect_all_fit
 from refgi.scene.vertexcolours import WHITE, factors
 

@@ -12,7 +12,7 @@ from refgi.scene.material import UNPAINTED
 from refgi.scene.model import Array, Material, Mesh
 from refgi.scene.plydata import Column, Ply, read_entries
 from refgi.scene.polygons import triangles_of
-from refgi.scene.strictness import tolerate
+from refgi.scene.reading import tolerate
 from refgi.scene.texture.image import image_file
 from refgi.scene.texture.texture import Texture
 from refgi.scene.vertexcolours import WHITE, factors, from_codes

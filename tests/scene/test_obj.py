@@ -7,7 +7,7 @@ import pytest
 
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene.obj import read_obj
-from refgi.scene.strictness import strictness
+from refgi.scene.reading import reading_as
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
@@ -70,7 +70,7 @@ def test_materials_are_floats_in_order_of_use(tmp_path: Path) -> None:
     ("mtllib absent.mtl\nf 1 2 3\n", "absent.mtl: no such file"),
 ])
 def test_each_fault_names_file_and_line(tmp_path: Path, tail: str, said: str) -> None:
-    with pytest.raises(InputError) as error, strictness(True):
+    with pytest.raises(InputError) as error, reading_as(strict=True):
         read_obj(written(tmp_path, SQUARE + tail))
     assert str(tmp_path) in str(error.value)
     assert said in str(error.value)

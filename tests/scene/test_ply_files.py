@@ -14,7 +14,7 @@ from refgi.errors import InputError, RefgiWarning
 from refgi.scene import load_scene
 from refgi.scene.model import Mesh
 from refgi.scene.ply import read_ply
-from refgi.scene.strictness import strictness
+from refgi.scene.reading import reading_as
 
 VERTICES = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 1.5, 0)]
 CODES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d"}
@@ -126,7 +126,7 @@ def test_faces_of_fewer_corners_are_passed_over_and_refused_when_strict(tmp_path
     content = ply(form, vertices(), faces([0, 1], [0, 1, 2, 3], [], [3], [3, 2, 4]))
     with pytest.warns(RefgiWarning, match=r"mesh\.ply: 3 faces of fewer than three corners passed over"):
         assert read(tmp_path, content).faces.tolist() == [[0, 1, 2], [0, 2, 3], [3, 2, 4]]
-    with pytest.raises(InputError, match="3 faces of fewer"), strictness(True):
+    with pytest.raises(InputError, match="3 faces of fewer"), reading_as(strict=True):
         read(tmp_path, content)
 
 
@@ -239,7 +239,7 @@ def test_what_a_texture_lacks_is_said(tmp_path: Path, comment: str, coordinates:
     with pytest.warns(RefgiWarning) as warned:
         assert read(tmp_path, content).material.diffuse == (0.5, 0.5, 0.5)
     assert [str(one.message) for one in warned] == [f"{tmp_path / 'mesh.ply'}: {said}"]
-    with pytest.raises(InputError), strictness(True):
+    with pytest.raises(InputError), reading_as(strict=True):
         read(tmp_path, content)
 
 

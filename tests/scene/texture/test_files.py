@@ -17,8 +17,8 @@ from refgi.scene.gltf import read_gltf
 from refgi.scene.model import Scene
 from refgi.scene.motion import moved, with_own_vertices
 from refgi.scene.obj import read_obj
+from refgi.scene.reading import reading_as
 from refgi.scene.repair import repaired
-from refgi.scene.strictness import strictness
 from refgi.scene.texture.image import Image
 from refgi.scene.transform import transformed_all
 from tests.scene.samples import BUFFER, glb_bytes, gltf_tree, write_scene
@@ -242,7 +242,7 @@ def test_obj_faces_without_coordinates_and_options_that_are_not_read(tmp_path: P
 def test_an_obj_texture_that_is_missing_names_line_and_image(tmp_path: Path) -> None:
     path = obj(tmp_path, "newmtl a\nmap_Kd woad.png\nnewmtl unused\nmap_Kd never.png\n")
     said = r"m\.mtl: line 2: map_Kd: .*woad\.png: no such file; did you mean 'wood"
-    with pytest.raises(InputError, match=said), strictness(True):
+    with pytest.raises(InputError, match=said), reading_as(strict=True):
         read_obj(path)
     with pytest.warns(RefgiWarning, match=r"1 texture\(s\) of map_Kd and map_d not there, left out: woad\.png"):
         assert read_obj(path).meshes[0].material == Material("a")  # grey, as without Kd

@@ -11,13 +11,14 @@ from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.scene import DirectionalLight, Material, PointLight, SpotLight, load_scene
 from refgi.truth import TruthSettings, trace_truth
-from refgi.truth.cell_densities import even_density
+from refgi.truth.cell_densities import even_density, receiver_at
 from refgi.truth.cell_pass import beside_of
 from refgi.truth.cell_rays import pick_cells, picks_for
-from refgi.truth.cell_walk import cell_at, column, fill_tops, found_up
+from refgi.truth.cell_walk import cell_at, fill_tops, found_up
 from refgi.truth.light_square import fill_rays, light_squares, place_of
+from refgi.truth.lobe_receivers import glossy_triangles
 from refgi.truth.passes import one_pass
-from refgi.truth.truth import task_of
+from refgi.truth.truth import _guided, _with_lobes, task_of
 from tests.truth.scenes import rectangle
 from tests.truth.scenes import scene as by_hand
 
@@ -35,11 +36,13 @@ def shiny(scene, exponent, *lights):
     return dataclasses.replace(scene, materials=materials, lights=lights or scene.lights)
 
 
-def task_for(scene, size=12, **settings):
+def task_for(scene, size=12, *, lobes=False, **settings):
     frame = Frame(scene, width=size, height=size)
-    buffer = frame.gbuffer
-    return task_of(frame.scene, frame.tracer, buffer.position, buffer.normal, buffer.triangle_id,
-                   TruthSettings(**settings))
+    buffer, chosen = frame.gbuffer, TruthSettings(**settings)
+    if not lobes:
+        return task_of(scene, frame.tracer, buffer.position, buffer.normal, buffer.triangle_id, chosen)
+    glossy = glossy_triangles(scene, buffer.position, buffer.normal, buffer.triangle_id)
+    return _guided(_with_lobes(scene, frame.tracer, buffer.position, buffer.normal, glossy, chosen))
 
 
 def rays_of(light, points):
@@ -74,21 +77,30 @@ def test_equal_parts_of_the_square_are_equal_solid_angles(light):
     assert ((counts - 2000) ** 2 / 2000).sum() < chi2.isf(CERTAIN, 19)
 
 
-@pytest.mark.parametrize("lamps", [("point",), ("spot", "sun", "point")])
-def test_rays_fall_as_densely_as_their_weights_say(lamps, evidence):
-    """n_b integrates to the picks, and picks of many passes fall into 6 x 6 parts of each square as it says."""
-    task = task_for(shiny(load_scene("cornell_box"), 60.0, *(LIGHTS[lamp] for lamp in lamps)), estimator="light")
+@pytest.mark.parametrize(("lamps", "lobes"), [
+    (("point",), False), (("spot", "sun", "point"), False), (("spot",), True)])
+def test_rays_fall_as_densely_as_their_weights_say(lamps, lobes, evidence):
+    """n_b integrates to the picks, and picks of many passes fall into 8 x 8 parts of each square as it says."""
+    scene = shiny(load_scene("cornell_box"), 60.0, *(LIGHTS[lamp] for lamp in lamps))
+    task = task_for(scene, lobes=lobes, estimator="light")
     beside, receivers, r, picks = beside_of(task, 0), task.receivers, len(task.receivers.pixel) // 3, task.counts.cells
-    cells, x, n = task.cells, column(task.receivers.position, r), column(task.receivers.normal, r)
+    cells, to = task.cells, receiver_at(task.receivers, task.lobes, r)
     found, sums = np.empty(len(cells.tree.top), np.float32), np.empty(len(cells.tree.top) + 1)
-    fill_tops(cells.tree, x, n, found, sums)
-    grid, places = 6, np.random.default_rng(3).random((20000, 2))
-    part, expected = np.floor(places * grid).astype(int) @ [grid, 1], []
+    fill_tops(cells.tree, to, found, sums)
+    grid, leaf = 8, np.flatnonzero(cells.child < 0)
+    corner, light = cells.corner[leaf], np.full(len(leaf), -1)
     for k in range(len(lamps)):
-        cell = [cell_at(cells, k, *place) for place in places]
-        density = np.array([even_density(cells, k, at, found_up(cells, at, x, n, sums).chance, picks) for at in cell])
-        expected.append(np.bincount(part, density, grid * grid) * cells.squares.measure[k] / len(places))
-    assert np.sum(expected) == pytest.approx(picks, rel=0.05)  # by 20,000 places: a percent or two
+        a, b = ((corner[:, :2] + 0.5) / 2.0 ** corner[:, 2:]).T
+        light[[cell_at(cells, k, *place) == at for place, at in zip(zip(a, b, strict=True), leaf, strict=True)]] = k
+    chance = np.array([found_up(cells, at, to, sums).chance for at in leaf])
+    assert chance.sum() == pytest.approx(1, abs=1e-6)
+    rays_in = [even_density(cells, k, at, p, picks) * cells.squares.measure[k] * 0.25**level
+               for k, at, p, level in zip(light, leaf, chance, corner[:, 2], strict=True)]
+    assert np.sum(rays_in) == pytest.approx(picks, rel=1e-6)
+    assert corner[:, 2].min() >= math.log2(grid)  # no leaf is larger than a part
+    row, column = (corner[:, :2] >> (corner[:, 2:] - int(math.log2(grid)))).T
+    expected = np.bincount((light * grid + row) * grid + column, rays_in, len(lamps) * grid * grid)
+    expected = expected.reshape(len(lamps), -1)
     passes, got = 400, np.zeros((len(lamps), grid * grid))
     for seed in range(passes):
         rays = picks_for(len(receivers.pixel) * picks)
@@ -98,7 +110,7 @@ def test_rays_fall_as_densely_as_their_weights_say(lamps, evidence):
         for k, start, way in zip(rays.light[mine], rays.paths.origin[mine], rays.paths.direction[mine], strict=True):
             a, b = place_of(cells.squares, k, tuple(start.astype(float) + 0.3 * way))
             got[k, int(a * grid) * grid + int(b * grid)] += 1
-    expected = np.array(expected) * passes
+    expected = expected * passes
     off = np.abs(got - expected) / np.sqrt(expected + (0.05 * expected) ** 2 + 1)
     evidence(f"{len(lamps)} lamps: parts off by {off.max():.1f} at most")
     assert off.max() < 5

@@ -30,8 +30,11 @@ def scene_of(name, runs, line=()):
                        line=tuple(line), failures={})
 
 
+MACHINE = {"platform": "a", "cpu": "b", "threads": 2, "versions": {"refgi": "0"}}
+
+
 def result_of(*scenes, paths=()):
-    return Result(environment={}, scenes=scenes, paths=paths)
+    return Result(environment=MACHINE, scenes=scenes, paths=paths)
 
 
 def path_of(scene, method, changes=(), flicker=0.1, lag=0.5):

@@ -2,6 +2,7 @@
 
 from benchmarks.before_after import fronts_plot, main, ratio_table
 from refgi.bench.results import Figures, Result, Run, SceneResult, write_results
+from tests.batch.made import MACHINE
 
 
 def run(method, setting, seconds, rmse):
@@ -37,7 +38,7 @@ def test_folders_of_scenes_are_read_and_drawn(tmp_path):
     for name, found in (("before", BEFORE), ("after", AFTER)):
         folder = tmp_path / name / "box"
         folder.mkdir(parents=True)
-        write_results(Result(environment={}, scenes=(found,)), folder)
+        write_results(Result(environment=MACHINE, scenes=(found,)), folder)
     assert main([str(tmp_path / "before"), str(tmp_path / "after"), "--out", str(tmp_path / "out")]) == 0
     assert (tmp_path / "out" / "ratios.md").read_text().count("| box |") == 2
     assert (tmp_path / "out" / "box.svg").read_text().startswith("<svg")

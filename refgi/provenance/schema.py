@@ -28,6 +28,19 @@ class ProgramEntry(_Entry):
     git: str | None = None
 
 
+class LampsEntry(_Entry):
+    """Lamps that stand for emissive surfaces."""
+
+    count: Count
+    approximation: str
+
+
+class ExposureEntry(_Entry):
+    """What an exposure was taken from."""
+
+    percentile: Annotated[float, Field(ge=0, le=100)]
+
+
 class SceneEntry(_Entry):
     """Which scene, and as seen and lit by what."""
 
@@ -39,6 +52,7 @@ class SceneEntry(_Entry):
     materials_sha256: str
     camera: Objects
     lights: list[Objects]
+    emissive_lamps: LampsEntry | None = None
 
 
 class OptionsEntry(_Entry):
@@ -73,6 +87,7 @@ class PictureRecord(_Entry):
     scene: SceneEntry
     options: OptionsEntry
     exposure: Annotated[float, Field(allow_inf_nan=False, gt=0)]
+    auto_exposure: ExposureEntry | None = None
     units: dict[str, str]
     content: str
     method: str

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from refgi.cli.destination import Pictures
     from refgi.methods import Picture
     from refgi.provenance import Job, Record
+    from refgi.scene import Scene
 
 
 @click.command("render")
@@ -102,7 +103,8 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     record = _record(job, picture) | ({"auto_exposure": {"percentile": EXPOSED}} if auto else {})
     content = _content(picture, job, seconds, record) | {"stages": [_run(run) for run in log.runs]}
     planes = _write(picture, files, record)
-    _say_aloud(session, content, job)
+    _say_aloud(content, job.scene)
+    _warn_of_brightness(session, content, job.exposure)
     content["files"] = [str(file) for file in files.files]
     size = "x".join(map(str, content["size"]))
     text = f"{job.scene.name} by {job.method}: {size} in {seconds:.2f} s"
@@ -174,10 +176,10 @@ def _write(picture: "Picture", files: "Pictures", record: "Record") -> dict[str,
     return planes
 
 
-def _say_aloud(session: Session, content: dict[str, Any], job: "Job") -> None:
+def _say_aloud(content: dict[str, Any], scene: "Scene") -> None:
     from refgi.scene.repair import faintest_irradiance
 
-    least = faintest_irradiance(job.scene.lights, job.scene.geometry)
+    least = faintest_irradiance(scene.lights, scene.geometry)
     if bad := content["non_finite_pixels"]:
         say(f"{bad} pixels of the picture are NaN or infinite")
     elif content["brightest_radiance"] <= least:
@@ -185,7 +187,9 @@ def _say_aloud(session: Session, content: dict[str, Any], job: "Job") -> None:
         say(f"the picture is wholly black: the camera sees {seen}")
     elif content["mean_indirect_irradiance"] <= least:
         say("there is no indirect light in the picture")
-    exposure = job.exposure
+
+
+def _warn_of_brightness(session: Session, content: dict[str, Any], exposure: float) -> None:
     shown = content["brightest_radiance"] * exposure
     gltf = str(content["provenance"]["scene"]["source"]).lower().endswith((".gltf", ".glb"))
     if 0 < shown < (DARKEST_OF_GLTF if gltf else DARKEST) or shown > BRIGHTEST:

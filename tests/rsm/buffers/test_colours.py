@@ -32,6 +32,7 @@ from refgi.settings import of
 
 ROUNDING = 1e-12  # of a few products in float64
 SINGLE = 1e-6  # pictures in float32
+GLOSS = Material("gloss", (0.5, 0.5, 0.5), (0.3, 0.3, 0.3), 20.0)
 WHITE = Material("white", (0.8, 0.8, 0.8))
 
 
@@ -116,8 +117,9 @@ def textured(mesh: Mesh) -> Mesh:
 
 
 @pytest.mark.filterwarnings("ignore:.* of the indirect light")
-@pytest.mark.parametrize("method", ["sii", "vpl", "truth"])
-@pytest.mark.parametrize("material", [WHITE, Material("gloss", (0.5, 0.5, 0.5), (0.3, 0.3, 0.3), 20.0)])
+@pytest.mark.parametrize(("method", "material"), [
+    ("sii", WHITE), ("vpl", WHITE), ("truth", WHITE), ("sii", GLOSS), ("vpl", GLOSS),
+    pytest.param("truth", GLOSS, marks=pytest.mark.slow)])  # kernels of its own: half a minute
 def test_methods_see_the_ramp_as_a_texture_of_it(method, material):
     settings = of(find_method(method).settings, **({"samples": 96, "light_grid": 16} if method == "truth" else
                                                    {"lights": 64}))

@@ -22,6 +22,9 @@ from refgi.truth.surfaces import Surfaces
 Array = npt.NDArray[Any]
 
 
+SOFT = 8.0  # exponent up to which directions of the hemisphere do as well as those around the lights' images
+
+
 class Task(NamedTuple):
     """Inputs of a pass."""
 
@@ -42,8 +45,11 @@ class Task(NamedTuple):
     @property
     def counts(self) -> Counts:
         """Samples of each receiver in a pass that meet senders' lobes; the light estimator knows no directions."""
-        mirrors = self.picks // 2 if self.directions and self.sides.hide else 0
-        return Counts(self.directions, self.picks - mirrors, mirrors)
+        if not self.directions or not self.sides.hide:
+            return Counts(self.directions, self.picks, 0)
+        half, specular = self.picks // 2, self.surfaces.specular.any(axis=1)
+        soft = self.surfaces.exponent[specular].max(initial=0.0) <= SOFT
+        return Counts(self.directions, self.picks - half, 0 if soft else half)
 
     @property
     def sides(self) -> Sides:

@@ -189,12 +189,15 @@ def cell_rays(scene):
 def rays_of(settings, receivers, lamps, passes=2, scene="lamps"):
     """Return how many rays to nearest hits and how many shadow rays passes and pilot take: docs/truth.
 
-    Each of the picks has another one for lobes of senders.
+    Each of the picks has another one for lobes of senders; half of them where directions bring the lobes as well, all
+    of an exponent of 8 or less.
     """
     picks = 0 if settings.estimator == "hemisphere" else settings.picks
     directions = {"light": 0, "hemisphere": settings.directions or 16}.get(settings.estimator, settings.directions or 8)
-    closest = receivers * (directions * settings.bounces + picks)
-    shadow = receivers * (2 * picks + lamps * directions * settings.bounces)
+    sharpest = max(m.exponent for m in frame_of(scene).scene.materials if any(m.specular))
+    of_lobes = picks - picks // 2 if directions and sharpest <= 8 else picks
+    closest = receivers * (directions * settings.bounces + of_lobes)
+    shadow = receivers * (picks + of_lobes + lamps * directions * settings.bounces)
     closest += lamps * settings.light_grid**2 * settings.interleave**2 if picks else 0
     cells = cell_rays(scene) if picks else 0
     if not picks or settings.uniform_share == 1:

@@ -155,8 +155,9 @@ def _digest() -> str:
     import refgi
 
     total = hashlib.sha256()
-    for file in sorted(Path(refgi.__file__).parent.rglob("*.py")):
-        total.update(file.read_bytes())
+    for file in sorted(Path(refgi.__file__).parent.rglob("*")):
+        if file.suffix in (".py", ".bugs"):
+            total.update(file.read_bytes())
     return total.hexdigest()
 
 

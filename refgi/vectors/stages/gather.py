@@ -14,10 +14,10 @@ from refgi.scene import Scene
 from refgi.splat.gather.gather import DiscSettings, Interpolation
 from refgi.splat.gather.gather_sum import disc_offsets
 from refgi.splat.gather.interpolation import SimilarityLimits, coarse_pixels, interpolate
-from refgi.vectors.bugs.pair import RECEIVERS
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.gather_disc import OFFSET, PAPER, WEIGHT, Disc, add_centers, add_disc_sum, add_texels
+from refgi.vectors.stages.pairs import RECEIVERS
 
 
 def add_gather(

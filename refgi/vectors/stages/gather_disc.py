@@ -7,9 +7,9 @@ import numpy as np
 
 from refgi.rsm.raster.projection import Projection, project
 from refgi.splat.gather.gather_sum import GatherMap, centers, fill_texels, gather_discs
-from refgi.vectors.bugs.pair import RECEIVERS
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
+from refgi.vectors.stages.pairs import RECEIVERS
 
 OFFSET, WEIGHT = "gather.offset", "gather.weight"
 PAPER = "RSM 2005, Sec. 4; docs/methods/gather"

@@ -13,7 +13,7 @@ from refgi.splat.multires.settings import Representative
 from refgi.splat.multires.subsplats.detail import surface_detail
 from refgi.splat.multires.subsplats.evaluate import evaluate, points_of
 from refgi.vectors.bugs.detail import detail_bugs, light_bugs
-from refgi.vectors.bugs.pair import RECEIVERS, pair_bugs
+from refgi.vectors.bugs.pair import pair_bugs
 from refgi.vectors.bugs.subsplat import point_bugs
 from refgi.vectors.recipe import Recipe, reading
 from refgi.vectors.spec import Arrays, Bug, Run, Spec
@@ -22,6 +22,7 @@ from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.multires_list import SUBSPLATS, subsplats_of
 from refgi.vectors.stages.multires_ranges import covered_of, everywhere
 from refgi.vectors.stages.multires_upsample import LIGHT
+from refgi.vectors.stages.pairs import RECEIVERS
 
 POINTS = ("multires.point", "multires.normal")
 EQ2 = "AMS Eq. 2, E only; E-AMS-02"

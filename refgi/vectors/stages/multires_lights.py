@@ -14,7 +14,7 @@ from refgi.pairs.settings import PairSettings
 from refgi.splat.multires.refinement.grid import level_shape, representatives, top_level
 from refgi.splat.multires.settings import ByIrradiance
 from refgi.splat.multires.subsplats.upsample import upsample
-from refgi.vectors.bugs.pair import EQ2, RECEIVERS, pair_bugs
+from refgi.vectors.bugs.pair import pair_bugs
 from refgi.vectors.bugs.splits import SPLIT, split_bugs, splits
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
@@ -22,6 +22,7 @@ from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.multires_list import SUBSPLATS, subsplats_of
 from refgi.vectors.stages.multires_ranges import IDS, covered_of
 from refgi.vectors.stages.multires_upsample import LIGHT
+from refgi.vectors.stages.pairs import EQ2, RECEIVERS
 
 FIRST = "multires.first"
 SINGLE = ("half of the lights", "last light", "largest light", "0.1 m", "lights shine backwards",

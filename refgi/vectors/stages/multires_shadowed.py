@@ -10,12 +10,12 @@ import numpy as np
 
 from refgi.scene import Scene
 from refgi.splat.multires.multires import halved
-from refgi.vectors.bugs.pair import RECEIVERS
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec, Stage
 from refgi.vectors.stages import vpl
 from refgi.vectors.stages.multires_light import POINTS
 from refgi.vectors.stages.multires_upsample import LIGHT
+from refgi.vectors.stages.pairs import RECEIVERS
 
 PIXEL = "multires.pixel"
 NAMES = {vpl.FACING: "multires.facing", vpl.VISIBLE: "multires.visible", vpl.LIGHT: LIGHT}

@@ -4,16 +4,21 @@ from typing import Any
 
 import numpy as np
 
+from refgi.literal import pairs as literal
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
-from refgi.settings import of, replaced
-from refgi.vectors.bugs.pair import EQ2, RECEIVERS, as_printed, pair_bugs
-from refgi.vectors.bugs.pair_family import pair_family
+from refgi.settings import of
 from refgi.vectors.recipe import Recipe, writing
+from refgi.vectors.rows import Form
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import VECTOR
 from refgi.vectors.stages.lights import LIGHT, LOBE, light_names, pixel_lights_of
 
+EQ2 = "SII Eq. 2 and 3; unit directions and r^2 (E-SII-02)"
+RECEIVERS = ("gbuffer.position", "gbuffer.normal", "gbuffer.triangle_id")
+READS = {"position": "gbuffer.position", "normal": "gbuffer.normal", "light_position": "lights.position",
+         "light_normal": "lights.normal", "flux": "lights.flux"}
+LOBES = {"lobe_flux": "lights.lobe_flux", "lobe_axis": "lights.lobe_axis", "lobe_exponent": "lights.lobe_exponent"}
 AREA = "A = Omega d^2 / cos, times T/N w"
 NORM = "(P + 1) / (2 pi K), K the share of the lobe's integral above the surface; 0 where K is below 1e-12"
 
@@ -70,10 +75,13 @@ def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
     area = ("lights.area",) if settings.needs_footprints else ()
     glossy = "lights.lobe_flux" in recipe.specs
 
-    def run(arrays: Arrays, real: Any, how: PairSettings = settings) -> Arrays:
+    form = Form(literal.irradiance, {**READS, "triangle_id": "gbuffer.triangle_id", **(LOBES if glossy else {}),
+                                     **({"area": "lights.area"} if area else {})}, ("sum.irradiance",))
+
+    def run(arrays: Arrays, real: Any) -> Arrays:
         receivers = receivers_of(arrays, real)
         footprint = np.ascontiguousarray(arrays["lights.area"], np.float64) if area else None
-        return {"sum.irradiance": irradiance(receivers, pixel_lights_of(arrays, real), how, footprint)}
+        return {"sum.irradiance": irradiance(receivers, pixel_lights_of(arrays, real), settings, footprint)}
 
     recipe.facts["sum.clamp"] = "none" if settings.clamp is None else settings.clamp.name()
     recipe.facts["sum.lobe_norm"] = NORM
@@ -82,11 +90,15 @@ def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
     recipe.add("sum", "irradiance of every pixel light at every pixel, without visibility and albedo/pi", run,
                (*RECEIVERS, *names, *area),
                {"sum.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", EQ2)},
-               paper=EQ2, bugs=(*pair_bugs(run, bool(area), glossy), *pair_family(
-                   run, bool(area), glossy, count), *(
-                   (Bug("nothing is clamped", lambda a, r: run(a, r, replaced(settings, {"clamp": "none"})),
-                        "docs/methods/sii_sum"),) if settings.clamp is not None else ())),
-               exact=("gbuffer.position", "lights.position"), variants=(as_printed(False),))
+               paper=EQ2, exact=("gbuffer.position", "lights.position"), variants=(form.run(),),
+               bugs=form.bugs("pair", "irradiance", *_lists("irradiance", glossy, bool(area), count)))
+
+
+def _lists(entry: str, glossy: bool, disc: bool, count: int) -> tuple[str, ...]:
+    """Return the lists of rows that hold for lights with or without lobes and discs."""
+    kind = "glossy" if glossy else "diffuse"
+    return (*(("pair/disc",) if disc else ("pair/free", f"{entry}/free", f"pair/{kind} free")), f"pair/{kind}",
+            f"{entry}/{kind}", *(("pair/several",) if count > 1 else ()))
 
 
 def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) -> None:
@@ -100,6 +112,8 @@ def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) ->
                 Spec("row, receiver", "1", "0: all are surfaces", tier="T0"))
     names, glossy, bare = light_names(recipe), "lights.lobe_flux" in lights, of(PairSettings, clamp="none")
 
+    form = Form(literal.pairs, {**READS, **(LOBES if glossy else {})}, ("pairs.irradiance",))
+
     def run(arrays: Arrays, real: Any) -> Arrays:
         made = np.zeros((3, 1, count), real)
         for k in range(count):
@@ -111,8 +125,8 @@ def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) ->
     recipe.add("pairs", "irradiance of light k at receiver k", run, (*RECEIVERS, *names), {
         "pairs.irradiance": Spec("rgb, row, pair", "W/m^2", "irradiance; 0 where light and receiver coincide",
                                  "linear RGB", EQ2, alone=True)},
-        paper=EQ2, bugs=(*pair_bugs(run, False, glossy, own=True), *pair_family(run, False, glossy, count, own=True)),
-        exact=("gbuffer.position", "lights.position"), variants=(as_printed(True),))
+        paper=EQ2, bugs=form.bugs("pair", *_lists("pairs", glossy, False, count)),
+        exact=("gbuffer.position", "lights.position"), variants=(form.run(),))
 
 
 def _give_lights(recipe: Recipe, lights: Arrays) -> None:

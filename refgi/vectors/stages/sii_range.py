@@ -14,10 +14,10 @@ from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import LobeSettings, PairSettings
 from refgi.splat.sii.reach.reference_length import PAPER_LIGHTS, PAPER_OVERDRAW, reference_length, strengths
 from refgi.splat.sii.reach.threshold import all_peaks, threshold
-from refgi.vectors.bugs.pair import RECEIVERS
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
+from refgi.vectors.stages.pairs import RECEIVERS
 from refgi.vectors.stages.sii_range_sum import (
     BARE,
     BOTH,

@@ -10,10 +10,10 @@ from refgi.splat.sii.reach.bounds import appendix_ellipsoid, tangent_ellipsoid
 from refgi.splat.sii.reach.threshold import DIFFUSE, GLOSSY, light_range
 from refgi.splat.sii.settings import AbsoluteCut, FullBound, ReachSettings, RelativeCut, SiiSettings
 from refgi.splat.sii.sii import splat
-from refgi.vectors.bugs.pair import RECEIVERS
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
+from refgi.vectors.stages.pairs import RECEIVERS
 
 BOTH = ("diffuse", "glossy")
 LENGTH, LOW, LIGHT = "range.length", "range.low", "range.irradiance"

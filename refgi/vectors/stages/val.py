@@ -17,12 +17,12 @@ from refgi.cluster.settings import BackProjection, BoxBlur, Csm, GeometryBlur, H
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.scene import Scene
 from refgi.settings import replaced
-from refgi.vectors.bugs.pair import EQ2, RECEIVERS
 from refgi.vectors.bugs.val_sum import sum_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.facing import add_facing
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
+from refgi.vectors.stages.pairs import EQ2, RECEIVERS
 from refgi.vectors.stages.val_areas import add_areas
 from refgi.vectors.stages.val_basis import add_basis
 from refgi.vectors.stages.val_clusters import add_extents, add_kmeans, clusters_of, extent_of

@@ -15,11 +15,12 @@ from refgi.scene import Geometry, Scene
 from refgi.truth.imperfect import Imperfect, ImperfectDepth, fill_hidden
 from refgi.truth.vpl import VplSettings
 from refgi.vectors.bugs.imperfect_lookup import hidden_bugs, literal_hidden
-from refgi.vectors.bugs.pair import EQ2, RECEIVERS, pair_bugs
+from refgi.vectors.bugs.pair import pair_bugs
 from refgi.vectors.recipe import Recipe, reading, writing
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
 from refgi.vectors.stages.buffers import VECTOR, geometry_of
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
+from refgi.vectors.stages.pairs import EQ2, RECEIVERS
 from refgi.vectors.stages.vpl_maps import add_maps
 
 GEOMETRY = ("scene.vertices", "scene.faces")

@@ -55,10 +55,10 @@ class Form:
 
         return run
 
-    def bugs(self, *lists: str) -> tuple[Bug, ...]:
-        """Return the likely bugs of some lists, in the order of the file."""
-        return tuple(Bug(row.cause, _lazily(self, row), row.paper)
-                     for row in rows(self.function.__module__) if row.list in lists)
+    def bugs(self, *lists: str, of: str = "") -> tuple[Bug, ...]:
+        """Return the likely bugs of some lists, in the order of the file; `of`: a literal module that it calls."""
+        module = f"{PACKAGE}.{of}" if of else self.function.__module__
+        return tuple(Bug(row.cause, _lazily(self, row), row.paper) for row in rows(module) if row.list in lists)
 
 
 def _lazily(form: Form, row: Row) -> Run:

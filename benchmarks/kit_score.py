@@ -23,6 +23,7 @@ from rich.table import Table
 
 from refgi.testing import kit_folder
 from refgi.vectors.check import ALL_WITHIN, Asked, Kit, check_output
+from refgi.vectors.edits import StaleEditError, replaced
 from refgi.vectors.search import searched
 from refgi.vectors.spec import kind_of
 
@@ -96,10 +97,10 @@ def _score(port: str, right: Path, number: int, bug: dict[str, Any], *, seconds:
         folder = Path(name)
         source = _copied(right, folder)
         file = source / bug["file"]
-        text = file.read_text(encoding="utf-8")
-        if text.count(bug["old"]) != 1:
-            return Score(port, number, bug["what"], "does not build", False, "its text is not there once", ())
-        file.write_text(text.replace(bug["old"], bug["new"]), encoding="utf-8")
+        try:
+            file.write_text(replaced(file.read_text(encoding="utf-8"), bug["old"], bug["new"]), encoding="utf-8")
+        except StaleEditError as error:
+            return Score(port, number, bug["what"], "does not build", False, str(error), ())
         said = _build(port, source, bug["file"])
         if said:
             return Score(port, number, bug["what"], "does not build", False, said, ())

@@ -117,12 +117,6 @@ LONG = {
         "test_the_twins_pass[sii-warp-a-True]",
     ),
     "tests/vectors/test_port_c.py": ("test_the_buffers_of_every_method_are_within",),
-    "tests/vectors/test_search.py": (
-        "test_a_wrong_sign_that_is_no_likely_bug_is_named",
-        "test_it_is_asked_for_on_the_command_line",
-        "test_known_causes_come_first_and_time_ends_a_search",
-        "test_what_nothing_explains_stays_without_a_cause",
-    ),
     "tests/vectors/test_truth_stages.py": (
         "test_a_sum_over_the_light_s_cone_agrees",
         "test_another_estimator_agrees[truth-visible]",

@@ -20,6 +20,7 @@ from benchmarks.mutate.project import REFGI
 from benchmarks.mutate.scratch import Scratch, remove_copies
 from benchmarks.stability.runner import PARTS
 from refgi.stress.rows import read_rows
+from refgi.vectors.edits import replaced
 
 FAULTS = Path(__file__).with_name("precision_faults.toml")
 ORDER = sorted(PARTS, key=["kernels", "pictures", "rays", "sameness", "files", "faults", "kills"].index)
@@ -38,9 +39,7 @@ class PrecisionFault(NamedTuple):
 
     def put_into(self, text: str) -> str:
         """Return the text of its file with the line changed."""
-        if text.count(self.old) != 1:
-            raise ValueError(f"{self.name}: its line does not stand once in {self.file}")
-        return text.replace(self.old, self.new)
+        return replaced(text, self.old, self.new, f"{self.name}, {self.file}")
 
 
 def faults() -> list[PrecisionFault]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from refgi.literal import pairs
-from refgi.vectors import rows
+from refgi.vectors import edits, rows
 
 MODULES = rows.literal_modules()
 KNOWN = ("numpy", "functools", "math", "typing", "collections.abc", "itertools")
@@ -23,8 +23,8 @@ def test_each_row_edits_one_place_of_some_function(module):
 def fits(function, row):
     """Return whether an edit matches once and leaves a program."""
     try:
-        return rows.edited(function, row.edits) is not None
-    except rows.StaleRowError:
+        return edits.edited(function, row.edits) is not None
+    except edits.StaleEditError:
         return False
 
 
@@ -38,17 +38,17 @@ def test_literal_text_imports_numpy_alone(module):
 
 def test_an_edit_changes_the_function_alone_that_it_is_asked_of():
     w, m = np.array([[0.0], [0.0], [1.0]]), np.array([[0.0], [0.0], [1.0]])
-    doubled = rows.edited(pairs.lobe_intensity, (("(exponent + 1) / (2 * np.pi) /", "(exponent + 1) / np.pi /"),))
+    doubled = edits.edited(pairs.lobe_intensity, (("(exponent + 1) / (2 * np.pi) /", "(exponent + 1) / np.pi /"),))
     right = pairs.lobe_intensity(w, m, m, np.array([7.0]))
     assert right == pytest.approx(8 / (2 * np.pi))  # a lobe along the normal lies above the surface as a whole
     assert doubled(w, m, m, np.array([7.0])) == pytest.approx(2 * right)
     assert pairs.lobe_intensity(w, m, m, np.array([7.0])) == pytest.approx(right)
 
 
-@pytest.mark.parametrize("edits", [(("no such text", "0"),), (("np", "0"),), (("r = np.sqrt(", "r = = np.sqrt("),)])
-def test_an_edit_that_does_not_fit_once_or_leaves_no_program_is_refused(edits):
-    with pytest.raises(rows.StaleRowError, match=r"refgi\.literal\.pairs\.pair"):
-        rows.edited(pairs.pair, edits)
+@pytest.mark.parametrize("wrong", [(("no such text", "0"),), (("np", "0"),), (("r = np.sqrt(", "r = = np.sqrt("),)])
+def test_an_edit_that_does_not_fit_once_or_leaves_no_program_is_refused(wrong):
+    with pytest.raises(edits.StaleEditError, match=r"refgi\.literal\.pairs\.pair"):
+        edits.edited(pairs.pair, wrong)
 
 
 @pytest.mark.parametrize("line", ["a cause :: pair", "a cause :: pair :: no arrow", "a cause :: pair :: => new"])
@@ -56,7 +56,7 @@ def test_a_line_that_is_no_row_is_refused(line, monkeypatch):
     monkeypatch.setattr(rows.resources, "files", lambda _: Text(line))
     rows.rows.cache_clear()
     try:
-        with pytest.raises(rows.StaleRowError, match=r"pairs\.bugs:1: expected"):
+        with pytest.raises(edits.StaleEditError, match=r"pairs\.bugs:1: expected"):
             rows.rows("refgi.literal.pairs")
     finally:
         rows.rows.cache_clear()

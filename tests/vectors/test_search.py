@@ -1,6 +1,7 @@
-"""The search for a cause among single changes of refgi's source: ports with bugs that no likely bug is."""
+"""The search for a cause among single changes of the literal text: ports with bugs that no likely bug is."""
 
 import ast
+import inspect
 import math
 
 import numpy as np
@@ -8,12 +9,11 @@ import pytest
 from click.testing import CliRunner
 
 from refgi.cli.group import VerbGroup
-from refgi.errors import RefgiError
+from refgi.literal import pairs as literal
+from refgi.vectors.changes import changes_of
 from refgi.vectors.check import Asked, check_output
-from refgi.vectors.kit import Kit
 from refgi.vectors.manifest import CommonCause, Result
-from refgi.vectors.search import searched
-from refgi.vectors.search.edits import edits_of
+from refgi.vectors.search import TooSlowError, limited, searched
 from refgi.vectors.spec import stored
 
 FUNCTION = '''
@@ -33,7 +33,7 @@ def changed():
     tree = ast.parse(FUNCTION)
     before = ast.dump(tree)
     found = {}
-    for edit in edits_of(tree.body[0]):
+    for edit in changes_of(tree.body[0]):
         edit.put()
         compile(tree, "area.py", "exec")
         found[ast.unparse(tree.body[0])] = edit.is_name
@@ -65,49 +65,43 @@ def test_docstrings_annotations_and_names_of_functions_stay():
 
 
 def test_what_is_told_is_short_and_says_both():
-    said = [edit.said for edit in edits_of(ast.parse(FUNCTION).body[0])]
+    said = [edit.said for edit in changes_of(ast.parse(FUNCTION).body[0])]
     assert "`range(1, i - 1)` for `range(1, i)`" in " ".join(said)
     assert max(map(len, said)) < 320
 
 
-def samples(kit, sign):
-    """Return the samples of a level in NumPy, from a kit's inputs: crown points turned by each texel's own angle.
-
-    HSSIL Sec. 3.2: r (1 + u) from the receiver, 2 pi r l over N and pi r^2 texels each. `sign` is of the second row of
-    the rotation: 1 is right.
-    """
-    case = next(one for one in kit.cases(Asked(cases=("hssil-default",))) if one.id == "hssil-default")
-    points, shifts = (kit.array(case, f"samples3.{name}").astype(float) for name in ("points", "shifts"))
-    facts = case.facts["samples3"]
-    u = (points[:, 0] + shifts[..., :1]) % 1
-    turn = 2 * math.pi * shifts[..., 1:]
-    length = facts["radius"] * (1 + u)
-    x = length * (points[:, 1] * np.cos(turn) - points[:, 2] * np.sin(turn))
-    y = length * (sign * points[:, 1] * np.sin(turn) + points[:, 2] * np.cos(turn))
-    weight = 2 * math.pi * facts["radius"] * length / facts["crown"]
-    return {"samples3.offsets": np.floor(np.stack([x, y], -1) + 0.5).astype(int), "samples3.weight": weight}
+def pairs(kit, wrong):
+    """Return diffuse irradiance of pairs in NumPy, from a kit's inputs (SII Eq. 2); wrong: the light's cosine twice."""
+    case = next(one for one in kit.cases(Asked(cases=("pairs-diffuse",))) if one.id == "pairs-diffuse")
+    x, n, p, m, flux = (kit.array(case, name).astype(float).reshape(3, -1) for name in (
+        "gbuffer.position", "gbuffer.normal", "lights.position", "lights.normal", "lights.flux"))
+    d = x - p
+    square = np.maximum((d * d).sum(axis=0), 1e-100)
+    arriving, leaving = (np.maximum(0, (sign * normal * d).sum(axis=0)) for sign, normal in ((-1, n), (1, m)))
+    cosines = leaving * (leaving if wrong else arriving)
+    return {"pairs.irradiance": (flux * cosines / (math.pi * square**2))[:, None]}
 
 
 def written(folder, arrays):
-    (folder / "hssil-default").mkdir(parents=True)
+    (folder / "pairs-diffuse").mkdir(parents=True)
     for name, array in arrays.items():
-        np.save(folder / "hssil-default" / f"{name}.npy", stored(array))
+        np.save(folder / "pairs-diffuse" / f"{name}.npy", stored(array))
     return folder
 
 
-def test_a_wrong_sign_that_is_no_likely_bug_is_named(kit, tmp_path, evidence):
-    output = written(tmp_path / "wrong", samples(kit, -1))
+def test_a_wrong_name_that_is_no_likely_bug_is_named(kit, tmp_path, evidence):
+    output = written(tmp_path / "wrong", pairs(kit, wrong=True))
     result = check_output(kit, output, Asked())
-    assert result.first == ("hssil-default", "samples3")
+    assert result.first == ("pairs-diffuse", "pairs")
     assert not any(cause.explained for cause in result.findings[0].causes)
     told = []
     found = searched(kit, output, Asked(), result, tell=lambda what, done: told.append((what, done)))
     first, *_ = found.findings[0].causes
     evidence(f"found: {first.cause}")
-    assert "sine" in first.cause
-    assert "sssil/crown/points.py" in first.cause
+    assert "`term = sent * sent * fall`" in first.cause
+    assert "literal/pairs.py:" in first.cause
     assert first.explained == 1
-    assert told[0][0].startswith("samples: ")
+    assert told[0][0].startswith("pairs: ")
     assert 0 <= told[-1][1] <= 1
     own = {one.causes[0].cause for one in found.stages if (one.case, one.stage) == result.first}
     assert own == {first.cause}  # the page and the table tell it too
@@ -115,21 +109,29 @@ def test_a_wrong_sign_that_is_no_likely_bug_is_named(kit, tmp_path, evidence):
     assert others == [one for one in result.stages if (one.case, one.stage) != result.first]
 
 
+def test_the_line_told_is_that_of_the_file(kit, tmp_path):
+    output = written(tmp_path / "wrong", pairs(kit, wrong=True))
+    result = check_output(kit, output, Asked())
+    cause = searched(kit, output, Asked(), result).findings[0].causes[0].cause
+    number = int(cause.partition("literal/pairs.py:")[2].split()[0])
+    assert "term = sent * received * fall" in inspect.getsource(literal).splitlines()[number - 1]
+
+
 def test_it_is_asked_for_on_the_command_line(kit, tmp_path):
-    output = written(tmp_path / "wrong", samples(kit, -1))
-    arguments = ["vectors", "check", str(kit.folder), str(output), "--case", "hssil-default"]
+    output = written(tmp_path / "wrong", pairs(kit, wrong=True))
+    arguments = ["vectors", "check", str(kit.folder), str(output), "--case", "pairs-diffuse"]
     without = CliRunner().invoke(VerbGroup.refgi(), arguments)
     assert without.exit_code == 1
-    assert "points.py" not in without.stdout
+    assert "pairs.py" not in without.stdout
     done = CliRunner().invoke(VerbGroup.refgi(), [*arguments, "--search", "60", "--json", str(tmp_path / "found.json")])
     assert done.exit_code == 1, done.output
-    assert "as if refgi's sssil/crown/points.py" in " ".join(done.stdout.split())
+    assert "as if refgi's literal/pairs.py" in " ".join(done.stdout.split())
     found = Result.model_validate_json((tmp_path / "found.json").read_text())
-    assert "points.py" in found.findings[0].causes[0].cause
+    assert "pairs.py" in found.findings[0].causes[0].cause
 
 
 def test_known_causes_come_first_and_time_ends_a_search(kit, tmp_path):
-    output = written(tmp_path / "wrong", samples(kit, -1))
+    output = written(tmp_path / "wrong", pairs(kit, wrong=True))
     result = check_output(kit, output, Asked())
     known = CommonCause(cause="known", explained=1, tried=1)
 
@@ -139,30 +141,34 @@ def test_known_causes_come_first_and_time_ends_a_search(kit, tmp_path):
 
     first, second, *_ = searched(kit, output, Asked(), having(1)).findings[0].causes
     assert first == known
-    assert "points.py" in second.cause
+    assert "pairs.py" in second.cause
     assert searched(kit, output, Asked(), having(3)) == having(3)
     assert searched(kit, output, Asked(), result, seconds=1e-9) == result
 
 
 def test_nothing_is_searched_where_nothing_is_wrong(kit, tmp_path):
-    output = written(tmp_path / "right", samples(kit, 1))
+    output = written(tmp_path / "right", pairs(kit, wrong=False))
     result = check_output(kit, output, Asked())
     assert result.first is None
     assert searched(kit, output, Asked(), result) is result
 
 
 def test_what_nothing_explains_stays_without_a_cause(kit, tmp_path):
-    made = samples(kit, 1)
-    made["samples3.weight"] = made["samples3.weight"] * np.random.default_rng(0).uniform(0.5, 2, (4, 4, 12))
+    made = pairs(kit, wrong=False)
+    made["pairs.irradiance"] = made["pairs.irradiance"] * np.random.default_rng(0).uniform(0.5, 2, made[
+        "pairs.irradiance"].shape)
     output = written(tmp_path / "noise", made)
     result = check_output(kit, output, Asked())
     assert searched(kit, output, Asked(), result, seconds=5.0) == result
 
 
-def test_a_search_that_fails_says_why(kit, tmp_path, monkeypatch):
-    output = written(tmp_path / "wrong", samples(kit, -1))
-    result = check_output(kit, output, Asked())
-    gone = Kit(kit.folder)
-    monkeypatch.setattr(gone, "folder", tmp_path / "gone")
-    with pytest.raises(RefgiError, match=r"search: the process ended with nothing: .*gone"):
-        searched(gone, output, Asked(), result)
+def test_a_change_that_never_ends_is_left():
+    def endless():
+        with limited(0.05):
+            while True:
+                pass
+
+    with pytest.raises(TooSlowError):
+        endless()
+    with limited(0.05):
+        assert sum(range(10)) == 45

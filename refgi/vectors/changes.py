@@ -35,9 +35,10 @@ Holders = dict[ast.AST, Holder]
 
 
 @dataclass(frozen=True, eq=False)
-class Edit:
+class Change:
     """One change: `other` in place of `node`."""
 
+    root: Any  # the function
     node: ast.AST
     other: ast.AST
     holders: Holders  # of all nodes of the function
@@ -80,7 +81,7 @@ class Edit:
             getattr(parent, field)[place] = node
 
 
-def edits_of(function: ast.AST) -> list[Edit]:
+def changes_of(function: ast.AST) -> list[Change]:
     """Return the changes of a function's body.
 
     Parameters
@@ -90,7 +91,7 @@ def edits_of(function: ast.AST) -> list[Edit]:
 
     Returns
     -------
-    list of Edit
+    list of Change
         Each leaves a tree that is a program, if not always one that runs.
     """
     holders = dict(_below(function))
@@ -102,7 +103,7 @@ def edits_of(function: ast.AST) -> list[Edit]:
             for other in others:
                 if not hasattr(other, "lineno"):  # new, not a part of what was there
                     ast.fix_missing_locations(ast.copy_location(other, node))
-                found.append(Edit(node, other, holders, is_name))
+                found.append(Change(function, node, other, holders, is_name))
     return found
 
 

@@ -20,8 +20,9 @@ from refgi.diagnostics import diagnosing
 from refgi.methods import render
 from refgi.scene import Scene
 from refgi.settings import flat
+from refgi.vectors.forms import described
 from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Array, Arrays, Case, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Bug, Case, Run, Spec
 
 LEFT_OUT = frozenset({"scene.load", "rays.build", "rsm.resolve", "rsm.rasterize", "lights.shares", "lights.map_flux",
                       "cluster.occluders", "cluster.blockers",
@@ -135,8 +136,15 @@ def _add(recipe: Recipe, known: _Known, name: str, run: stages.Run, outputs: Map
         known.add(writes[leaf], array)
     specs = {writes[leaf]: spec_of(field_description(run.value, leaf) or told.get("", ""), array, leaf or name)
              for leaf, array in outputs.items()}
+    form, bugs, exact = None, tuple[Bug, ...](), tuple[str, ...]()
+    if (beside := described(run.name, arguments)) is not None:
+        form = dataclasses.replace(beside.form, reads={key: reads[leaf] for key, leaf in beside.form.reads.items()},
+                                   writes=tuple(writes[leaf] for leaf in beside.form.writes))
+        bugs = tuple(bug for module, rows in beside.lists for bug in form.bugs(rows, of=module))
+        exact = tuple(reads[leaf] for leaf in beside.exact)
     recipe.add(name, _summary(function), _run(function, arguments, reads, writes), tuple(dict.fromkeys(reads.values())),
-               specs, paper=f"{function.__module__}.{function.__name__}")
+               specs, paper=f"{function.__module__}.{function.__name__}", bugs=bugs, exact=exact,
+               variants=() if form is None else (form,))
 
 
 def _run(

@@ -110,6 +110,34 @@ def test_axes_and_units_are_those_of_docstrings_and_comments():
     assert specs["lights.choose.texel"].unit == "1"
 
 
+def test_likely_bugs_and_the_search_know_stages_that_have_a_literal_form(tmp_path):
+    kit, manifest, output = exported(tmp_path, "sii")
+    assert check_output(kit, output.parent, Asked()).exit_code == 0
+    total = next(step for step in manifest.stages if step.name == "pairs.sum")
+    read = {name: kit.array(manifest, name).astype(float) for name in total.reads}
+    # each light's flux over the hemisphere, 1/(2 pi) in place of 1/pi: half of the diffuse light is missing
+    diffuse = diffuse_light(read)
+    right = kit.array(manifest, "pairs.sum")
+    np.save(output / "pairs.sum.npy", (right - 0.5 * diffuse).astype(np.float32))
+    result = check_output(kit, output.parent, Asked())
+    assert result.first == (manifest.id, "pairs.sum")
+    assert "over the hemisphere: 1/(2 pi)" in result.findings[0].causes[0].cause
+
+
+def diffuse_light(read):
+    """Return Eq. 2 of a kit's arrays in a loop over lights, discs of their footprints in place of points."""
+    x, n = read["rsm.gbuffer.position"], read["rsm.gbuffer.normal"]
+    total = np.zeros_like(x)
+    for p, m, flux, area in zip(read["lights.choose.position"].T, read["lights.choose.normal"].T,
+                                read["lights.choose.flux"].T, read["lights.footprints"], strict=True):
+        d = x - p[:, None, None]
+        square = (d**2).sum(axis=0)
+        cosines = np.maximum(0, -(n * d).sum(axis=0)) * np.maximum(0, np.einsum("c,cij->ij", m, d))
+        term = np.divide(cosines, np.pi * square * (square + area / np.pi), out=np.zeros_like(square), where=square > 0)
+        total += flux[:, None, None] * term
+    return total
+
+
 def test_more_than_the_room_is_refused_before_anything_is_written(tmp_path):
     case = recorded_case("sii-heap", heap(), "sii", **SIZE)
     with pytest.raises(InputError, match=r"expected a kit of at most 0\.01 MB, got .*--size"):

@@ -3,7 +3,8 @@
 Rows lie beside the file that they edit, `refgi/literal/*.bugs`. `old` stands exactly once, in one line, in the function
 of a form or in those of refgi.literal that it calls, docstrings apart; several edits are joined by ` ;; `. `list` names
 the rows that a stage has, by custom the function and what it needs: `pair`, `pair/glossy`. `paper` may be left out.
-Empty lines and those that begin with `#` are passed over.
+Empty lines and those that begin with `#` are passed over. `new` may name `arrays`, all that the stage reads, for bugs
+that take a wrong one.
 """
 
 import ast
@@ -21,6 +22,7 @@ from refgi.vectors.spec import Arrays, Bug, Run
 
 PACKAGE = "refgi.literal"
 Edits = tuple[tuple[str, str], ...]
+Read = str | tuple[str | None, ...]  # name of an array; None: what one of several has not
 
 
 class Row(NamedTuple):
@@ -41,7 +43,7 @@ class Form:
     """The literal form of a stage: which function, what it reads and writes."""
 
     function: Callable[..., Any]
-    reads: Mapping[str, str]  # parameter: array
+    reads: Mapping[str, Read]  # parameter: array, or a tuple of some
     writes: tuple[str, ...]  # in the order in which the function returns them
     numbers: Mapping[str, Any] = field(default_factory=dict)  # its other arguments
 
@@ -50,7 +52,7 @@ class Form:
         called = function or self.function
 
         def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 literal forms compute in the type of arrays
-            made = called(**{name: arrays[array] for name, array in self.reads.items()}, **self.numbers)
+            made = called(**{name: _read(arrays, array) for name, array in self.reads.items()}, **self.numbers)
             return dict(zip(self.writes, made if len(self.writes) > 1 else (made,), strict=True))
 
         return run
@@ -61,15 +63,21 @@ class Form:
         return tuple(Bug(row.cause, _lazily(self, row), row.paper) for row in rows(module) if row.list in lists)
 
 
+def _read(arrays: Arrays, name: Read | None) -> Any:
+    return None if name is None else arrays[name] if isinstance(name, str) else tuple(
+        _read(arrays, one) for one in name)
+
+
 def _lazily(form: Form, row: Row) -> Run:
     """Return what a stage runs with a bug; the text is edited when it first runs."""
     @functools.cache
-    def made() -> Run:
-        return form.run(edited(form.function, row.edits, row.cause))
+    def made() -> types.FunctionType:
+        return edited(form.function, row.edits, row.cause)
 
     def run(arrays: Arrays, real: Any) -> Arrays:
+        made().__globals__["arrays"] = arrays
         with np.errstate(all="ignore"):  # a bug may divide by 0
-            return made()(arrays, real)
+            return form.run(made())(arrays, real)
 
     return run
 
@@ -104,7 +112,7 @@ def _row(line: str, where: str) -> Row:
     return Row(parts[0], parts[1], tuple((edit[0], edit[1]) for edit in edits), parts[3] if len(parts) == 4 else "")
 
 
-def edited(function: Callable[..., Any], edits: Edits, what: str = "edit") -> Callable[..., Any]:
+def edited(function: Callable[..., Any], edits: Edits, what: str = "edit") -> types.FunctionType:
     """Return a literal function with edits in its text or in that of the literal functions that it calls.
 
     Raises
@@ -124,7 +132,7 @@ def edited(function: Callable[..., Any], edits: Edits, what: str = "edit") -> Ca
 
 def _compiled(
     function: Callable[..., Any], parts: Mapping[types.FunctionType, str], what: str
-) -> Callable[..., Any]:
+) -> types.FunctionType:
     """Return a function anew from the texts of itself and of those that it calls."""
     scope: dict[str, Any] = {}
     for one in parts:

@@ -5,31 +5,33 @@ half extent of the image plane. Row 0 is the top row; texel centres lie at + 1/2
 """
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from refgi.literal import buffers as literal
+from refgi.literal import light_flux
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.light_projection import light_projection
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.buffers.solid_angle import texel_solid_angles
-from refgi.rsm.raster.projection import Projection, camera_projection
+from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, camera_projection
 from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
 from refgi.scene import DirectionalLight, Geometry, PointLight, Scene, SpotLight, material_table
 from refgi.scene.material import MaterialTable
 from refgi.scene.model import Light
 from refgi.vectors.bounds import ROUNDING
-from refgi.vectors.bugs.flux import flux_family
-from refgi.vectors.bugs.ids import ids_family
-from refgi.vectors.bugs.surface import surface_family
-from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.recipe import Recipe, writing
+from refgi.vectors.rows import Form, Read
+from refgi.vectors.spec import Array, Arrays, Run, Spec
 
 VECTOR, POINT = "unit vector", "m"
 QUADRATURE = 8.0  # roundings that a float32 sum over a texel's nodes gathers; the bound is SAFETY times as wide
 SCENE = ("scene.vertices", "scene.faces", "scene.material_of_face")
 REFLECTANCE = ("materials.diffuse", "materials.specular", "materials.exponent")
 EARLIER = "before"  # the camera of the frame before, whose bugs are those of the camera
+VIEWS = "view/centre", "view/resolution", "view/frame", "view/origin", "view/extent"
 NAMES = {SpotLight: "spot", PointLight: "point", DirectionalLight: "directional"}
 
 
@@ -87,25 +89,46 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
                    f"{name}.lobe_axis": Spec(f"xyz, {sheet}", VECTOR, "mirror direction; 0 without a lobe", "world",
                                              "r = d - 2 (n . d) n"),
                    f"{name}.lobe_exponent": Spec(sheet, "1", "Phong exponent; 0 without a lobe")}
-    even = f"{name}.solid_angle", f"{name}.flux"
-
-    def equal(arrays: Arrays, real: Any) -> Arrays:
-        made = dict(flux(arrays, real))
-        angle = made[even[0]]
-        mean = np.full_like(angle, angle.mean())
-        return made | {even[0]: mean, even[1]: made[even[1]] * (mean / angle).astype(real)}
-
     # a spot's flux is an integral over each texel, which refgi takes in float64 in any run
     summed = writing(flux, **{f"{name}__flux": lambda a: (a * (1.0 + QUADRATURE * ROUNDING)).astype(a.dtype)})
+    spot = isinstance(light, SpotLight)
+    form = _flux_form(recipe, name, lamp, light, maps)
     recipe.add(f"{name}.flux", "flux that leaves each texel's surface", flux, reads, writes,
-               paper="SII Sec. 3.1; docs/radiometry", variants=(summed,) if isinstance(light, SpotLight) else (),
-               bugs=(
-                   Bug("every texel has the same solid angle", equal, "Nichols and Wyman 2009, Fig. 13"),
-                   Bug("the albedo is left out", reading(flux, materials__diffuse=np.ones_like,
-                                                         materials__specular=_ones_where_any), "Phi_t = albedo ..."),
-                   Bug("flux is divided by pi", writing(flux, **{f"{name}__flux": lambda a: a / np.pi}),
-                       "flux is W; 1/pi comes with Eq. 1"),
-                   *flux_family(name, lamp, light, maps, glossy)))
+               paper="SII Sec. 3.1; docs/radiometry",
+               variants=(in_float64(form.run()), *((summed,) if spot else ())),
+               bugs=(*form.bugs(*_flux_lists(light, maps, glossy), *(falloff_lists([light]) if spot else ())),
+                     *form.bugs(*_view_lists_of_flux(maps, glossy), of="buffers")))
+
+
+def _flux_form(recipe: Recipe, name: str, lamp: str, light: Light, maps: Projection) -> Form:
+    spot, directional = isinstance(light, SpotLight), isinstance(light, DirectionalLight)
+    reads = {"triangle_id": f"{name}.triangle_id", "vertices": "scene.vertices", "faces": "scene.faces",
+             "material_of_face": "scene.material_of_face", **{key.split(".")[1]: key for key in REFLECTANCE},
+             **_view_reads(name), "strength": f"{lamp}.{'irradiance' if directional else 'intensity'}",
+             **{key.split(".")[1]: key for key in _normals(recipe)},
+             **({"half_angles": f"{lamp}.half_angles"} if spot else {})}
+    falloff = {"falloff": light.falloff} if isinstance(light, SpotLight) else {}
+    return Form(light_flux.reflected_flux, reads, tuple(f"{name}.{key}" for key in (
+        "solid_angle", "flux", "lobe_flux", "lobe_axis", "lobe_exponent")), _view_numbers(maps) | falloff)
+
+
+def _flux_lists(light: Light, maps: Projection, glossy: bool) -> tuple[str, ...]:
+    return ("flux", f"flux/{_view_kind(maps)}", *(("flux/spot",) if isinstance(light, SpotLight) else ()),
+            *(("flux/cube",) if maps.maps > 1 else ()), *(("flux/glossy",) if glossy else ()),
+            *(("flux/glossy cube",) if glossy and maps.maps > 1 else ()))
+
+
+def _view_lists_of_flux(maps: Projection, glossy: bool) -> tuple[str, ...]:
+    """Return lists of what the mirror directions of lobes, and solid angles, tell of a view."""
+    return (*(("view/frame",) if glossy else ()), *(("view/cube rows",) if maps.maps > 1 else ()),
+            *(("view/cube",) if glossy and maps.maps > 1 else ()))
+
+
+def falloff_lists(lights: Sequence[Light]) -> tuple[str, ...]:
+    """Return lists of wrong falloffs of some lights' spots: what is right for all of them is none."""
+    kinds = {light.falloff for light in lights if isinstance(light, SpotLight)}
+    return (*(("falloff",) if kinds else ()), *(("falloff/smooth",) if kinds - {"squared_ramp"} else ()),
+            *(("falloff/squared",) if "squared_ramp" in kinds else ()))
 
 
 def rsm_of(
@@ -144,10 +167,6 @@ def light_of(arrays: Arrays, lamp: str, light: Light) -> Light:
         value |= {"inner_half_angle": min(inner, outer), "outer_half_angle": outer, "falloff": light.falloff}
     made: Light = type(light)(**value)
     return made
-
-
-def _ones_where_any(array: Array) -> Array:
-    return np.where(array > 0, 1.0, array).astype(array.dtype)
 
 
 def _normals(recipe: Recipe) -> tuple[str, ...]:
@@ -205,15 +224,43 @@ def _visible(triangle_id: Array) -> Visibility:
 
 
 def _add_ids(recipe: Recipe, name: str, view: str, maps: Projection, scene: Scene) -> None:
+    form = Form(literal.visible_triangles, {"vertices": "scene.vertices", "faces": "scene.faces", **_view_reads(view)},
+                (f"{name}.triangle_id",), _view_numbers(maps))
+    kind = _view_kind(maps)
+
     def ids(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 the rasterizer has one precision
         return {f"{name}.triangle_id": rasterize(geometry_of(arrays, scene), _maps_of(arrays, view, maps)).triangle_id}
 
-    mirrored = reading(ids, **{f"{view}__half": lambda half: half * (1, -1)})
+    lists = () if name == EARLIER else ("triangles", f"triangles/{kind}", *VIEWS, *_cube_lists(maps), *(
+        ("triangles/cube",) if maps.maps > 1 else ()))
     recipe.add(f"{name}.ids", "nearest triangle at each texel's centre", ids, (*SCENE, *_map_names(view)),
                {f"{name}.triangle_id": Spec("row, column", "1", "nearest triangle, -1 for none", tier="T0")},
-               paper="docs/rasterizer", bugs=(
-                   *(() if name == EARLIER else ids_family(name, view, maps)),
-                   Bug("rows run upwards: upside down", mirrored, "row 0 is the top row (docs/conventions)")))
+               paper="docs/rasterizer", bugs=form.bugs("view/upwards", *lists), variants=(in_float64(form.run()),))
+
+
+def in_float64(run: Run) -> Run:
+    """Return the run of a stage that computes in float64 whatever it reads, as refgi does where digits cancel."""
+    def run_in_float64(arrays: Arrays, real: Any) -> Arrays:
+        return run({name: array.astype(np.float64) if array.dtype.kind == "f" else array
+                    for name, array in arrays.items()}, real)
+
+    return run_in_float64
+
+
+def _view_reads(view: str) -> dict[str, Read]:
+    return {key: f"{view}.{key}" for key in ("origin", "frame", "half")}
+
+
+def _view_numbers(maps: Projection) -> dict[str, Any]:
+    return {"rows": maps.height, "columns": maps.width, "parallel": maps.kind == ORTHOGRAPHIC}
+
+
+def _view_kind(maps: Projection) -> str:
+    return "parallel" if maps.kind == ORTHOGRAPHIC else "perspective"
+
+
+def _cube_lists(maps: Projection) -> tuple[str, ...]:
+    return ("view/cube", "view/cube down") if maps.maps > 1 else ()
 
 
 def _half_texel(maps: Projection) -> Any:
@@ -228,7 +275,12 @@ def _half_texel(maps: Projection) -> Any:
 def _add_surface(
     recipe: Recipe, name: str, view: str, maps: Projection, scene: Scene, channels: tuple[str, ...]
 ) -> None:
-    materials = ("materials.diffuse", "materials.specular", "materials.exponent")
+    smooth = bool(_normals(recipe))
+    reads = {key: f"scene.{key}" for key in ("vertices", "faces", "material_of_face",
+                                             *(("vertex_normals",) if smooth else ()))}
+    form = Form(literal.surface, {**reads, "diffuse": "materials.diffuse", "triangle_id": f"{name}.triangle_id",
+                                  **_view_reads(view)},
+                tuple(f"{name}.{key}" for key in ("depth", "position", "normal", "albedo")), _view_numbers(maps))
 
     def surface(arrays: Arrays, real: Any) -> Arrays:
         buffer = GBuffer(geometry_of(arrays, scene), materials_of(arrays, real), _maps_of(arrays, view, maps),
@@ -239,21 +291,11 @@ def _add_surface(
              "position": Spec("xyz, row, column", "m", "surface point; 0 without surface", "world"),
              "normal": Spec("xyz, row, column", VECTOR, "on the side that is seen; 0 without surface", "world"),
              "albedo": Spec("rgb, row, column", "1", "diffuse reflectance; 0 without surface", "linear RGB")}
-    flat = Bug("normals are not turned to the side that is seen", _unturned(surface, name, arrays_of=scene), "")
-    family = () if name == EARLIER else surface_family(name, view, maps, channels, bool(_normals(recipe)))
+    lists = () if name == EARLIER else (
+        "surface", f"surface/{_view_kind(maps)}", *VIEWS, *_cube_lists(maps), *(
+            ("view/cube rows",) if maps.maps > 1 else ()), *(("surface/smooth",) if smooth else ()), *(
+            ("surface/albedo",) if "albedo" in channels else ()))
     recipe.add(f"{name}.surface", "depth, position and normal of what each texel sees", surface,
-               (*SCENE, *_normals(recipe), *materials, *_map_names(view), f"{name}.triangle_id"),
-               {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1", bugs=(flat, *family))
-
-
-def _unturned(run: Any, name: str, arrays_of: Scene) -> Any:
-    """Return the stage with each triangle's normal as its winding gives it."""
-    def altered(arrays: Arrays, real: Any) -> Arrays:
-        made = dict(run(arrays, real))
-        geometry, ids = geometry_of(arrays, arrays_of), np.asarray(arrays[f"{name}.triangle_id"])
-        a, b, c = (geometry.vertices[geometry.faces[:, k]] for k in range(3))
-        wound = np.moveaxis(np.cross(b - a, c - a)[ids], -1, 0)
-        normal = made[f"{name}.normal"]
-        return made | {f"{name}.normal": np.where((wound * normal).sum(axis=0) < 0, -normal, normal)}
-
-    return altered
+               (*SCENE, *_normals(recipe), *REFLECTANCE, *_map_names(view), f"{name}.triangle_id"),
+               {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1",
+               bugs=form.bugs("surface/side", *lists), variants=(in_float64(form.run()),))

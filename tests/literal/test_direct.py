@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from refgi.literal.buffers import surface, visible_triangles
-from refgi.literal.direct import direct_irradiance, shadow_map, shadow_rays
+from refgi.literal.direct import direct_irradiance, plane_bias, shadow_map, shadow_rays
 from refgi.rays import Tracer
-from refgi.rsm.raster.projection import cube_projection
+from refgi.rsm.raster.projection import cube_projection, directional_projection
 from refgi.scene import DirectionalLight, Geometry, PointLight
 
 LAMP = np.array([0.3, 2.5, -0.2])
-EDGES = 0.05  # share of points in the texels that a shadow's edge runs through: a map of 64 x 64 texels a face
+SUN = np.array([0.5, -2.0, 0.3])
+EDGES = 0.05  # share of points in the texels that a shadow's edge runs through: maps of some 5 cm a texel
 
 
 def floor_and_leaves():
@@ -27,7 +28,7 @@ def floor_and_leaves():
     return vertices, np.arange(39).reshape(-1, 3), position, normal, np.zeros((30, 40), int)
 
 
-@pytest.mark.parametrize(("key", "value"), [("place", LAMP), ("direction", np.array([0.5, -2.0, 0.3]))])
+@pytest.mark.parametrize(("key", "value"), [("place", LAMP), ("direction", SUN)])
 def test_shadow_rays_are_those_of_embree(key, value):
     vertices, faces, position, normal, ids = floor_and_leaves()
     visible = shadow_rays(position, normal, ids, vertices, faces, **{key: value})
@@ -38,15 +39,29 @@ def test_shadow_rays_are_those_of_embree(key, value):
     assert 0.2 < visible.mean() < 0.95
 
 
-def test_a_shadow_map_shows_what_rays_do_but_for_edges():
+@pytest.mark.parametrize("key", ["place", "direction"])
+def test_a_shadow_map_shows_what_rays_do_but_for_edges(key):
     vertices, faces, position, normal, ids = floor_and_leaves()
-    maps = cube_projection(tuple(LAMP), 64)
-    view = {"origin": maps.origin, "frame": maps.frame, "half": maps.half, "rows": 64, "columns": 64,
-            "parallel": False}
+    sun = DirectionalLight(tuple(SUN), (1.0, 1, 1))
+    maps = cube_projection(tuple(LAMP), 64) if key == "place" else directional_projection(
+        sun, (np.array([-3.0, 0, -3]), np.array([3.0, 3, 3])), 128)
+    view = {"origin": maps.origin, "frame": maps.frame, "half": maps.half, "rows": maps.height,
+            "columns": maps.width, "parallel": key == "direction"}
     seen = visible_triangles(vertices, faces, **view)
     depth, there, _, _ = surface(seen, vertices, faces, np.zeros(13, int), np.ones((1, 3)), **view)
     visible = shadow_map(position, normal, ids, depth=depth, map_position=there, **view)
-    assert (visible == shadow_rays(position, normal, ids, vertices, faces, place=LAMP)).mean() > 1 - EDGES
+    expected = shadow_rays(position, normal, ids, vertices, faces, **{key: LAMP if key == "place" else SUN})
+    assert (visible == expected).mean() > 1 - EDGES
+
+
+def test_bias_of_a_floor_two_metres_below_and_45_degrees_off():
+    points = np.array([[0.0, 2], [0, 0], [0, 0]])[:, None]
+    normal = np.array([0.0, 1, 0]).reshape(3, 1, 1) + 0 * points
+    down = np.array([[[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]])
+    bias = plane_bias(points, normal, np.array([[0.0, 2, 0]]), down, np.array([1.0, 0.5]), np.zeros((1, 2), int), 10,
+                      10, False)
+    texel = 2 * 1.0 / 10  # at 1 m
+    assert bias[0] == pytest.approx([0.1 * texel * 2, 0.1 * texel * 2 * math.sqrt(2) * (1 + 1)])
 
 
 def test_three_lamps_by_hand():

@@ -5,33 +5,38 @@ half extent of the image plane. Row 0 is the top row; texel centres lie at + 1/2
 """
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from refgi.literal import buffers as literal
-from refgi.literal import light_flux
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.light_projection import light_projection
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.buffers.solid_angle import texel_solid_angles
-from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, camera_projection
+from refgi.rsm.raster.projection import Projection, camera_projection
 from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
 from refgi.scene import DirectionalLight, Geometry, PointLight, Scene, SpotLight, material_table
 from refgi.scene.material import MaterialTable
 from refgi.scene.model import Light
 from refgi.vectors.bounds import ROUNDING
 from refgi.vectors.recipe import Recipe, writing
-from refgi.vectors.rows import Form, Read
-from refgi.vectors.spec import Array, Arrays, Run, Spec
+from refgi.vectors.spec import Array, Arrays, Spec
+from refgi.vectors.stages.buffer_forms import (
+    flux_form,
+    flux_lists,
+    ids_form,
+    ids_lists,
+    in_float64,
+    surface_form,
+    surface_lists,
+    view_lists_of_flux,
+)
 
 VECTOR, POINT = "unit vector", "m"
 QUADRATURE = 8.0  # roundings that a float32 sum over a texel's nodes gathers; the bound is SAFETY times as wide
 SCENE = ("scene.vertices", "scene.faces", "scene.material_of_face")
 REFLECTANCE = ("materials.diffuse", "materials.specular", "materials.exponent")
 EARLIER = "before"  # the camera of the frame before, whose bugs are those of the camera
-VIEWS = "view/centre", "view/resolution", "view/frame", "view/origin", "view/extent"
 NAMES = {SpotLight: "spot", PointLight: "point", DirectionalLight: "directional"}
 
 
@@ -91,44 +96,12 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
                    f"{name}.lobe_exponent": Spec(sheet, "1", "Phong exponent; 0 without a lobe")}
     # a spot's flux is an integral over each texel, which refgi takes in float64 in any run
     summed = writing(flux, **{f"{name}__flux": lambda a: (a * (1.0 + QUADRATURE * ROUNDING)).astype(a.dtype)})
-    spot = isinstance(light, SpotLight)
-    form = _flux_form(recipe, name, lamp, light, maps)
+    form = flux_form(name, lamp, light, maps, bool(_normals(recipe)))
     recipe.add(f"{name}.flux", "flux that leaves each texel's surface", flux, reads, writes,
                paper="SII Sec. 3.1; docs/radiometry",
-               variants=(in_float64(form.run()), *((summed,) if spot else ())),
-               bugs=(*form.bugs(*_flux_lists(light, maps, glossy), *(falloff_lists([light]) if spot else ())),
-                     *form.bugs(*_view_lists_of_flux(maps, glossy), of="buffers")))
-
-
-def _flux_form(recipe: Recipe, name: str, lamp: str, light: Light, maps: Projection) -> Form:
-    spot, directional = isinstance(light, SpotLight), isinstance(light, DirectionalLight)
-    reads = {"triangle_id": f"{name}.triangle_id", "vertices": "scene.vertices", "faces": "scene.faces",
-             "material_of_face": "scene.material_of_face", **{key.split(".")[1]: key for key in REFLECTANCE},
-             **_view_reads(name), "strength": f"{lamp}.{'irradiance' if directional else 'intensity'}",
-             **{key.split(".")[1]: key for key in _normals(recipe)},
-             **({"half_angles": f"{lamp}.half_angles"} if spot else {})}
-    falloff = {"falloff": light.falloff} if isinstance(light, SpotLight) else {}
-    return Form(light_flux.reflected_flux, reads, tuple(f"{name}.{key}" for key in (
-        "solid_angle", "flux", "lobe_flux", "lobe_axis", "lobe_exponent")), _view_numbers(maps) | falloff)
-
-
-def _flux_lists(light: Light, maps: Projection, glossy: bool) -> tuple[str, ...]:
-    return ("flux", f"flux/{_view_kind(maps)}", *(("flux/spot",) if isinstance(light, SpotLight) else ()),
-            *(("flux/cube",) if maps.maps > 1 else ()), *(("flux/glossy",) if glossy else ()),
-            *(("flux/glossy cube",) if glossy and maps.maps > 1 else ()))
-
-
-def _view_lists_of_flux(maps: Projection, glossy: bool) -> tuple[str, ...]:
-    """Return lists of what the mirror directions of lobes, and solid angles, tell of a view."""
-    return (*(("view/frame",) if glossy else ()), *(("view/cube rows",) if maps.maps > 1 else ()),
-            *(("view/cube",) if glossy and maps.maps > 1 else ()))
-
-
-def falloff_lists(lights: Sequence[Light]) -> tuple[str, ...]:
-    """Return lists of wrong falloffs of some lights' spots: what is right for all of them is none."""
-    kinds = {light.falloff for light in lights if isinstance(light, SpotLight)}
-    return (*(("falloff",) if kinds else ()), *(("falloff/smooth",) if kinds - {"squared_ramp"} else ()),
-            *(("falloff/squared",) if "squared_ramp" in kinds else ()))
+               variants=(in_float64(form.run()), *((summed,) if isinstance(light, SpotLight) else ())),
+               bugs=(*form.bugs(*flux_lists(light, maps, glossy)),
+                     *form.bugs(*view_lists_of_flux(maps, glossy), of="buffers")))
 
 
 def rsm_of(
@@ -224,43 +197,15 @@ def _visible(triangle_id: Array) -> Visibility:
 
 
 def _add_ids(recipe: Recipe, name: str, view: str, maps: Projection, scene: Scene) -> None:
-    form = Form(literal.visible_triangles, {"vertices": "scene.vertices", "faces": "scene.faces", **_view_reads(view)},
-                (f"{name}.triangle_id",), _view_numbers(maps))
-    kind = _view_kind(maps)
+    form = ids_form(name, view, maps)
 
     def ids(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 the rasterizer has one precision
         return {f"{name}.triangle_id": rasterize(geometry_of(arrays, scene), _maps_of(arrays, view, maps)).triangle_id}
 
-    lists = () if name == EARLIER else ("triangles", f"triangles/{kind}", *VIEWS, *_cube_lists(maps), *(
-        ("triangles/cube",) if maps.maps > 1 else ()))
+    lists = () if name == EARLIER else ids_lists(maps)
     recipe.add(f"{name}.ids", "nearest triangle at each texel's centre", ids, (*SCENE, *_map_names(view)),
                {f"{name}.triangle_id": Spec("row, column", "1", "nearest triangle, -1 for none", tier="T0")},
                paper="docs/rasterizer", bugs=form.bugs("view/upwards", *lists), variants=(in_float64(form.run()),))
-
-
-def in_float64(run: Run) -> Run:
-    """Return the run of a stage that computes in float64 whatever it reads, as refgi does where digits cancel."""
-    def run_in_float64(arrays: Arrays, real: Any) -> Arrays:
-        return run({name: array.astype(np.float64) if array.dtype.kind == "f" else array
-                    for name, array in arrays.items()}, real)
-
-    return run_in_float64
-
-
-def _view_reads(view: str) -> dict[str, Read]:
-    return {key: f"{view}.{key}" for key in ("origin", "frame", "half")}
-
-
-def _view_numbers(maps: Projection) -> dict[str, Any]:
-    return {"rows": maps.height, "columns": maps.width, "parallel": maps.kind == ORTHOGRAPHIC}
-
-
-def _view_kind(maps: Projection) -> str:
-    return "parallel" if maps.kind == ORTHOGRAPHIC else "perspective"
-
-
-def _cube_lists(maps: Projection) -> tuple[str, ...]:
-    return ("view/cube", "view/cube down") if maps.maps > 1 else ()
 
 
 def _half_texel(maps: Projection) -> Any:
@@ -276,11 +221,7 @@ def _add_surface(
     recipe: Recipe, name: str, view: str, maps: Projection, scene: Scene, channels: tuple[str, ...]
 ) -> None:
     smooth = bool(_normals(recipe))
-    reads = {key: f"scene.{key}" for key in ("vertices", "faces", "material_of_face",
-                                             *(("vertex_normals",) if smooth else ()))}
-    form = Form(literal.surface, {**reads, "diffuse": "materials.diffuse", "triangle_id": f"{name}.triangle_id",
-                                  **_view_reads(view)},
-                tuple(f"{name}.{key}" for key in ("depth", "position", "normal", "albedo")), _view_numbers(maps))
+    form = surface_form(name, view, maps, smooth)
 
     def surface(arrays: Arrays, real: Any) -> Arrays:
         buffer = GBuffer(geometry_of(arrays, scene), materials_of(arrays, real), _maps_of(arrays, view, maps),
@@ -291,10 +232,7 @@ def _add_surface(
              "position": Spec("xyz, row, column", "m", "surface point; 0 without surface", "world"),
              "normal": Spec("xyz, row, column", VECTOR, "on the side that is seen; 0 without surface", "world"),
              "albedo": Spec("rgb, row, column", "1", "diffuse reflectance; 0 without surface", "linear RGB")}
-    lists = () if name == EARLIER else (
-        "surface", f"surface/{_view_kind(maps)}", *VIEWS, *_cube_lists(maps), *(
-            ("view/cube rows",) if maps.maps > 1 else ()), *(("surface/smooth",) if smooth else ()), *(
-            ("surface/albedo",) if "albedo" in channels else ()))
+    lists = () if name == EARLIER else surface_lists(maps, smooth, "albedo" in channels)
     recipe.add(f"{name}.surface", "depth, position and normal of what each texel sees", surface,
                (*SCENE, *_normals(recipe), *REFLECTANCE, *_map_names(view), f"{name}.triangle_id"),
                {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1",

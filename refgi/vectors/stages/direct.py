@@ -17,6 +17,7 @@ from refgi.scene.model import Light
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.rows import Form, Read
 from refgi.vectors.spec import Array, Arrays, Spec
+from refgi.vectors.stages.buffer_forms import falloff_lists, in_float64, view_numbers, view_reads
 from refgi.vectors.stages.buffers import (
     SCENE,
     _add_ids,
@@ -26,12 +27,8 @@ from refgi.vectors.stages.buffers import (
     _light_names,
     _map_names,
     _maps_of,
-    _view_numbers,
-    _view_reads,
     _visible,
-    falloff_lists,
     geometry_of,
-    in_float64,
     light_of,
 )
 from refgi.vectors.stages.facing import FACING, add_facing
@@ -88,8 +85,8 @@ def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
 
     smooth = points[1] == FACING
     form = Form(literal.shadow_map, {
-        **_points(points), **_view_reads(name), "depth": depths[0], "map_position": depths[1]},
-        (f"shadow{index}.visible",), _view_numbers(maps))
+        **_points(points), **view_reads(name), "depth": depths[0], "map_position": depths[1]},
+        (f"shadow{index}.visible",), view_numbers(maps))
     lists = (*(("shadow_map/cube",) if maps.maps > 1 else ()), *(("shadow_map/smooth",) if smooth else ()))
     # faces turned away from the light, which the literal text does not know, are dark where normals are interpolated
     variants = () if smooth else (in_float64(form.run()),)

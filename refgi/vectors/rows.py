@@ -70,14 +70,11 @@ def _read(arrays: Arrays, name: Read | None) -> Any:
 
 def _lazily(form: Form, row: Row) -> Run:
     """Return what a stage runs with a bug; the text is edited when it first runs."""
-    @functools.cache
-    def made() -> types.FunctionType:
-        return edited(form.function, row.edits, row.cause)
-
     def run(arrays: Arrays, real: Any) -> Arrays:
-        made().__globals__["arrays"] = arrays
+        wrong = edited(form.function, row.edits, row.cause)
+        wrong.__globals__["arrays"] = arrays
         with np.errstate(all="ignore"):  # a bug may divide by 0
-            return form.run(made())(arrays, real)
+            return form.run(wrong)(arrays, real)
 
     return run
 
@@ -112,6 +109,7 @@ def _row(line: str, where: str) -> Row:
     return Row(parts[0], parts[1], tuple((edit[0], edit[1]) for edit in edits), parts[3] if len(parts) == 4 else "")
 
 
+@functools.cache
 def edited(function: Callable[..., Any], edits: Edits, what: str = "edit") -> types.FunctionType:
     """Return a literal function with edits in its text or in that of the literal functions that it calls.
 

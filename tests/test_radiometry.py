@@ -7,6 +7,7 @@ import pytest
 from scipy.special import betainc
 
 from refgi import radiometry
+from refgi.literal.light_flux import spot_share
 from refgi.radiometry import (
     corner_solid_angle_paraboloid,
     corner_solid_angle_perspective,
@@ -36,7 +37,8 @@ def test_spot_falloff_is_the_smoothstep_or_a_ramp(falloff):
     cone = cone_row(math.acos(0.9), math.acos(0.5), falloff)
     for cos_angle in np.linspace(-1.0, 1.0, 81):
         got = spot_falloff((0.0, math.sqrt(1 - cos_angle**2), cos_angle), (0.0, 0.0, 1.0), cone, math.inf)
-        assert got == pytest.approx(naive.spot_intensity(1.0, cos_angle, 0.9, 0.5, falloff), abs=ROUNDING[np.float64])
+        expected = spot_share(cos_angle, math.acos(0.9), math.acos(0.5), falloff)
+        assert got == pytest.approx(expected, abs=ROUNDING[np.float64])
 
 
 def test_spot_with_equal_cones_is_a_step():
@@ -68,7 +70,7 @@ def test_incident_light_by_hand(real):
     got = np.array([incident_light(table, k, *(real(c) for c in point)) for k in range(3)])
     d = np.array([1.0, 2.0, 3.0]) - point
     r = np.linalg.norm(d)
-    intensity = naive.spot_intensity(1.0, -(d @ axis) / r, math.cos(0.3), math.cos(0.9)) * np.array([1.0, 2.0, 4.0])
+    intensity = spot_share(-(d @ axis) / r, 0.3, 0.9) * np.array([1.0, 2.0, 4.0])
     assert got[0] == pytest.approx([*(d / r), r, *(intensity / r**2)], rel=10 * ROUNDING[np.float64])
     d = np.array([0.0, 2.0, 0.0]) - point
     r = np.linalg.norm(d)

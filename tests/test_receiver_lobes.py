@@ -110,8 +110,8 @@ LIGHTS = {"point": PointLight((0.3, 0.8, 0.2), (2.0, 1.0, 0.5)),
 @pytest.mark.parametrize("exponent", EXPONENTS)
 def test_one_light_over_a_phong_floor(kind, exponent, evidence):
     """Direct light of one small light: f_s I <n.l> / d^2 at every pixel, from angles by the law of cosines."""
+    from refgi.literal.light_flux import spot_share
     from refgi.scene import Material
-    from tests.naive.radiometry import spot_intensity
 
     shiny, light = Material("shiny", (0.1,) * 3, (0.5, 0.6, 0.7), exponent), LIGHTS[kind]
     found = dataclasses.replace(scene([floor(1.0, shiny)], light))
@@ -125,8 +125,8 @@ def test_one_light_over_a_phong_floor(kind, exponent, evidence):
         intensity = np.asarray(light.intensity)
         if kind == "spot":
             axis, away = np.asarray(light.direction) / np.linalg.norm(light.direction), x - light.position
-            intensity = spot_intensity(intensity, axis @ away / np.linalg.norm(away), math.cos(light.inner_half_angle),
-                                       math.cos(light.outer_half_angle))
+            share = spot_share(axis @ away / np.linalg.norm(away), light.inner_half_angle, light.outer_half_angle)
+            intensity = share * intensity
         expected[:, row, column] = naive.of_point_light(intensity, light.position, exponent, shiny.specular, x,
                                                         np.array([0.0, 1.0, 0.0]), camera.eye)
     most = expected.max()

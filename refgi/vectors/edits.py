@@ -33,6 +33,7 @@ def replaced(text: str, old: str, new: str, what: str = "edit") -> str:
     return text.replace(old, new)
 
 
+@functools.cache
 def edited(function: Callable[..., Any], edits: Edits, what: str = "edit") -> Callable[..., Any]:
     """Return a literal function with edits in its text or in that of the literal functions that it calls.
 

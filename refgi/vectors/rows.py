@@ -3,7 +3,8 @@
 Rows lie beside the file that they edit, `refgi/literal/*.bugs`. `old` stands exactly once, in one line, in the function
 of a form or in those of refgi.literal that it calls, docstrings apart; several edits are joined by ` ;; `. `list` names
 the rows that a stage has, by custom the function and what it needs: `pair`, `pair/glossy`. `paper` may be left out.
-Empty lines and those that begin with `#` are passed over.
+Empty lines and those that begin with `#` are passed over. `new` may name `arrays`, all that the stage reads, for bugs
+that take a wrong one.
 """
 
 import functools
@@ -17,6 +18,8 @@ import numpy as np
 
 from refgi.vectors.edits import PACKAGE, Edits, StaleEditError, edited
 from refgi.vectors.spec import Array, Arrays, Bug, Run
+
+Read = str | tuple["Read | None", ...]  # name of an array, or of several; None: what one of several has not
 
 
 class Row(NamedTuple):
@@ -33,7 +36,7 @@ class Form:
     """The literal form of a stage: which function, what it reads and writes. Runs as the stage does."""
 
     function: Callable[..., Any]
-    reads: Mapping[str, str]  # parameter: array
+    reads: Mapping[str, Read]  # parameter: array, or several, such as those of all maps
     writes: tuple[str, ...]  # in the order in which the function returns them
     numbers: Mapping[str, Any] = field(default_factory=dict)  # its other arguments
     adapt: Mapping[str, Callable[[Array], Array]] = field(default_factory=dict)  # what parameters are made of arrays
@@ -44,7 +47,7 @@ class Form:
 
     def by(self, function: Callable[..., Any], arrays: Arrays) -> Arrays:
         """Return what the stage writes with another function, such as an edited one."""
-        read = {name: self.adapt.get(name, _as_it_is)(arrays[array]) for name, array in self.reads.items()}
+        read = {name: self.adapt.get(name, _as_it_is)(_read(arrays, array)) for name, array in self.reads.items()}
         made = function(**read, **self.numbers)
         return dict(zip(self.writes, made if len(self.writes) > 1 else (made,), strict=True))
 
@@ -62,15 +65,18 @@ def _as_it_is(array: Array) -> Array:
     return array
 
 
+def _read(arrays: Arrays, name: Read | None) -> Any:
+    return None if name is None else arrays[name] if isinstance(name, str) else tuple(
+        _read(arrays, one) for one in name)
+
+
 def _lazily(form: Form, row: Row) -> Run:
     """Return what a stage runs with a bug; the text is edited when it first runs."""
-    @functools.cache
-    def function() -> Callable[..., Any]:
-        return edited(form.function, row.edits, row.cause)
-
     def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 in the type of the arrays
+        wrong = edited(form.function, row.edits, row.cause)
+        wrong.__globals__["arrays"] = arrays
         with np.errstate(all="ignore"):  # a bug may divide by 0
-            return form.by(function(), arrays)
+            return form.by(wrong, arrays)
 
     return run
 

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
+from refgi.literal.light_flux import spot_share
 from tests.naive.draws import draw
 from tests.naive.openness import LIFT, basis, cosine_direction
 from tests.naive.pixel_lights import mirror, radical_inverse
-from tests.naive.radiometry import spot_intensity
 from tests.naive.shares import shares_of, shift_of, trial_flux
 from tests.naive.surface import hit_of, unit
 
@@ -75,8 +75,7 @@ def emitted(scene, lamp, s, t):
     direction = around(axis, math.sqrt(1 - cosine**2), t) + cosine * axis
     intensity = np.asarray(lamp.intensity)
     if kind == "SpotLight":
-        intensity = spot_intensity(intensity, cosine, math.cos(lamp.inner_half_angle), math.cos(lamp.outer_half_angle),
-                                   lamp.falloff)
+        intensity = intensity * spot_share(cosine, lamp.inner_half_angle, lamp.outer_half_angle, lamp.falloff)
     return np.asarray(lamp.position), direction, intensity * 2 * math.pi * cap
 
 

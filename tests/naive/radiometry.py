@@ -8,18 +8,6 @@ import numpy as np
 gauss_legendre = cache(np.polynomial.legendre.leggauss)
 
 
-def spot_intensity(axis_intensity, cos_angle, cos_inner, cos_outer, falloff="smoothstep"):
-    """I(a) = I0 t t (3 - 2 t), I0 t t or I0 t; t = clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1)."""
-    if cos_angle < cos_outer:
-        return 0.0
-    if cos_inner == cos_outer:
-        return axis_intensity
-    t = min(1.0, max(0.0, (cos_angle - cos_outer) / (cos_inner - cos_outer)))
-    if falloff != "smoothstep":
-        return axis_intensity * (t if falloff == "ramp" else t * t)
-    return axis_intensity * t * t * (3 - 2 * t)
-
-
 def solid_angle_of_rectangle(density, x0, x1, y0, y1, nodes=64):
     """Integrate a solid-angle density over a rectangle of the image plane by Gauss-Legendre quadrature."""
     x, w = gauss_legendre(nodes)

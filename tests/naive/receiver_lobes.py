@@ -9,9 +9,10 @@ import math
 
 import numpy as np
 
+from refgi.literal.light_flux import spot_share
 from tests.naive.crossings import LIFT, corners_of, crossings, face_normals, free
 from tests.naive.pair_term import parts
-from tests.naive.radiometry import gauss_legendre, lobe_fraction, spot_intensity
+from tests.naive.radiometry import gauss_legendre, lobe_fraction
 from tests.naive.truth import nearest_hits
 from tests.naive.vpl import sender_faces
 
@@ -189,5 +190,4 @@ def _falloff(light, w):
     if not hasattr(light, "direction"):
         return np.ones(len(w))
     axis = unit(np.asarray(light.direction))
-    return np.array([spot_intensity(1.0, one @ axis, math.cos(light.inner_half_angle),
-                                    math.cos(light.outer_half_angle)) for one in w])
+    return spot_share(w @ axis, light.inner_half_angle, light.outer_half_angle)

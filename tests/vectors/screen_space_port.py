@@ -10,9 +10,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from refgi.literal import direct
 from refgi.scene import Geometry
 from refgi.vectors.cases.hssil import SETTINGS, TEMPORAL
-from tests.naive import crossings, crown, crown_points, direct, level_blur, reprojection, temporal, upsampling
+from tests.naive import crown, crown_points, level_blur, reprojection, temporal, upsampling
 from tests.naive import hssil as whole
 from tests.naive import view_pyramid as pyramid
 
@@ -40,23 +41,17 @@ def points(arrays):
 
 
 def shadows(case, arrays, index):
-    position, normal = points(arrays)
-    normal = arrays.get("gbuffer.facing", normal)  # planes, sides and offsets are the face's
-    visible = np.zeros(position.shape[1:], bool)
-    lamp = lamps(arrays).get(f"light{index}")
-    for at in pixels(arrays):
-        if f"rsm{index}.depth" in arrays:
-            facts = case.facts[f"rsm{index}"]
-            visible[at] = direct.reached(
-                facts["projection"], *(arrays[f"rsm{index}.{key}"] for key in ("origin", "frame", "half")),
-                (facts["rows"], facts["columns"]), arrays[f"rsm{index}.depth"], arrays[f"rsm{index}.position"],
-                position[:, *at], normal[:, *at])
-            continue
-        corners = arrays["scene.vertices"][arrays["scene.faces"]]
-        start = position[:, *at] + 1e-5 * normal[:, *at]
-        end = lamp["position"] if "position" in lamp else start - 1e3 * lamp["direction"]
-        faces = (end - start) @ normal[:, *at] > 0
-        visible[at] = faces and crossings.free(corners, start[None], end[None], 1 - 1e-5)[0]
+    at = dict(zip(("position", "normal"), points(arrays), strict=True), triangle_id=arrays["gbuffer.triangle_id"])
+    at["normal"] = arrays.get("gbuffer.facing", at["normal"])  # planes, sides and offsets are the face's
+    rsm = f"rsm{index}"
+    if f"{rsm}.depth" not in arrays:
+        lamp = lamps(arrays)[f"light{index}"]
+        end = {"place": lamp["position"]} if "position" in lamp else {"direction": lamp["direction"]}
+        visible = direct.shadow_rays(**at, vertices=arrays["scene.vertices"], faces=arrays["scene.faces"], **end)
+    else:
+        facts, view = case.facts[rsm], {key: arrays[f"{rsm}.{key}"] for key in ("origin", "frame", "half", "depth")}
+        visible = direct.shadow_map(**at, **view, map_position=arrays[f"{rsm}.position"], rows=facts["rows"],
+                                    columns=facts["columns"], parallel=facts["projection"] == "orthographic")
     return {f"shadow{index}.visible": visible}
 
 
@@ -67,13 +62,12 @@ def lamps(arrays):
 
 
 def irradiance(case, arrays, _):
-    position, normal = points(arrays)
-    light = np.zeros(position.shape)
-    for lamp, values in lamps(arrays).items():
-        for at in pixels(arrays):
-            if arrays[f"shadow{lamp[5:]}.visible"][at]:
-                light[:, *at] += direct.irradiance(case.facts[lamp], values, position[:, *at], normal[:, *at],
-                                                   case.facts.get(f"{lamp}.falloff", "smoothstep"))
+    values = lamps(arrays)
+    light = direct.direct_irradiance(
+        *points(arrays), arrays["gbuffer.triangle_id"], [arrays[f"shadow{lamp[5:]}.visible"] for lamp in values],
+        [one.get("intensity", one.get("irradiance")) for one in values.values()],
+        *([one.get(key) for one in values.values()] for key in ("position", "direction", "half_angles")),
+        [case.facts.get(f"{lamp}.falloff", "smoothstep") for lamp in values])
     return {"direct.irradiance": light}
 
 

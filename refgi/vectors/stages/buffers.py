@@ -19,11 +19,18 @@ from refgi.scene import DirectionalLight, Geometry, PointLight, Scene, SpotLight
 from refgi.scene.material import MaterialTable
 from refgi.scene.model import Light
 from refgi.vectors.bounds import ROUNDING
-from refgi.vectors.bugs.flux import flux_family
-from refgi.vectors.bugs.ids import ids_family
-from refgi.vectors.bugs.surface import surface_family
-from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.recipe import Recipe, writing
+from refgi.vectors.spec import Array, Arrays, Spec
+from refgi.vectors.stages.buffer_forms import (
+    flux_form,
+    flux_lists,
+    ids_form,
+    ids_lists,
+    in_float64,
+    surface_form,
+    surface_lists,
+    view_lists_of_flux,
+)
 
 VECTOR, POINT = "unit vector", "m"
 QUADRATURE = 8.0  # roundings that a float32 sum over a texel's nodes gathers; the bound is SAFETY times as wide
@@ -87,25 +94,14 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
                    f"{name}.lobe_axis": Spec(f"xyz, {sheet}", VECTOR, "mirror direction; 0 without a lobe", "world",
                                              "r = d - 2 (n . d) n"),
                    f"{name}.lobe_exponent": Spec(sheet, "1", "Phong exponent; 0 without a lobe")}
-    even = f"{name}.solid_angle", f"{name}.flux"
-
-    def equal(arrays: Arrays, real: Any) -> Arrays:
-        made = dict(flux(arrays, real))
-        angle = made[even[0]]
-        mean = np.full_like(angle, angle.mean())
-        return made | {even[0]: mean, even[1]: made[even[1]] * (mean / angle).astype(real)}
-
     # a spot's flux is an integral over each texel, which refgi takes in float64 in any run
     summed = writing(flux, **{f"{name}__flux": lambda a: (a * (1.0 + QUADRATURE * ROUNDING)).astype(a.dtype)})
+    form = flux_form(name, lamp, light, maps, bool(_normals(recipe)))
     recipe.add(f"{name}.flux", "flux that leaves each texel's surface", flux, reads, writes,
-               paper="SII Sec. 3.1; docs/radiometry", variants=(summed,) if isinstance(light, SpotLight) else (),
-               bugs=(
-                   Bug("every texel has the same solid angle", equal, "Nichols and Wyman 2009, Fig. 13"),
-                   Bug("the albedo is left out", reading(flux, materials__diffuse=np.ones_like,
-                                                         materials__specular=_ones_where_any), "Phi_t = albedo ..."),
-                   Bug("flux is divided by pi", writing(flux, **{f"{name}__flux": lambda a: a / np.pi}),
-                       "flux is W; 1/pi comes with Eq. 1"),
-                   *flux_family(name, lamp, light, maps, glossy)))
+               paper="SII Sec. 3.1; docs/radiometry",
+               variants=(in_float64(form.run()), *((summed,) if isinstance(light, SpotLight) else ())),
+               bugs=(*form.bugs(*flux_lists(light, maps, glossy)),
+                     *form.bugs(*view_lists_of_flux(maps, glossy), of="buffers")))
 
 
 def rsm_of(
@@ -144,10 +140,6 @@ def light_of(arrays: Arrays, lamp: str, light: Light) -> Light:
         value |= {"inner_half_angle": min(inner, outer), "outer_half_angle": outer, "falloff": light.falloff}
     made: Light = type(light)(**value)
     return made
-
-
-def _ones_where_any(array: Array) -> Array:
-    return np.where(array > 0, 1.0, array).astype(array.dtype)
 
 
 def _normals(recipe: Recipe) -> tuple[str, ...]:
@@ -205,15 +197,15 @@ def _visible(triangle_id: Array) -> Visibility:
 
 
 def _add_ids(recipe: Recipe, name: str, view: str, maps: Projection, scene: Scene) -> None:
+    form = ids_form(name, view, maps)
+
     def ids(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 the rasterizer has one precision
         return {f"{name}.triangle_id": rasterize(geometry_of(arrays, scene), _maps_of(arrays, view, maps)).triangle_id}
 
-    mirrored = reading(ids, **{f"{view}__half": lambda half: half * (1, -1)})
+    lists = () if name == EARLIER else ids_lists(maps)
     recipe.add(f"{name}.ids", "nearest triangle at each texel's centre", ids, (*SCENE, *_map_names(view)),
                {f"{name}.triangle_id": Spec("row, column", "1", "nearest triangle, -1 for none", tier="T0")},
-               paper="docs/rasterizer", bugs=(
-                   *(() if name == EARLIER else ids_family(name, view, maps)),
-                   Bug("rows run upwards: upside down", mirrored, "row 0 is the top row (docs/conventions)")))
+               paper="docs/rasterizer", bugs=form.bugs("view/upwards", *lists), variants=(in_float64(form.run()),))
 
 
 def _half_texel(maps: Projection) -> Any:
@@ -228,7 +220,8 @@ def _half_texel(maps: Projection) -> Any:
 def _add_surface(
     recipe: Recipe, name: str, view: str, maps: Projection, scene: Scene, channels: tuple[str, ...]
 ) -> None:
-    materials = ("materials.diffuse", "materials.specular", "materials.exponent")
+    smooth = bool(_normals(recipe))
+    form = surface_form(name, view, maps, smooth)
 
     def surface(arrays: Arrays, real: Any) -> Arrays:
         buffer = GBuffer(geometry_of(arrays, scene), materials_of(arrays, real), _maps_of(arrays, view, maps),
@@ -239,21 +232,8 @@ def _add_surface(
              "position": Spec("xyz, row, column", "m", "surface point; 0 without surface", "world"),
              "normal": Spec("xyz, row, column", VECTOR, "on the side that is seen; 0 without surface", "world"),
              "albedo": Spec("rgb, row, column", "1", "diffuse reflectance; 0 without surface", "linear RGB")}
-    flat = Bug("normals are not turned to the side that is seen", _unturned(surface, name, arrays_of=scene), "")
-    family = () if name == EARLIER else surface_family(name, view, maps, channels, bool(_normals(recipe)))
+    lists = () if name == EARLIER else surface_lists(maps, smooth, "albedo" in channels)
     recipe.add(f"{name}.surface", "depth, position and normal of what each texel sees", surface,
-               (*SCENE, *_normals(recipe), *materials, *_map_names(view), f"{name}.triangle_id"),
-               {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1", bugs=(flat, *family))
-
-
-def _unturned(run: Any, name: str, arrays_of: Scene) -> Any:
-    """Return the stage with each triangle's normal as its winding gives it."""
-    def altered(arrays: Arrays, real: Any) -> Arrays:
-        made = dict(run(arrays, real))
-        geometry, ids = geometry_of(arrays, arrays_of), np.asarray(arrays[f"{name}.triangle_id"])
-        a, b, c = (geometry.vertices[geometry.faces[:, k]] for k in range(3))
-        wound = np.moveaxis(np.cross(b - a, c - a)[ids], -1, 0)
-        normal = made[f"{name}.normal"]
-        return made | {f"{name}.normal": np.where((wound * normal).sum(axis=0) < 0, -normal, normal)}
-
-    return altered
+               (*SCENE, *_normals(recipe), *REFLECTANCE, *_map_names(view), f"{name}.triangle_id"),
+               {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1",
+               bugs=form.bugs("surface/side", *lists), variants=(in_float64(form.run()),))

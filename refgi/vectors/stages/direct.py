@@ -1,20 +1,23 @@
 """Stages of direct light at the camera's pixels: shadows from a map's depths or by rays, irradiance of all lights."""
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
 
+from refgi.literal import direct as literal
 from refgi.rays import Tracer
 from refgi.rsm.buffers.direct import direct_irradiance, shadow_map_visibility
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.light_projection import light_projection
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.raster.projection import Projection, camera_projection
-from refgi.scene import Scene, material_table
-from refgi.vectors.bugs.direct import direct_family
-from refgi.vectors.bugs.shadow import shadow_map_family
-from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.scene import DirectionalLight, Scene, SpotLight, material_table
+from refgi.scene.model import Light
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.rows import Form, Read
+from refgi.vectors.spec import Array, Arrays, Spec
+from refgi.vectors.stages.buffer_forms import falloff_lists, in_float64, view_numbers, view_reads
 from refgi.vectors.stages.buffers import (
     SCENE,
     _add_ids,
@@ -61,16 +64,6 @@ def _faces(scene: Scene) -> tuple[str, str, str]:
     return (POINTS[0], POINTS[1] if scene.geometry.vertex_normals is None else FACING, POINTS[2])
 
 
-def _interpolated(run: Any, scene: Scene) -> tuple[Bug, ...]:
-    """Return the bug of shadows that take interpolated normals, of a smooth scene."""
-    def altered(arrays: Arrays, real: Any) -> Arrays:
-        return dict(run({**arrays, FACING: arrays[POINTS[1]]}, real))
-
-    smooth = scene.geometry.vertex_normals is not None
-    return (Bug("interpolated normals in place of faces'", altered, "docs/conventions: which normal serves what"),
-            ) if smooth else ()
-
-
 def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
     """Add the depths that a light sees, and whether it sees what the camera does."""
     name, light = f"rsm{index}", scene.lights[index]
@@ -80,7 +73,7 @@ def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
     _add_surface(recipe, name, name, maps, scene, ("depth", "position", "normal"))
     depths, points = (f"{name}.depth", f"{name}.position"), _faces(scene)
 
-    def test(arrays: Arrays, real: Any, bias: float | None = None) -> Arrays:
+    def test(arrays: Arrays, real: Any) -> Arrays:
         projection = _maps_of(arrays, name, maps)
         view = GBuffer(scene.geometry, material_table(scene.materials, real), projection,
                        _visible(np.zeros(maps.shape, np.int32)), real)
@@ -88,21 +81,19 @@ def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
         position, normal = (np.ascontiguousarray(arrays[key], real) for key in points[:2])
         rsm = Rsm(light, view, material_table(scene.materials, real), known)
         return {f"shadow{index}.visible": shadow_map_visibility(position, normal, np.asarray(arrays[POINTS[2]]) >= 0,
-                                                                rsm, bias, points[1] == FACING)}
+                                                                rsm, None, points[1] == FACING)}
 
-    printed = name.replace(".", "__")
+    smooth = points[1] == FACING
+    form = Form(literal.shadow_map, {
+        **_points(points), **view_reads(name), "depth": depths[0], "map_position": depths[1]},
+        (f"shadow{index}.visible",), view_numbers(maps))
+    lists = (*(("shadow_map/cube",) if maps.maps > 1 else ()), *(("shadow_map/smooth",) if smooth else ()))
+    # faces turned away from the light, which the literal text does not know, are dark where normals are interpolated
+    variants = () if smooth else (in_float64(form.run()),)
     recipe.add(f"shadow{index}", "the nearest texel's point does not lie above the receiver's own plane", test,
                (*points, *_map_names(name), *depths), {f"shadow{index}.visible": _visible_spec()},
-               paper="docs/rasterizer: receiver-plane bias", exact=(*points[:2], *depths), bugs=(
-                   Bug("the bias is a constant 0", lambda a, r: test(a, r, 0.0), "receiver-plane bias"),
-                   Bug("the bias is a constant tenth of the scene's size", lambda a, r: test(a, r, 0.2),
-                       "receiver-plane bias"),
-                   Bug("rows of the map run upwards", reading(test, **{f"{printed}__frame": _upside_down}),
-                       "row 0 is the top row"),
-                   Bug("the map's depths are those at its texels' corners", reading(test, **{
-                       f"{printed}__depth": _moved, f"{printed}__position": _moved}), "texel centres at + 1/2"),
-                   Bug("nothing is in shadow", writing(test, **{f"shadow{index}__visible": np.ones_like}), ""),
-                   *_interpolated(test, scene), *shadow_map_family(test, name, maps, index, points[1])))
+               paper="docs/rasterizer: receiver-plane bias", exact=(*points[:2], *depths),
+               bugs=form.bugs("shadow_map", *lists), variants=variants)
 
 
 def _add_rays(recipe: Recipe, scene: Scene, index: int) -> None:
@@ -115,15 +106,18 @@ def _add_rays(recipe: Recipe, scene: Scene, index: int) -> None:
         return {f"shadow{index}.visible": tracer.visible_from_light(position, normal, triangle_id >= 0,
                                                                     light_of(arrays, lamp, light))}
 
-    place = [name for name in _light_names(lamp, light) if name.endswith("position")]
-    wrong = (Bug("the light is looked for at the origin", reading(test, **{
-        place[0].replace(".", "__"): np.zeros_like}), "a ray to the light"),) if place else ()
+    key = "direction" if isinstance(light, DirectionalLight) else "place"
+    form = Form(literal.shadow_rays, {
+        **_points(points), "vertices": "scene.vertices", "faces": "scene.faces",
+        key: f"{lamp}.direction" if key == "direction" else f"{lamp}.position"}, (f"shadow{index}.visible",))
     recipe.add(f"shadow{index}", "no triangle lies between the pixel's point and the light", test,
                (*SCENE, *points, *_light_names(lamp, light)), {f"shadow{index}.visible": _visible_spec()},
-               paper="shadow rays", exact=("scene.vertices", *points[:2]), bugs=(
-                   Bug("nothing is in shadow", writing(test, **{f"shadow{index}__visible": np.ones_like}), ""),
-                   Bug("rays start below the surface", reading(test, **{points[1].replace(".", "__"): np.negative}),
-                       "off the surface, on the side that is seen"), *wrong))
+               paper="shadow rays", exact=("scene.vertices", *points[:2]),
+               bugs=form.bugs("shadow_rays", f"shadow_rays/{key}"), variants=(in_float64(form.run()),))
+
+
+def _points(points: Sequence[str]) -> dict[str, Read]:
+    return dict(zip(("position", "normal", "triangle_id"), points, strict=True))
 
 
 def _add_sum(recipe: Recipe, scene: Scene, view: Projection) -> None:
@@ -138,22 +132,29 @@ def _add_sum(recipe: Recipe, scene: Scene, view: Projection) -> None:
                  for (lamp, light), shadow in zip(lights, shadows, strict=True)]
         return {"direct.irradiance": np.sum(parts, axis=0, dtype=real)}
 
-    def unshadowed(array: Array) -> Array:
-        return np.ones_like(array)
-
     positions = tuple(name for name in names if name.endswith("position"))
-    spots = [name.replace(".", "__") for name in names if name.endswith("half_angles")]
-    cones = (Bug("the outer half-angle for both: the cone's edge is hard", reading(run, **{
-        name: lambda a: a[[1, 1]] for name in spots}), "docs/conventions: smooth edge of a spot"),) if spots else ()
+    form = _irradiance_form(lights, shadows)
+    some = (any(one.endswith("position") for one in names), any(one.endswith("half_angles") for one in names),
+            len(lights) > 1)
+    lists = ("direct", *(name for name, has in zip(
+        ("direct/place", "direct/spot", "direct/several"), some, strict=True) if has))
     recipe.add("direct", "direct irradiance of all lights, without albedo/pi", run, (*POINTS, *names, *shadows),
                {"direct.irradiance": Spec("rgb, row, column", "W/m^2", "direct irradiance; 0 without surface",
                                           "linear RGB", "E = I(w) cos / d^2")},
-               paper="HSS Sec. 4; docs/radiometry", exact=(POINTS[0], *positions), bugs=(
-                   Bug("shadows are missing", reading(run, **{name.replace(".", "__"): unshadowed for name in
-                                                              shadows}), "HSS Sec. 4"),
-                   Bug("the normal points inwards", reading(run, gbuffer__normal=lambda a: -a), "E = I cos / d^2"),
-                   Bug("irradiance is divided by pi", writing(run, direct__irradiance=lambda a: a / np.pi),
-                       "albedo/pi comes with the radiance"), *cones, *direct_family(lights)))
+               paper="HSS Sec. 4; docs/radiometry", exact=(POINTS[0], *positions), variants=(in_float64(form.run()),),
+               bugs=(*form.bugs(*lists), *form.bugs(*falloff_lists(scene.lights), of="light_flux")))
+
+
+def _irradiance_form(lights: Sequence[tuple[str, Light]], shadows: Sequence[str]) -> Form:
+    def of_each(*keys: str) -> tuple[str | None, ...]:
+        return tuple(next((f"{lamp}.{key}" for key in keys if f"{lamp}.{key}" in _light_names(lamp, light)), None)
+                     for lamp, light in lights)
+
+    falloffs = tuple(light.falloff if isinstance(light, SpotLight) else None for _, light in lights)
+    return Form(literal.direct_irradiance, {
+        **_points(POINTS), "visible": tuple(shadows), "strength": of_each("intensity", "irradiance"),
+        "place": of_each("position"), "direction": of_each("direction"), "half_angles": of_each("half_angles")},
+        ("direct.irradiance",), {"falloff": falloffs})
 
 
 def _visible_spec() -> Spec:
@@ -162,7 +163,3 @@ def _visible_spec() -> Spec:
 
 def _upside_down(frame: Array) -> Array:
     return np.asarray(frame * np.array([1.0, -1.0, 1.0]).reshape(3, 1))
-
-
-def _moved(array: Array) -> Array:
-    return np.roll(array, (1, 1), axis=(-2, -1))

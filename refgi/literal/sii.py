@@ -25,12 +25,11 @@ def sii(
 ) -> Any:
     """Return the irradiance (3, h, w) of the pairs in range, W/m^2: I_low is a share of the largest I_0 over L^2."""
     lobe = lobe_flux, lobe_axis, lobe_exponent
-    b = strengths(position, normal, triangle_id, light_position, light_normal, flux, *lobe)
-    peak = peaks(light_normal, flux, *lobe)
-    length = reference_length(position, normal, triangle_id, light_position, light_normal, flux, *lobe, drawn=drawn)
-    low = low_irradiance(length, *one_or_two(peak), share=share)
-    return range_sum(*one_or_two(kept(low, *one_or_two(b))), position, normal, triangle_id, light_position,
-                     light_normal, flux, *lobe, area)
+    seen = position, normal, triangle_id, light_position, light_normal, flux, *lobe
+    peak, lobe_peak = one_or_two(peaks(light_normal, flux, *lobe))
+    low = low_irradiance(reference_length(*seen, drawn=drawn), peak, lobe_peak, share=share)
+    diffuse, glossy = one_or_two(kept(low, *one_or_two(strengths(*seen))))
+    return range_sum(diffuse, glossy, *seen, area)
 
 
 def largest(flux: Any) -> Any:

@@ -14,7 +14,6 @@ from refgi.rsm.buffers.light_projection import light_projection
 from refgi.splat.gather import gather
 from refgi.vectors.cases.gather import FULL, FULL_PLANS, QUICK, QUICK_PLANS, SQUARE, settings_of
 from refgi.vectors.cases.scenes import room
-from refgi.vectors.stages.gather_disc import Disc, literal_sum
 from tests.naive import gather as twin
 from tests.vectors.splat_ports import LARGEST_MASK, expect_within, made, masked_shares, stages_of
 
@@ -145,13 +144,3 @@ def test_the_literal_twin_as_a_port_is_within_bounds(id):
 @pytest.mark.parametrize("id", ALL)
 def test_rounding_decides_few_elements(id):
     assert max(masked_shares(id, "gather").values()) < LARGEST_MASK
-
-
-@pytest.mark.parametrize("id", ALL)
-def test_the_sum_that_bugs_are_put_into_has_none_of_its_own(id):
-    facts = made(id)[0].facts
-    for index in range(len(lamps(id))):
-        maps = view_of(id, index)
-        disc = Disc(facts["gather"]["radius"], maps.height, maps.width)
-        light = literal_sum(made(id)[1], index, disc, facts["gather"]["offset"])
-        expect_within(id, f"gather{index}.sum", {f"gather{index}.irradiance": light})

@@ -9,7 +9,6 @@ from refgi.frame import Frame
 from refgi.pairs.settings import PairSettings
 from refgi.settings import of
 from refgi.truth.vpl import VplSettings, vpl
-from refgi.vectors.bugs.imperfect import literal_filled, literal_maps, literal_points
 from refgi.vectors.cases.vpl import FULL_PLANS, QUICK_PLANS
 from refgi.vectors.stages.lights import pixel_lights_of
 from tests.naive import imperfect
@@ -157,16 +156,3 @@ def test_something_is_in_shadow_everywhere_but_in_the_dark():
         given = Given(id)
         lit = given.light.any(axis=2)
         assert 0.05 < given.known["vpl.visible"][:, *given.at][lit].mean() < 0.95
-
-
-@pytest.mark.parametrize("id", ["vpl-maps", "vpl-maps-bare"])
-def test_maps_that_bugs_are_put_into_have_none_of_their_own(id):
-    case, known = made(id)
-    facts, exact = case.facts["vpl.maps"], {key: array.astype(float) if array.dtype.kind == "f" else array
-                                            for key, array in known.items()}
-    expect_within(id, "vpl.points", literal_points(exact, facts["points"]))
-    expect_within(id, "vpl.depth", literal_maps(exact, facts["texels a side"],
-                                                facts["boxes, in the width of a point's disc"]))
-    if facts["levels"]:
-        expect_within(id, "vpl.filled", {"vpl.filled": np.array([literal_filled(one, facts["levels"])
-                                                                 for one in exact["vpl.depth"]])})

@@ -28,27 +28,31 @@ def pattern(xi: Any, weight_squared: bool = False) -> Any:
 
 
 def centers(
-    position: Any, triangle_id: Any, origin: Any, frame: Any, half: Any, rows: int, columns: int, perspective: bool
+    position: Any, triangle_id: Any, origin: Any, frame: Any, half: Any, rows: int, columns: int,
+    kind: str,
 ) -> Any:
     """Return where on the stacked maps each receiver lies, (2, h, w) row and column, and its depth (h, w), m.
 
-    k maps of rows x columns: origin (k, 3), frame (k, 3, 3) right, down, forward, half (2,) extent right and down.
-    Outside: where the straight way to the middle of the first map meets its border, at depth inf.
+    k maps of rows x columns, "perspective", "orthographic" or "paraboloid": origin (k, 3), frame (k, 3, 3) right, down,
+    forward, half (2,) extent right and down. Outside: where the straight way to the middle of the first map meets its
+    border, at depth inf.
     """
     covered, x = triangle_id >= 0, position.reshape(3, -1)
     right, down, ahead = in_frame(x, origin[0], frame[0])
     plane = np.stack([down / half[1], right / half[0]])
-    away = np.maximum(ahead, 1e-30) if perspective else np.ones_like(ahead)  # behind the lamp: as far out as can be
+    away = np.ones_like(ahead) if kind == "orthographic" else np.maximum(ahead, 1e-30)  # behind: as far out as can be
     place = share_of_map(plane / np.maximum(np.abs(plane).max(axis=0), away)) * [[rows], [columns]]
     depth = np.full(x.shape[1], np.inf, x.dtype)
     for k in reversed(range(len(origin))):  # of several maps that see a point the first one
         right, down, ahead = in_frame(x, origin[k], frame[k])
         plane = np.stack([down / half[1], right / half[0]])
-        z = ahead if perspective else np.ones_like(ahead)
-        sees = (np.abs(plane) <= z).all(axis=0) & (z > 0)
+        distance = np.sqrt(right**2 + down**2 + ahead**2)
+        far = distance if kind == "paraboloid" else ahead
+        z = {"perspective": ahead, "orthographic": np.ones_like(ahead), "paraboloid": distance + ahead}[kind]
+        sees = (np.abs(plane) <= z).all(axis=0) & (z > 0) & ((ahead >= 0) | (kind == "orthographic"))
         on_map = share_of_map(plane / np.where(sees, z, 1)) * [[rows], [columns]] + [[k * rows], [0]]
         place = np.where(sees, on_map, place)
-        depth = np.where(sees, ahead, depth)
+        depth = np.where(sees, far, depth)
     place, depth = place.reshape(2, *covered.shape), depth.reshape(covered.shape)
     return np.where(covered, place, 0), np.where(covered, depth, np.inf)
 

@@ -29,7 +29,7 @@ def test_weights_make_the_samples_even():
 
 def place(x, y, z, **view):
     view = {"origin": np.zeros((1, 3)), "frame": np.eye(3)[None], "half": np.array([1.0, 0.5]), "rows": 8,
-            "columns": 12, "perspective": True} | view
+            "columns": 12, "kind": "perspective"} | view
     center, depth = centers(np.reshape([x, y, z], (3, 1, 1)), np.zeros((1, 1), int), **view)
     return (*center.ravel().tolist(), float(depth.item()))
 
@@ -38,7 +38,10 @@ def test_places_on_a_map_by_hand():
     assert place(1.0, -0.5, 2.0) == pytest.approx((2.0, 9.0, 2.0))  # down -1/4 of 1/2, right 1/2 of 1
     assert place(6.0, 1.5, 2.0) == pytest.approx((6.0, 12.0, math.inf))  # (3, 1.5) in halves: on the way at (1, 0.5)
     assert place(0.5, 0.125, -1.0) == pytest.approx((6.0, 12.0, math.inf))  # behind: as far out as can be
-    assert place(0.5, -0.25, 9.0, perspective=False) == pytest.approx((2.0, 9.0, 9.0))
+    assert place(0.5, -0.25, 9.0, kind="orthographic") == pytest.approx((2.0, 9.0, 9.0))
+    side = {"kind": "paraboloid", "half": np.ones(2)}
+    assert place(3.0, 0.0, 4.0, **side) == pytest.approx((4.0, 8.0, 5.0))  # 3 / (5 + 4)
+    assert place(1.0, -1.0, -1.0, **side) == pytest.approx((0.0, 12.0, math.inf))  # behind
 
 
 def test_of_stacked_maps_the_one_that_sees_a_point_counts():
@@ -49,7 +52,7 @@ def test_of_stacked_maps_the_one_that_sees_a_point_counts():
 
 def test_without_surface_there_is_neither_place_nor_texel():
     center, depth = centers(np.ones((3, 1, 1)), np.full((1, 1), -1), np.zeros((1, 3)), np.eye(3)[None], np.ones(2), 8,
-                            8, True)
+                            8, "perspective")
     assert center.tolist() == [[[0]], [[0]]]
     assert depth == math.inf
     assert disc_texels(center, np.zeros((1, 2)), np.full((1, 1), -1), 0.5, 1, 8, 8) == -1

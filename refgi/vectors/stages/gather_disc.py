@@ -6,13 +6,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from refgi.literal import gather as literal
-from refgi.rsm.raster.projection import PERSPECTIVE, Projection, project
+from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, PERSPECTIVE, Projection, project
 from refgi.splat.gather.gather_sum import GatherMap, centers, fill_texels, gather_discs
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.rows import Form
 from refgi.vectors.spec import Arrays, Spec
 from refgi.vectors.stages.pairs import RECEIVERS
 
+KINDS = {PERSPECTIVE: "perspective", ORTHOGRAPHIC: "orthographic", PARABOLOID: "paraboloid"}
 OFFSET, WEIGHT = "gather.offset", "gather.weight"
 PAPER = "RSM 2005, Sec. 4; docs/methods/gather"
 
@@ -47,12 +48,12 @@ def add_centers(recipe: Recipe, index: int, maps: Projection, decided: bool) -> 
             places[:, covered] = centers(here, points)
         return {center: places.reshape(2, *shape), depth: depths.reshape(shape)}
 
-    perspective = maps.kind == PERSPECTIVE
+    kind = KINDS[maps.kind]
     form = Form(literal.centers, {"position": RECEIVERS[0], "triangle_id": RECEIVERS[2], **dict(zip(
         ("origin", "frame", "half"), planes, strict=True))}, (center, depth), {
-            "rows": maps.height, "columns": maps.width, "perspective": perspective})
+            "rows": maps.height, "columns": maps.width, "kind": kind})
     lists = ("centers", *(["centers/stacked"] if maps.maps > 1 else []), *(
-        ["centers/perspective"] if perspective else []))
+        ["centers/perspective"] if kind == "perspective" else []))
     recipe.add(f"gather{index}.center", "where on the map each pixel's surface point lies", run,
                (RECEIVERS[0], RECEIVERS[2], *planes), {
                    center: Spec("(row, column), row, column", "texel", "place on the stacked maps, texel centres at + "

@@ -5,6 +5,7 @@ lamp can have another's N, T, distance or peak. Where a factor is that of single
 Expected values come from section "Printed forms" of docs/radiometry, in closed form from the default's lights.
 """
 
+import dataclasses
 import math
 import re
 from pathlib import Path
@@ -32,7 +33,8 @@ from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
 from refgi.stages import observe
 from tests import lamps
-from tests.naive import eq2, upsample
+from tests.naive import gather as literal_gather
+from tests.naive import upsample
 from tests.naive.radiometry import lobe_fraction, solid_angle_of_rectangle
 from tests.wiring.cases import needed
 
@@ -226,17 +228,15 @@ def scaled_by_openness():
 
 
 def square_of_xi():
-    """Gather with the weight 3/2 xi_1^2 of one literal loop a pixel and lamp."""
+    """Gather with the weight 3/2 xi_1^2 of the literal text, lamp by lamp."""
     frame = lamps.corner(lamps.RED, lamps.BLUE)
     settings = of(GatherSettings, samples=60, radius=0.4, interpolation="none")
     printed, _ = pair_of(gather, frame, settings, "rsm_weight_squared")
+    squared = dataclasses.replace(settings.disc, as_published=frozenset({"rsm_weight_squared"}))
     expected, seen = np.zeros_like(printed), np.zeros(printed.shape, bool)
     for channel, rsm in zip((0, 2), frame.rsms, strict=True):
-        row, column, _ = rsm.project(frame.gbuffer.position)
-        for i, j in np.argwhere(frame.gbuffer.covered & np.isfinite(row)):
-            seen[channel, i, j] = True
-            expected[channel, i, j] = eq2.gather(frame.gbuffer.position[:, i, j], frame.gbuffer.normal[:, i, j],
-                                                 (row[i, j], column[i, j]), rsm, 60, 0.4, power=2)[channel]
+        seen[channel] = frame.gbuffer.covered & np.isfinite(rsm.project(frame.gbuffer.position)[0])
+        expected[channel] = literal_gather.every_sum(frame.gbuffer, [rsm], squared)[channel]
     return printed[seen] / expected.max(), expected[seen] / expected.max()
 
 

@@ -13,6 +13,7 @@ from refgi.cluster.val import cluster_lights
 from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
+from refgi.literal.pairs import pair
 from refgi.method import _WARNED
 from refgi.methods import METHODS, render
 from refgi.rays import Tracer
@@ -169,25 +170,20 @@ def test_vpl_sums_what_shadow_rays_let_through(scene, visibility):
 def test_gather_sums_the_discs(room, offset):
     settings = from_text(METHODS["gather"].settings(), ("disc.samples=40", f"disc.offset={offset}"))
     points, disc = room.glossy_points, settings.disc
-    pattern, total = gather.disc_pattern(disc), np.zeros(points.position.shape)
-    w_o = to_eye(room, points)
+    (pattern, weight), total = gather.disc_pattern(disc), np.zeros(points.position.shape)
+    w_o, ids = to_eye(room, points), np.zeros((1, len(points.pixel)), int)
     for rsm in room.rsms:
-        height, width = rsm.projection.height, rsm.projection.width
-        sheet = rsm.flux.shape[1:]
+        texel = gather.disc_texels(rsm, disc, pattern, points.position[:, None], ids)[:, 0]
         for i in range(len(points.pixel)):
-            x, normal = points.position[:, i], points.normal[:, i]
-            row, column = gather.place(rsm.projection, x)
-            rows = np.floor(row + pattern[:, 0] * height).astype(int)
-            columns = np.floor(column + pattern[:, 1] * width).astype(int)
-            on = (rows >= 0) & (rows < sheet[0]) & (columns >= 0) & (columns < sheet[1])
-            p, n, flux = (part[:, rows[on], columns[on]] for part in (rsm.position, rsm.normal, rsm.flux))
+            x, normal, on = points.position[:, i], points.normal[:, i], texel[:, i] >= 0
+            p, n, flux = (part.reshape(3, -1)[:, texel[on, i]] for part in (rsm.position, rsm.normal, rsm.flux))
             p = p - offset * n
             with np.errstate(invalid="ignore", divide="ignore"):
                 w_i = ((p - x[:, None]) / np.linalg.norm(p - x[:, None], axis=0)).T
                 f = receiver_lobes.brdf(points.exponent[i], normal, w_i, w_o[:, i])
-                light = np.where(flux.any(axis=0), flux * gather.pair(x, normal, p, n) * f, 0.0)
-            scale = 2 * math.pi * disc.radius**2 * height * width / disc.samples
-            total[:, i] += points.specular[:, i] * scale * (light @ pattern[on, 2])
+                light = np.where(flux.any(axis=0), pair(x[:, None], normal[:, None], p, n, flux) * f, 0.0)
+            scale = disc.radius**2 * rsm.projection.height * rsm.projection.width / disc.samples
+            total[:, i] += points.specular[:, i] * scale * (light @ weight[on])
     close(METHODS["gather"].lobes(room, settings), spread(room, points, total))
 
 

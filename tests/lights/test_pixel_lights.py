@@ -8,6 +8,7 @@ import pytest
 from refgi.errors import InputError
 from refgi.lights import Warp, choose_pixel_lights, importance
 from refgi.lights.shares import map_shares
+from refgi.literal.lights import grid_points, halton_points, pixel_lights, texels
 from refgi.rsm import reflective_shadow_map
 from refgi.scene import Material, PointLight, SpotLight, load_scene, material_table
 from refgi.stages import observe
@@ -40,19 +41,17 @@ def with_flux(rsm, flux):
 
 @pytest.mark.feature("SII-13")
 @pytest.mark.parametrize(("pattern", "count"), [("grid", 25), ("grid", 49), ("halton", 50), ("halton", 700)])
-def test_texels_and_weights_equal_those_of_a_literal_twin(pattern, count, evidence):
+def test_lights_equal_those_of_the_literal_text(pattern, count, evidence):
     rsm = box_map()
-    texels = (naive.grid_texels(math.isqrt(count), 24, 24) if pattern == "grid"
-              else naive.halton_texels(count, 24, 24))  # fmt: skip
-    expected = naive.lights(rsm.flux, texels)
+    points = grid_points(math.isqrt(count)) if pattern == "grid" else halton_points([count], np.zeros((1, 2)), 0)
+    texel, weight = texels(points, [count], 0, 1, 24, 24)
+    p, m, phi, *_ = pixel_lights([texel], [weight], [rsm.position], [rsm.normal], [rsm.flux])
     lights = choose_pixel_lights([rsm], count=count, pattern=pattern)
     assert lights.drawn == count
-    assert lights.flux.shape == (3, len(expected))
-    for k, (row, column, phi) in enumerate(expected):
-        np.testing.assert_allclose(lights.flux[:, k], phi, rtol=ROUNDING)
-        np.testing.assert_array_equal(lights.position[:, k], rsm.position[:, row, column])
-        np.testing.assert_array_equal(lights.normal[:, k], rsm.normal[:, row, column])
-    evidence(f"{pattern} N={count}: {len(expected)} lights with flux, weights T/N")
+    np.testing.assert_allclose(lights.flux, phi, rtol=ROUNDING)
+    np.testing.assert_array_equal(lights.position, p)
+    np.testing.assert_array_equal(lights.normal, m)
+    evidence(f"{pattern} N={count}: {phi.shape[1]} lights with flux, weights T/N")
 
 
 @pytest.mark.feature("SII-13")
@@ -103,9 +102,9 @@ def test_grid_cells_equal_those_of_a_literal_twin(n, resolution):
 
 def test_nearest_cells_equal_those_of_a_literal_twin():
     rsm = box_map()
-    texels = naive.halton_texels(9, 24, 24)
+    chosen, _ = texels(halton_points([9], np.zeros((1, 2)), 0), [9], 0, 1, 24, 24)
     lights = choose_pixel_lights([rsm], count=9, pattern="halton", filtered=True)
-    expected = np.array(naive.nearest_cell_sums(rsm.flux, texels))
+    expected = np.array(naive.nearest_cell_sums(rsm.flux, [divmod(int(t), 24) for t in chosen]))
     np.testing.assert_allclose(lights.flux, expected[:, expected.any(axis=0)], rtol=ROUNDING)
 
 

@@ -63,32 +63,3 @@ def irradiance(position, normal, lights, term=pair):
             total[:, i] += term(position[:, i], normal[:, i], lights.position[:, k], lights.normal[:, k],
                                 lights.flux[:, k])
     return total
-
-
-def gather(x, normal_x, center, rsm, samples, radius, offset=0.0, power=1):
-    """Sum the texels at center + r_max xi_1 (cos, sin)(2 pi xi_2) with the weight xi_1, Halton points from 1 on.
-
-    With another power of xi_1 the weight is (power + 1) / 2 xi_1^power, whose mean is the same.
-    `center` is (row, column), `rsm` has position, normal and flux (3, H, W) of one square map; E = (2 pi r_max^2 T / S)
-    sum xi_1 E_t with r_max in map widths and T the texels of the map.
-    """
-    height, width = rsm.flux.shape[1:]
-    total = np.zeros(3)
-    for s in range(1, samples + 1):
-        xi1, xi2 = van_der_corput(s, 2), van_der_corput(s, 3)
-        row = math.floor(center[0] + radius * height * xi1 * math.cos(2 * math.pi * xi2))
-        column = math.floor(center[1] + radius * width * xi1 * math.sin(2 * math.pi * xi2))
-        if 0 <= row < height and 0 <= column < width:
-            p, n, flux = (part[:, row, column].astype(float) for part in (rsm.position, rsm.normal, rsm.flux))
-            total += (power + 1) / 2 * xi1**power * pair(x, normal_x, p - offset * n, n, flux)
-    return 2 * math.pi * radius**2 * height * width / samples * total
-
-
-def van_der_corput(index, base):
-    """Mirror the digits of an index at the point."""
-    value, digit = 0.0, 1.0 / base
-    while index:
-        value += index % base * digit
-        index //= base
-        digit /= base
-    return value

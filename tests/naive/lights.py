@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from refgi.literal.lights import grid_points, halton_points
+from refgi.literal.warp import warp
 from tests.naive.draws import draw
 from tests.naive.light_maps import maps_of
 from tests.naive.light_paths import walk
 from tests.naive.openness import openness
-from tests.naive.pixel_lights import grid_texels, radical_inverse
 from tests.naive.shares import nearest_grid, shares_of
-from tests.naive.warp import pyramid, warp
 
 PATTERN, ROULETTE = 0, 2  # uses of the random streams
 
@@ -129,9 +129,8 @@ def texels_of(here, index, share, settings):
     if settings.source.pattern == "all":
         return list(range(here.texels))
     if settings.source.pattern == "grid":
-        cells = grid_texels(math.isqrt(share // here.stacked), here.width, here.width)
-        return [(layer * here.width + row) * here.width + column
-                for layer in range(here.stacked) for row, column in cells]
+        return [(layer * here.width + math.floor(v * here.width)) * here.width + math.floor(u * here.width)
+                for layer in range(here.stacked) for u, v in grid_points(math.isqrt(share // here.stacked))]
     return [texel_at(here, u, v) for u, v in points_of(here, index, share, settings)]
 
 
@@ -139,13 +138,12 @@ def points_of(here, index, share, settings):
     """Return the pattern as points (u, v) over the stacked maps: columns, rows downwards."""
     stream = PATTERN + 256 * index
     if settings.source.pattern == "grid":
-        n = math.isqrt(share // here.stacked)
-        return [((i + 0.5) / n, (layer + (j + 0.5) / n) / here.stacked)
-                for layer in range(here.stacked) for j in range(n) for i in range(n)]
+        return [(u, (layer + v) / here.stacked)
+                for layer in range(here.stacked) for u, v in grid_points(math.isqrt(share // here.stacked))]
     if settings.source.pattern == "random":
         return [(draw(settings.seed, stream, 2 * k), draw(settings.seed, stream, 2 * k + 1)) for k in range(share)]
     shift = [draw(settings.seed, stream, axis) if settings.seed or index else 0.0 for axis in (0, 1)]
-    return [((radical_inverse(k, 2) + shift[0]) % 1, (radical_inverse(k, 3) + shift[1]) % 1) for k in range(share)]
+    return halton_points([share], np.array([shift]), 0)
 
 
 def texel_at(here, u, v):
@@ -156,29 +154,14 @@ def texel_at(here, u, v):
 def warped_texels(here, index, share, frame, settings):
     """Return the warped pattern's texels and weights; v chooses the stacked map first."""
     how = settings.source.warp
-    importance = importance_of(here, frame, settings).reshape(here.stacked, here.width, here.width)
-    sums = [pyramid(layer) for layer in importance]
-    levels = min(how.levels, len(sums[0]) - 1)
-    places = []
-    for u, v in points_of(here, index, share, settings):
-        layer, v, w = layer_of(v, importance.sum(axis=(1, 2)))
-        u, v, factor = warp(u, v, sums[layer], levels, how.name())
-        places.append((texel_at(here, u, (layer + v) / here.stacked), w * factor))
+    importance = importance_of(here, frame, settings).reshape(here.height, here.width)
+    points, weights = warp(np.array(points_of(here, index, share, settings)), importance, here.stacked, how.levels,
+                           how.name())
+    places = [(texel_at(here, u, v), weight) for (u, v), weight in zip(points, weights, strict=True)]
     if how.renormalise_weights:
         total = sum(weight for _, weight in places)
         places = [(texel, weight * share / total) for texel, weight in places]
     return places
-
-
-def layer_of(v, sums):
-    """Return the stacked map that v falls on in proportion to their importance, v stretched over it, and 1/density."""
-    shares = sums / sums.sum() if sums.any() else np.full(len(sums), 1 / len(sums))
-    below = 0.0
-    for layer, part in enumerate(shares):
-        if v < below + part:
-            return layer, (v - below) / part, 1 / (len(shares) * part)
-        below += part
-    raise ValueError(v)
 
 
 def importance_of(here, frame, settings):

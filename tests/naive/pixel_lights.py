@@ -1,39 +1,15 @@
-"""Slow literal twin of the choice of pixel lights."""
+"""Slow literal twins of cells of filtered pixel lights, and of mirrored directions."""
 
 import math
 
+import numpy as np
+
+from refgi.literal import lights as literal
+
 
 def radical_inverse(index, base):
-    value, scale = 0.0, 1.0 / base
-    while index:
-        value += (index % base) * scale
-        index //= base
-        scale /= base
-    return value
-
-
-def grid_texels(n, height, width):
-    """uv = ((i + 1/2)/n, (j + 1/2)/n), texel = floor(uv * resolution), row by row."""
-    return [
-        (math.floor((j + 0.5) / n * height), math.floor((i + 0.5) / n * width)) for j in range(n) for i in range(n)
-    ]
-
-
-def halton_texels(count, height, width):
-    return [
-        (math.floor(radical_inverse(k, 3) * height), math.floor(radical_inverse(k, 2) * width)) for k in range(count)
-    ]
-
-
-def lights(flux, texels):
-    """Phi_i = Phi_t / (N q_t) with q = 1/T; those without flux left out."""
-    height, width = len(flux[0]), len(flux[0][0])
-    chosen = []
-    for row, column in texels:
-        phi = [channel[row][column] * (height * width) / len(texels) for channel in flux]
-        if any(phi):
-            chosen.append((row, column, phi))
-    return chosen
+    """Return the digits of one number mirrored at the point."""
+    return float(literal.radical_inverse(np.array([index]), base)[0])
 
 
 def grid_cell_sums(flux, n):

@@ -1,11 +1,13 @@
-"""Slow literal twin of pixel lights with true visibility: every pair of light and receiver, and a ray for each."""
+"""`vpl` as a whole by the literal text: pixel lights with visibility by rays or imperfect maps, in float64."""
 
 import numpy as np
 
-from refgi.pairs.settings import PairSettings
-from tests.naive import imperfect
-from tests.naive.crossings import LIFT, corners_of, face_normals, free
-from tests.naive.pair_term import contributions
+from refgi.literal import imperfect, pairs
+from refgi.literal.vpl import facing, shadowed_sum, visible
+from tests.naive.crossings import face_normals
+from tests.naive.draws import draw
+
+STREAM = 7  # of a light's points: this + 256 times its number
 
 
 def picture(frame, lights, visibility=True, maps=None, seed=0):
@@ -15,33 +17,31 @@ def picture(frame, lights, visibility=True, maps=None, seed=0):
     blocked by it; without, cosines alone bound a pair. With `maps`, settings of imperfect ones, those stand for rays.
     """
     buffer, geometry = frame.gbuffer, frame.scene.geometry
-    pixels = np.argwhere(buffer.covered)
-    at = tuple(pixels.T)
-    position, normal = (plane[:, *at].T.astype(float) for plane in (buffer.position, buffer.normal))
-    facing = face_normals(geometry, buffer.triangle_id[at], normal)
-    light = contributions(position, normal, lights, PairSettings())
-    up = sender_faces(frame, lights)
-    result = np.zeros((3, frame.height, frame.width))
-    for i, sent in enumerate(light):
-        place = lights.position[:, i].astype(float)
-        toward = place - position
-        counts = sent.any(axis=1) & (((toward * facing).sum(axis=1) > 0) | (not visibility))
-        if visibility and maps is not None:
-            counts[counts] = unmapped(corners_of(geometry), lights, i, position[counts], facing[counts], maps, seed)
-        elif visibility:
-            counts &= toward @ up[i] < 0
-            counts[counts] = free(corners_of(geometry), position[counts] + LIFT * facing[counts], place + LIFT * up[i])
-        result[:, *at] += (sent * counts[:, None]).T
-    return result
+    vertices, faces = np.asarray(geometry.vertices, float), geometry.faces
+    position, normal, ids = (*(np.asarray(one, float) for one in (buffer.position, buffer.normal)),
+                             np.where(buffer.covered, buffer.triangle_id, -1))
+    sent = [None if one is None else np.asarray(one, float) for one in lights[:6]]
+    if not visibility:
+        return pairs.irradiance(position, normal, ids, *sent)
+    up = facing(vertices, faces, normal, ids)
+    if maps is None:
+        seen = visible(vertices, faces, position, normal, ids, up, *sent[:2])
+    else:
+        depth, views, radius = imperfect_maps(geometry, lights, maps, seed)
+        seen = imperfect.looked_up(position, normal, ids, up, *sent[:2], views, depth, radius, maps.bias)
+    return shadowed_sum(position, normal, ids, seen, *sent)
 
 
-def unmapped(corners, lights, i, points, facing, maps, seed):
-    """Return which points light i reaches by its imperfect shadow map."""
-    position, normal = lights.position[:, i].astype(float), lights.normal[:, i].astype(float)
-    depth, radius = imperfect.depth_map(corners, position, normal, i, maps.points, maps.resolution, maps.levels, seed,
-                                        maps.splat)
-    return [not imperfect.is_hidden(depth, radius, maps.bias, point, up, position, normal)
-            for point, up in zip(points, facing, strict=True)]
+def imperfect_maps(geometry, lights, maps, seed):
+    """Return the maps (N, R, R) of lights, their frames (N, 3, 3) and the radius of a point, m."""
+    vertices, faces = np.asarray(geometry.vertices, float), geometry.faces
+    shift = np.array([[draw(seed, STREAM + 256 * number, c) for c in range(3)]
+                      for number in range(lights.flux.shape[1])])
+    point, face, radius = imperfect.scattered_points(vertices, faces, shift, maps.points)
+    views = imperfect.frames(np.asarray(lights.normal, float))
+    depth = imperfect.depth_maps(vertices, faces, point, face, radius, np.asarray(lights.position, float), views,
+                                 maps.resolution, maps.splat)
+    return imperfect.filled(depth, maps.levels), views, radius
 
 
 def sender_faces(frame, lights):

@@ -1,4 +1,4 @@
-"""Slow literal twin of hierarchical warping for square maps of 2^L x 2^L texels."""
+"""Chances of texels under hierarchical warping, for square maps of 2^L x 2^L texels, and the variance they leave."""
 
 
 def pyramid(importance):
@@ -10,36 +10,6 @@ def pyramid(importance):
         levels.insert(0, [[below[2 * i][2 * j] + below[2 * i][2 * j + 1] + below[2 * i + 1][2 * j]
                            + below[2 * i + 1][2 * j + 1] for j in half] for i in half])  # fmt: skip
     return levels
-
-
-def _step(y, r):
-    """Eq. (5) and (6): the new coordinate and the factor of the weight."""
-    if y < r:
-        return y / (2 * r), 1 / (2 * r)
-    return (1 + y - 2 * r) / (2 * (1 - r)), 1 / (2 * (1 - r))
-
-
-def warp(x, y, sums, levels, method):
-    """Return (u, v, w) of one sample after the given number of levels."""
-    ci, cj, w = 0, 0, 1.0
-    below_one = 1 - 2**-53
-    for level in range(1, levels + 1):
-        s = sums[level]
-        tl, tr = s[2 * ci][2 * cj], s[2 * ci][2 * cj + 1]
-        bl, br = s[2 * ci + 1][2 * cj], s[2 * ci + 1][2 * cj + 1]
-        total = tl + tr + bl + br
-        y, factor = _step(y, (tl + tr) / total if total else 0.5)
-        y, w = min(y, below_one), w * factor
-        if method == "A":
-            a, b = (tl, tr) if y < 0.5 else (bl, br)
-        else:
-            a, b = tl + bl, tr + br
-        x, factor = _step(x, a / (a + b) if a + b else 0.5)
-        x, w = min(x, below_one), w * factor
-        ci, cj = 2 * ci + (y >= 0.5), 2 * cj + (x >= 0.5)
-        x, y = (2 * x) % 1, (2 * y) % 1
-    cells = 2**levels
-    return (cj + x) / cells, (ci + y) / cells, w
 
 
 def probabilities(importance, levels, method):

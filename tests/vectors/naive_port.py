@@ -1,11 +1,14 @@
-"""The first port: what a kit's stages give by the literal twins, texel by texel, in float64."""
+"""The first port: what a kit's stages give by the literal text and twins of buffers, in float64."""
 
 import math
 
 import numpy as np
 
-from tests.naive import eq2, raster, warp
-from tests.naive.pixel_lights import grid_texels, mirror, radical_inverse
+from refgi.literal import lights, pairs
+from refgi.literal.warp import warp
+from refgi.vectors.stages.lights import LIGHT, LOBE
+from tests.naive import raster
+from tests.naive.pixel_lights import mirror
 
 RAYS = {"perspective": raster.perspective_ray, "orthographic": raster.orthographic_ray}
 
@@ -103,87 +106,48 @@ class NaivePort:
     def points(self, name, _, arrays):
         count = self.case.arrays[f"{name}.points"].shape[0]
         if self.case.facts[f"{name}.points"] == "grid":
-            n = math.isqrt(count)
-            return {f"{name}.points": [((i + 0.5) / n, (j + 0.5) / n) for j in range(n) for i in range(n)]}
-        shift = arrays.get(f"{name}.shift", (0, 0))
-        return {f"{name}.points": [((radical_inverse(k, 2) + shift[0]) % 1, (radical_inverse(k, 3) + shift[1]) % 1)
-                                   for k in range(count)]}
+            return {f"{name}.points": lights.grid_points(math.isqrt(count))}
+        shift = np.array(arrays.get(f"{name}.shift", (0, 0)))
+        return {f"{name}.points": lights.halton_points([count], shift[None], 0)}
 
     def importance(self, name, _, arrays):
-        flux = arrays[f"{name}.flux"] + arrays.get(f"{name}.lobe_flux", 0)
-        return {f"{name}.importance": flux.max(axis=0)}
+        return {f"{name}.importance": lights.importance(arrays[f"{name}.flux"], arrays.get(f"{name}.lobe_flux"))}
 
     def warp(self, name, _, arrays):
-        how, worth = self.case.facts[f"{name}.warp"], arrays[f"{name}.importance"]
-        if worth.shape[0] != worth.shape[1] or worth.shape[0] & (worth.shape[0] - 1):
-            return None  # the twin knows one square map of a power of two
-        sums = warp.pyramid(worth)
-        found = [warp.warp(u, v, sums, how["levels"], how["method"]) for u, v in arrays[f"{name}.points"]]
-        return {f"{name}.warped": [one[:2] for one in found], f"{name}.density_weight": [one[2] for one in found]}
+        points, weight = warp(arrays[f"{name}.points"], arrays[f"{name}.importance"], self.case.facts[name]["maps"],
+                              **self.case.facts[f"{name}.warp"])
+        return {f"{name}.warped": points, f"{name}.density_weight": weight}
 
     def texels(self, name, _, arrays):
         (points,) = [arrays[key] for key in (f"{name}.warped", f"{name}.points") if key in arrays]
         rows, columns = self.case.arrays[f"{name}.texel"].index_of
-        weight = arrays.get(f"{name}.density_weight", np.ones(len(points)))
-        if self.case.facts[f"{name}.points"] == "grid":
-            n = math.isqrt(len(points))
-            texel = [row * columns + column for row, column in grid_texels(n, rows, columns)]
-        else:
-            texel = [math.floor(v * rows) * columns + math.floor(u * columns) for u, v in points]
-        return {f"{name}.texel": texel, f"{name}.weight": rows * columns / len(points) * weight}
+        texel, weight = lights.texels(points, [len(points)], 0, 1, rows, columns,
+                                      arrays.get(f"{name}.density_weight", 1.0))
+        return {f"{name}.texel": texel, f"{name}.weight": weight}
 
     def lights(self, arrays):
-        out = {name: [] for name in self.written("lights")}
-        for m in range(sum(key.endswith(".texel") and key.startswith("rsm") for key in arrays)):
-            for texel, weight in zip(arrays[f"rsm{m}.texel"], arrays[f"rsm{m}.weight"], strict=True):
-                here = {key: arrays[f"rsm{m}.{key}"].reshape(-1, arrays[f"rsm{m}.triangle_id"].size)[:, texel]
-                        for key in (name.removeprefix("lights.") for name in out) if f"rsm{m}.{key}" in arrays
-                        and key != "texel"}
-                if not (here["flux"].any() or here.get("lobe_flux", np.zeros(3)).any()):
-                    continue
-                for key, value in here.items():
-                    factor = weight if key in ("flux", "lobe_flux") else 1
-                    out[f"lights.{key}"].append(factor * (value[0] if key == "lobe_exponent" else value))
-                out["lights.texel"].append(texel)
-                out["lights.map"].append(m)
-        return {name: np.array(rows).T for name, rows in out.items()}
+        maps = sum(key.endswith(".texel") and key.startswith("rsm") for key in arrays)
+        kinds = [key for key in ("texel", "weight", *LIGHT, *LOBE) if f"rsm0.{key}" in arrays]
+        names = [f"lights.{key}" for key in (*kinds[2:], "texel", "map")]
+        return dict(zip(names, lights.pixel_lights(*([arrays[f"rsm{m}.{key}"] for m in range(maps)] for key in kinds)),
+                        strict=True))
 
     def footprints(self, arrays):
-        areas = []
-        for k, (m, texel) in enumerate(zip(arrays["lights.map"], arrays["lights.texel"], strict=True)):
-            place = list(arrays[f"rsm{m}.texel"]).index(texel)
-            away = arrays[f"light{m}.position"] - arrays["lights.position"][:, k]
-            cosine = abs(away @ arrays["lights.normal"][:, k]) / np.linalg.norm(away)
-            areas.append(arrays[f"rsm{m}.solid_angle"].reshape(-1)[texel] * arrays[f"rsm{m}.weight"][place]
-                         * (away @ away) / cosine)
-        return {"lights.area": areas}
+        maps = range(1 + arrays["lights.map"].max())
+        near = [f"light{m}.position" in arrays for m in maps]
+        lamp = [arrays[f"light{m}.{'position' if near[m] else 'direction'}"] for m in maps]
+        own = ([arrays[f"rsm{m}.{key}"] for m in maps] for key in ("solid_angle", "texel", "weight"))
+        return {"lights.area": lights.footprints(
+            *(arrays[f"lights.{key}"] for key in ("position", "normal", "texel", "map")), *own, lamp, near)}
 
     def sum(self, arrays):
-        shape = self.case.arrays["sum.irradiance"].shape
-        total = np.zeros(shape)
-        for row, column in np.argwhere(arrays["gbuffer.triangle_id"] >= 0):
-            x, n = arrays["gbuffer.position"][:, row, column], arrays["gbuffer.normal"][:, row, column]
-            for k in range(arrays["lights.flux"].shape[1]):
-                total[:, row, column] += self.pair(arrays, x, n, k)
-        return {"sum.irradiance": total}
+        seen = (arrays[f"gbuffer.{key}"] for key in ("position", "normal", "triangle_id"))
+        own = (arrays.get(f"lights.{key}") for key in (*LIGHT, *LOBE, "area"))
+        return {"sum.irradiance": pairs.irradiance(*seen, *own)}
 
     def pairs(self, arrays):
-        count = arrays["lights.flux"].shape[1]
-        total = [self.pair(arrays, arrays["gbuffer.position"][:, 0, k], arrays["gbuffer.normal"][:, 0, k], k)
-                 for k in range(count)]
-        return {"pairs.irradiance": np.array(total).T[:, None]}
-
-    @staticmethod
-    def pair(arrays, x, n, k):
-        p, normal = arrays["lights.position"][:, k], arrays["lights.normal"][:, k]
-        area = arrays["lights.area"][k] if "lights.area" in arrays else 0.0
-        light = eq2.clamped_pair(x, n, p, normal, arrays["lights.flux"][:, k], area=area)
-        if "lights.lobe_flux" in arrays and arrays["lights.lobe_flux"][:, k].any():
-            lobe = eq2.lobe_pair(x, n, p, normal, arrays["lights.lobe_axis"][:, k], arrays["lights.lobe_exponent"][k],
-                                 arrays["lights.lobe_flux"][:, k])
-            r = np.linalg.norm(x - p)
-            light = light + lobe * (r**2 / (r**2 + area / math.pi) if area else 1.0)
-        return light
+        own = (arrays.get(f"lights.{key}") for key in (*LIGHT, *LOBE))
+        return {"pairs.irradiance": pairs.pairs(arrays["gbuffer.position"], arrays["gbuffer.normal"], *own)}
 
     def written(self, stage):
         """Return the names of the arrays that a stage writes."""

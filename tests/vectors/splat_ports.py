@@ -2,10 +2,14 @@
 
 from functools import cache
 
+import numpy as np
+
 from refgi.vectors.bounds import distance, isolated_bounds
 from refgi.vectors.cases import kit_cases
-from refgi.vectors.spec import expected_of, stored
+from refgi.vectors.spec import expected_of, outputs_of, stored
 
+SAME = 2e-6  # of an element and of its array's largest: places in float32, whose rounding near lights magnify
+DECIDED = 2e-3  # share of an array's elements that the rounding of float64 decides: rays along edges
 LARGEST_MASK = 0.05  # share of an array's elements that rounding may decide
 
 
@@ -52,3 +56,15 @@ def masked_shares(id, start):
     """Return the share of masked elements of each array of the stages that start with a word."""
     return {array: float(bound.masked.mean()) for name in stages_of(id, start)
             for array, bound in bounds_of(id, name).items() if bound.masked.size}
+
+
+def expect_literal(id, name):
+    """Expect that the literal text of a stage, its last variant, makes what the stage does."""
+    known, step = made(id)[1], stage_of(id, name)
+    for array, got in outputs_of(step, known, np.float64, step.variants[-1]).items():
+        expected = known[array]
+        assert got.shape == expected.shape, (id, array)
+        finite = np.isfinite(expected)
+        large = np.abs(expected[finite].astype(float)).max(initial=0)
+        same = np.isclose(got.astype(float), expected.astype(float), rtol=SAME, atol=SAME * large)
+        assert np.count_nonzero(~same) <= DECIDED * same.size, (id, array, np.mean(~same))

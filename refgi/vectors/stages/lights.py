@@ -6,16 +6,15 @@ import numpy as np
 
 from refgi.lights.pixel_lights import Drawn, lights_of
 from refgi.lights.warp import Warp, texel_of, warp_stacked
+from refgi.literal import lights as literal
+from refgi.literal.warp import warp as literal_warp
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.rsm.buffers.light_projection import light_projection
 from refgi.sampling import grid, halton
 from refgi.scene import Scene
-from refgi.vectors.bugs.lights import lights_bugs
-from refgi.vectors.bugs.points import below_1, grid_bugs, halton_bugs, importance_bugs
-from refgi.vectors.bugs.texel import texel_bugs
-from refgi.vectors.bugs.warp import warp_bugs
-from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.recipe import Recipe, reading
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.buffers import REFLECTANCE, SCENE, VECTOR, _light_names, _map_names, rsm_of
 
 Pattern = Literal["halton", "grid", "given"]
@@ -31,46 +30,53 @@ def add_lights(
 
     `shifts`: what is added to the points of each map modulo 1; none where absent.
     """
-    texels, weights = [], []
-    for index, count in enumerate(counts):
+    moved = shifts or ((0.0, 0.0),) * len(counts)
+    for index in range(len(counts)):
         if pattern == "grid" and recipe.facts[f"rsm{index}"]["maps"] > 1:
             raise ValueError(f"{recipe.id}: a grid on stacked maps: refgi lays one on each")
-        add_points(recipe, index, count, pattern, shifts[index] if shifts else None, before=sum(counts[:index]),
-                   first=shifts[0] if shifts and index else None)
+        add_points(recipe, index, counts, pattern, moved, bool(shifts))
         _add_texels(recipe, scene, resolution, index, counts, warp)
-        texels.append(f"rsm{index}.texel")
-        weights.append(f"rsm{index}.weight")
     _add_chosen(recipe, scene, resolution, counts)
 
 
+def below_1(points: Array) -> Array:
+    """Return points that stay below 1 in float32."""
+    return np.minimum(points, literal.BELOW_1)
+
+
 def add_points(
-    recipe: Recipe, index: int, count: int, pattern: Pattern, shift: tuple[float, float] | None = None, *,
-    before: int = 0, first: tuple[float, float] | None = None,
+    recipe: Recipe, index: int, counts: tuple[int, ...], pattern: Pattern, shifts: tuple[tuple[float, float], ...],
+    shifted: bool,
 ) -> None:
     """Add the points of the unit square that texels of a map are chosen by: computed, or given as random numbers.
 
-    `before`, `first`: points of the maps before and the first map's shift, which a port may take for this one's.
+    `counts` and `shifts` are those of all maps; the map's own shift is given where points are `shifted`.
     """
-    name = f"rsm{index}.points"
+    name, count = f"rsm{index}.points", counts[index]
     recipe.facts[name] = pattern
     spec = Spec("point, uv", "1", "points of the unit square in [0, 1): u along columns, v along rows downwards")
     if pattern == "given":
         recipe.give(name, below_1(np.random.default_rng([7, index]).random((count, 2))), spec)
         return
-    if shift is not None:
-        recipe.give(f"rsm{index}.shift", np.array(shift), Spec("uv", "1", "added to every point, modulo 1"))
+    shift = f"rsm{index}.shift"
+    if shifted:
+        recipe.give(shift, np.array(shifts[index]), Spec("uv", "1", "added to every point, modulo 1"))
 
     def points(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 numbers, the same in any type
         if pattern == "grid":
             return {name: grid(int(np.sqrt(count)))}
-        moved = None if shift is None else arrays[f"rsm{index}.shift"].tolist()
-        return {name: below_1(halton(count, shift=moved))}
+        return {name: below_1(halton(count, shift=arrays[shift].tolist() if shifted else None))}
 
-    wrong = (halton_bugs(name, count, shift, before, first) if pattern == "halton" else
-             grid_bugs(name, int(np.sqrt(count))))
+    if pattern == "grid":
+        form, lists = Form(literal.grid_points, {}, (name,), {"n": int(np.sqrt(count))}), ["grid"]
+    else:
+        known = np.array(shifts, np.float32).astype(np.float64)
+        form = Form(literal.halton_points, {}, (name,), {"counts": counts, "shifts": known, "number": index})
+        lists = ["halton", *(["halton/shifted"] if shifted else []), *(["halton/later"] if index else []),
+                 *(["halton/shifted later"] if shifted and index else [])]
     recipe.add(f"rsm{index}.points", "Halton points in bases 2 and 3 from index 0" if pattern == "halton" else
-               "centres of n x n cells, row by row", points, (f"rsm{index}.shift",) if shift is not None else (),
-               {name: spec}, paper="SII Sec. 3.1", bugs=tuple(wrong))
+               "centres of n x n cells, row by row", points, (shift,) if shifted else (), {name: spec},
+               paper="SII Sec. 3.1", bugs=form.bugs(*lists), variants=(form.run(),))
 
 
 def _add_texels(
@@ -81,35 +87,43 @@ def _add_texels(
     points, texel, weight = f"{name}.points", f"{name}.texel", f"{name}.weight"
     rows, columns = maps.shape
     if warp is not None:
-        glossy = f"{name}.lobe_flux" in recipe.specs
-        fluxes = (f"{name}.flux", *((f"{name}.lobe_flux", f"{name}.lobe_exponent") if glossy else ()))
-
-        def worth(arrays: Arrays, real: Any) -> Arrays:
-            lobe = arrays[f"{name}.lobe_flux"] if glossy else 0.0
-            return {f"{name}.importance": (arrays[f"{name}.flux"] + lobe).max(axis=0).astype(real)}
-
-        recipe.add(f"{name}.importance", "largest channel of a texel's flux, lobe included", worth, fluxes,
-                   {f"{name}.importance": Spec("row, column", "W", "importance of each texel")},
-                   paper="SII Sec. 3.5", bugs=tuple(importance_bugs(name, glossy, maps.maps)))
+        _add_importance(recipe, name, maps.maps)
         points = _add_warped(recipe, name, maps.maps, warp)
 
-    reads = (points, *((f"{name}.density_weight",) if warp is not None else ()))
+    own = {"density_weight": f"{name}.density_weight"} if warp is not None else {}
 
     def chosen(arrays: Arrays, real: Any) -> Arrays:
         at = np.asarray(arrays[points], np.float64)
-        own = arrays[f"{name}.density_weight"] if warp is not None else np.ones(len(at), real)
+        w = arrays[own["density_weight"]] if own else np.ones(len(at), real)
         return {texel: texel_of(at[:, 1], rows) * columns + texel_of(at[:, 0], columns),
-                weight: (rows * columns / count * own).astype(real)}
+                weight: (rows * columns / count * w).astype(real)}
 
     recipe.factors |= {f"T/N of rsm{index}": rows * columns / count, f"number of lights N of rsm{index}": count,
                        f"number of texels T of rsm{index}": rows * columns}
     recipe.facts[f"{name}.lights"] = {"T": rows * columns, "N": count}
-    recipe.add(f"{name}.texels", "the texel that each point falls on, and T/N w", chosen, reads, {
+    form = Form(literal.texels, {"points": points, **own}, (texel, weight), {
+        "counts": counts, "number": index, "maps": maps.maps, "rows": rows // maps.maps, "columns": columns})
+    recipe.add(f"{name}.texels", "the texel that each point falls on, and T/N w", chosen, (points, *own.values()), {
         texel: Spec("light", "1", "row * columns + column over the stacked maps", tier="T0", index_of=(rows, columns)),
         weight: Spec("light", "1", "T/N times the weight of the warp: how many texels a light stands for"),
-    }, paper="SII Sec. 3.1", exact=(points,), bugs=tuple(texel_bugs(
-        name, points, f"{name}.density_weight" if warp is not None else "", chosen,
-        (maps.maps, rows // maps.maps, columns), (count, sum(counts)))))
+    }, paper="SII Sec. 3.1", exact=(points,), bugs=form.bugs("texels", *(["texels/warped"] if own else [])),
+        variants=(form.run(),))
+
+
+def _add_importance(recipe: Recipe, name: str, maps: int) -> None:
+    glossy = f"{name}.lobe_flux" in recipe.specs
+    reads = {"flux": f"{name}.flux"}
+    reads |= {key: f"{name}.{key}" for key in ("lobe_flux", "lobe_exponent")} if glossy else {}
+
+    def largest(arrays: Arrays, real: Any) -> Arrays:
+        lobe = arrays[f"{name}.lobe_flux"] if glossy else 0.0
+        return {f"{name}.importance": (arrays[f"{name}.flux"] + lobe).max(axis=0).astype(real)}
+
+    form = Form(literal.importance, reads, (f"{name}.importance",))
+    recipe.add(f"{name}.importance", "largest channel of a texel's flux, lobe included", largest,
+               tuple(reads.values()), {f"{name}.importance": Spec("row, column", "W", "importance of each texel")},
+               paper="SII Sec. 3.5", bugs=form.bugs("importance", *(["importance/glossy"] if glossy else []), *(
+                   ["importance/cube"] if maps > 1 else [])), variants=(form.run(),))
 
 
 def _summed_row_by_row(importance: Array) -> Array:
@@ -119,38 +133,24 @@ def _summed_row_by_row(importance: Array) -> Array:
     return np.asarray(importance * (1.0 + rows[:, None] + columns), importance.dtype)
 
 
-def _columns_first(importance: Array) -> Array:
-    return np.ascontiguousarray(importance.T).reshape(importance.shape)
-
-
 def _add_warped(recipe: Recipe, name: str, maps: int, warp: Warp) -> str:
     warped, weight = f"{name}.warped", f"{name}.density_weight"
 
-    def run(arrays: Arrays, real: Any, how: Warp = warp) -> Arrays:
+    def run(arrays: Arrays, real: Any) -> Arrays:
         points, weights = warp_stacked(np.asarray(arrays[f"{name}.points"], np.float64),
-                                       np.asarray(arrays[f"{name}.importance"]), maps, how)
+                                       np.asarray(arrays[f"{name}.importance"]), maps, warp)
         return {warped: below_1(points), weight: weights.astype(real)}
 
-    other = Warp("B" if warp.method == "A" else "A", warp.levels)
-    bugs = [Bug(f"method {other.method} in place of method {warp.method}", lambda a, r: run(a, r, other), "SII Fig. 6"),
-            Bug("weights are left at 1: the density is not counted",
-                writing(run, **{weight.replace(".", "__"): np.ones_like}), "SII Eq. 5, 6"),
-            Bug("weights are the density, not its inverse (reciprocal) 1 / density",
-                writing(run, **{weight.replace(".", "__"): lambda a: 1 / a}), "SII Eq. 5, 6"),
-            Bug("u and v are exchanged", reading(run, **{f"{name}__points": lambda a: a[:, ::-1]}),
-                "u along columns, v along rows"),
-            Bug("the importance map is transposed or read along columns",
-                reading(run, **{f"{name}__importance": _columns_first}), "rows, then columns"),
-            Bug("the importance map is upside down",
-                reading(run, **{f"{name}__importance": lambda a: a[::-1]}), "row 0 is the top row")]
-    bugs += warp_bugs(name, maps, warp, run)
+    form = Form(literal_warp, {"points": f"{name}.points", "importance": f"{name}.importance"}, (warped, weight), {
+        "maps": maps, "levels": warp.levels, "method": warp.method})
     recipe.facts[f"{name}.warp"] = {"method": warp.method, "levels": warp.levels}
     recipe.add(f"{name}.warp", f"points follow the importance over {warp.levels} levels, method {warp.method}", run,
                (f"{name}.points", f"{name}.importance"), {
                    warped: Spec("point, uv", "1", "warped points over the stacked maps"),
                    weight: Spec("point", "1", "w, 1 / density over the unit square")},
-               paper="SII Sec. 3.5, Eq. 5 and 6", bugs=tuple(bugs),
-               variants=(reading(run, **{f"{name}__importance": _summed_row_by_row}),))
+               paper="SII Sec. 3.5, Eq. 5 and 6",
+               bugs=form.bugs("warp", f"warp/{warp.method}", *(["warp/cube"] if maps > 1 else [])),
+               variants=(reading(run, **{f"{name}__importance": _summed_row_by_row}), form.run()))
     return warped
 
 
@@ -185,10 +185,13 @@ def _add_chosen(recipe: Recipe, scene: Scene, resolution: int, counts: tuple[int
     writes = {f"lights.{key}": specs[key] for key in kinds}
     writes |= {"lights.texel": Spec("light", "1", "each light's texel", tier="T0"),
                "lights.map": Spec("light", "1", "each light's map", tier="T0")}
-    shapes = [(maps.maps, maps.shape[0] // maps.maps, maps.shape[1]) for _, _, maps in lamps]
-    warped = any(f"rsm{k}.density_weight" in recipe.specs for k in numbers)
+    form = Form(literal.pixel_lights, {key: tuple(f"rsm{k}.{key}" for k in numbers) for key in (
+        "texel", "weight", *kinds)}, (*(f"lights.{key}" for key in kinds), "lights.texel", "lights.map"))
+    lists = ["lights", *(["lights/glossy"] if glossy else []), *(["lights/maps"] if len(counts) > 1 else []),
+             *(["lights/warped"] if any(f"rsm{k}.density_weight" in recipe.specs for k in numbers) else []),
+             *(["lights/cube"] if any(maps.maps > 1 for _, _, maps in lamps) else [])]
     recipe.add("lights", "texels with flux as pixel lights; those without are dropped", run, tuple(reads), writes,
-               paper="SII Sec. 3.1", bugs=tuple(lights_bugs(kinds, shapes, warped)))
+               paper="SII Sec. 3.1", bugs=form.bugs(*lists), variants=(form.run(),))
 
 
 def pixel_lights_of(arrays: Arrays, real: Any) -> PixelLights:

@@ -5,13 +5,14 @@ from typing import Any
 import numpy as np
 
 from refgi.literal import pairs as literal
+from refgi.literal.lights import footprints
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
 from refgi.settings import of
 from refgi.vectors.forms import pair_lists
-from refgi.vectors.recipe import Recipe, writing
+from refgi.vectors.recipe import Recipe
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.buffers import VECTOR
 from refgi.vectors.stages.lights import LIGHT, LOBE, light_names, pixel_lights_of
 
@@ -20,7 +21,6 @@ RECEIVERS = ("gbuffer.position", "gbuffer.normal", "gbuffer.triangle_id")
 READS = {"position": "gbuffer.position", "normal": "gbuffer.normal", "light_position": "lights.position",
          "light_normal": "lights.normal", "flux": "lights.flux"}
 LOBES = {"lobe_flux": "lights.lobe_flux", "lobe_axis": "lights.lobe_axis", "lobe_exponent": "lights.lobe_exponent"}
-AREA = "A = Omega d^2 / cos, times T/N w"
 NORM = "(P + 1) / (2 pi K), K the share of the lobe's integral above the surface; 0 where K is below 1e-12"
 
 
@@ -32,41 +32,34 @@ def receivers_of(arrays: Arrays, real: Any) -> Receivers:
 
 def add_footprints(recipe: Recipe, maps: int) -> None:
     """Add the surface that each pixel light stands for: Omega d^2 / cos of its texel, times T/N w."""
-    reads = tuple(f"rsm{k}.{key}" for k in range(maps) for key in ("solid_angle", "texel", "weight"))
-    places = tuple(f"light{k}.position" if f"light{k}.position" in recipe.specs else f"light{k}.direction"
-                   for k in range(maps))
+    numbers, texels = range(maps), ("solid_angle", "texel", "weight")
+    near = tuple(f"light{k}.position" in recipe.specs for k in numbers)
+    places = tuple(f"light{k}.{'position' if near[k] else 'direction'}" for k in numbers)
 
-    def run(arrays: Arrays, real: Any, power: float = 1, slant: float = -1, weighted: bool = True) -> Arrays:
+    def run(arrays: Arrays, real: Any) -> Arrays:
         lights, chosen = pixel_lights_of(arrays, real), np.asarray(arrays["lights.map"])
         area = np.zeros(len(chosen), real)
-        for k in range(maps):
+        for k in numbers:
             here = chosen == k
             texel = np.asarray(arrays["lights.texel"])[here]
             weight = dict(zip(np.asarray(arrays[f"rsm{k}.texel"]).tolist(), arrays[f"rsm{k}.weight"], strict=True))
-            angle = arrays[f"rsm{k}.solid_angle"].reshape(-1)[texel]
-            angle = angle * np.array([weight[int(t)] for t in texel], real) if weighted else angle
-            near = f"light{k}.position" in arrays
-            away = (arrays[f"light{k}.position"][:, None] - lights.position[:, here] if near else
-                    np.broadcast_to(-arrays[f"light{k}.direction"][:, None], (3, int(here.sum()))))
+            angle = arrays[f"rsm{k}.solid_angle"].reshape(-1)[texel] * np.array([weight[int(t)] for t in texel], real)
+            away = (arrays[places[k]][:, None] - lights.position[:, here] if near[k] else
+                    np.broadcast_to(-arrays[places[k]][:, None], (3, int(here.sum()))))
             square = (away**2).sum(axis=0)
             cosine = np.abs((away * lights.normal[:, here]).sum(axis=0)) / np.sqrt(square)
-            area[here] = angle * (square**power if near else 1) * np.maximum(cosine, 1e-3) ** slant
+            area[here] = angle * (square if near[k] else 1) / np.maximum(cosine, 1e-3)
         return {"lights.area": area}
 
+    form = Form(footprints, {"position": "lights.position", "normal": "lights.normal", "texel": "lights.texel",
+                             "number": "lights.map", "lamp": places, **{key: tuple(f"rsm{k}.{name}" for k in numbers)
+                             for key, name in zip(("solid_angle", "drawn", "weight"), texels, strict=True)}},
+                ("lights.area",), {"near": near})
     recipe.add("footprints", "surface that each light stands for", run,
-               (*light_names(recipe), "lights.texel", "lights.map", *places, *reads),
+               (*light_names(recipe), "lights.texel", "lights.map", *places, *(
+                   f"rsm{k}.{key}" for k in numbers for key in texels)),
                {"lights.area": Spec("light", "m^2", "Omega d^2 / cos of the light's texel, times T/N w")},
-               paper="docs/methods/sii_sum", bugs=(
-                   Bug("the squared distance is missing", lambda a, r: run(a, r, 0), AREA),
-                   Bug("the distance in place of its square", lambda a, r: run(a, r, 0.5), AREA),
-                   Bug("divided by the squared distance, not multiplied", lambda a, r: run(a, r, -1), AREA),
-                   Bug("the cosine is missing", lambda a, r: run(a, r, 1, 0), AREA),
-                   Bug("multiplied by the cosine, not divided", lambda a, r: run(a, r, 1, 1), AREA),
-                   Bug("divided by the squared cosine", lambda a, r: run(a, r, 1, -2), AREA),
-                   Bug("the light's weight T/N w is missing: the area of one texel", lambda a, r: run(
-                       a, r, weighted=False), AREA),
-                   Bug("the footprint is divided by pi already", writing(run, lights__area=lambda a: a / np.pi),
-                       AREA)))
+               paper="docs/methods/sii_sum", bugs=form.bugs("footprints"), variants=(form.run(),))
 
 
 def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:

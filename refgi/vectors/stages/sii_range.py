@@ -8,16 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from refgi.literal import sii as literal
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.packing import Packed, pack
 from refgi.pairs.pixel_lights import PixelLights
-from refgi.pairs.settings import LobeSettings, PairSettings
+from refgi.pairs.settings import PairSettings
 from refgi.splat.sii.reach.reference_length import PAPER_LIGHTS, PAPER_OVERDRAW, reference_length, strengths
 from refgi.splat.sii.reach.threshold import all_peaks, threshold
-from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
-from refgi.vectors.stages.pairs import RECEIVERS
+from refgi.vectors.stages.pairs import LOBES, READS, RECEIVERS
 from refgi.vectors.stages.sii_range_sum import (
     BARE,
     BOTH,
@@ -27,6 +29,8 @@ from refgi.vectors.stages.sii_range_sum import (
     add_kept,
     add_squares,
     add_sum,
+    lists_of,
+    pairs_of,
     peaks_of,
     relative_reach,
 )
@@ -45,7 +49,7 @@ def add_range(recipe: Recipe, drawn: int, share: float, length: float | None, pa
     _add_peaks(recipe, parts)
     _add_strengths(recipe, parts)
     if length is None:
-        _add_length(recipe, drawn)
+        _add_length(recipe, parts, drawn)
     else:
         recipe.give(LENGTH, np.array([length]), Spec("one", "m", "reference length of the share"))
     _add_low(recipe, parts, share)
@@ -54,9 +58,9 @@ def add_range(recipe: Recipe, drawn: int, share: float, length: float | None, pa
     add_sum(recipe, parts, pairs)
 
 
-def _packed(arrays: Arrays, pairs: PairSettings = BARE) -> tuple[PixelLights, Packed]:
+def _packed(arrays: Arrays) -> tuple[PixelLights, Packed]:
     lights = pixel_lights_of(arrays, np.float64)
-    return lights, pack(lights, pairs, np.zeros(lights.flux.shape[1]), np.float64)
+    return lights, pack(lights, BARE, np.zeros(lights.flux.shape[1]), np.float64)
 
 
 def _of_parts(lights: PixelLights, packed: Packed, values: tuple[Array, Array], parts: tuple[str, ...]) -> list[Array]:
@@ -73,31 +77,18 @@ def _of_parts(lights: PixelLights, packed: Packed, values: tuple[Array, Array], 
 def _add_peaks(recipe: Recipe, parts: tuple[str, ...]) -> None:
     names = [f"range.{part}_peak" for part in parts]
 
-    def run(arrays: Arrays, real: Any, pairs: PairSettings = BARE) -> Arrays:
-        lights, packed = _packed(arrays, pairs)
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        lights, packed = _packed(arrays)
         diffuse, lobes = all_peaks(packed)
         return dict(zip(names, (one.astype(real) for one in _of_parts(lights, packed, (diffuse[:-1], lobes), parts)),
                         strict=True))
 
-    def summed(weights: tuple[float, float, float]) -> Run:
-        def altered(arrays: Arrays, real: Any) -> Arrays:
-            scalar = {name: np.stack([np.tensordot(weights, arrays[name], 1)] * 3) for name in arrays
-                      if name.endswith("flux")}
-            return run({**arrays, **scalar}, real)
-
-        return altered
-
-    bugs = [Bug("luminance in place of the largest channel", summed((0.2126, 0.7152, 0.0722)), "largest channel"),
-            Bug("the sum of channels in place of the largest", summed((1, 1, 1)), "largest channel"),
-            Bug("1/pi is left out", writing(run, range__diffuse_peak=lambda a: a * np.pi), "I_0 = Phi / pi")]
-    if "glossy" in parts:
-        bugs += [Bug("a lobe's peak is its flux", lambda a, r: run(a, r, PairSettings(
-            clamp=None, lobe=LobeSettings(norm="none"))), "E-SII-03: times (P + 1) / 2 pi K"),
-            Bug("the norm is that of the whole lobe", lambda a, r: run(a, r, PairSettings(
-                clamp=None, lobe=LobeSettings(norm="full_lobe"))), "E-SII-03")]
+    reads = {"normal": READS["light_normal"], "flux": READS["flux"]} | (LOBES if len(parts) > 1 else {})
+    form = Form(literal.peaks, reads, tuple(names))
     recipe.add("range.peaks", "I_0, the peak intensity of each part of each light", run, light_names(recipe), {
         name: Spec("light", "W/sr", f"largest channel of I_0 of the {part} part; 0 without it", paper=PAPER)
-        for name, part in zip(names, parts, strict=True)}, paper=PAPER, bugs=tuple(bugs))
+        for name, part in zip(names, parts, strict=True)}, paper=PAPER, bugs=form.bugs(*lists_of("peaks", parts)),
+        variants=(form.run(),))
 
 
 def _strengths(arrays: Arrays, parts: tuple[str, ...]) -> list[Array]:
@@ -120,63 +111,30 @@ def _add_strengths(recipe: Recipe, parts: tuple[str, ...]) -> None:
     def run(arrays: Arrays, real: Any) -> Arrays:
         return {name: one.astype(real) for name, one in zip(names, _strengths(arrays, parts), strict=True)}
 
-    def to_light(arrays: Arrays) -> tuple[Array, Array]:
-        d = np.asarray(arrays["lights.position"])[:, :, None, None] - np.asarray(arrays[RECEIVERS[0]])[:, None]
-        return d, np.linalg.norm(d, axis=0)
-
-    def with_receiver(arrays: Arrays, real: Any) -> Arrays:
-        (d, r), n = to_light(arrays), np.asarray(arrays[RECEIVERS[1]])[:, None]
-        cosine = np.maximum(0, (d * n).sum(axis=0) / r)
-        return {name: one * cosine for name, one in run(arrays, real).items()}
-
-    def at_peak(arrays: Arrays, real: Any) -> Arrays:
-        (d, r), made = to_light(arrays), run(arrays, real)
-        cosine = -(d * np.asarray(arrays["lights.normal"])[:, :, None, None]).sum(axis=0) / r
-        return {**made, names[0]: np.divide(made[names[0]], cosine, out=np.zeros_like(made[names[0]]),
-                                            where=cosine > 0)}
-
-    def powered(power: int) -> Run:
-        def altered(arrays: Arrays, real: Any) -> Arrays:
-            r = to_light(arrays)[1]
-            return {name: one * r**power for name, one in run(arrays, real).items()}
-
-        return altered
-
+    form = Form(literal.strengths, pairs_of(parts), tuple(names))
     recipe.add("range.strengths", "B, what each light causes at each pixel at most", run,
                (*RECEIVERS, *light_names(recipe)), {name: Spec(
                    "light, row, column", "W/m^2", f"I(w) / r^2 of the {part} part, without the pixel's cosine; 0 "
                    "without surface", paper=PAPER) for name, part in zip(names, parts, strict=True)},
-               paper=PAPER, exact=(RECEIVERS[0], "lights.position"), bugs=(
-                   Bug("the pixel's cosine counts", with_receiver, "the pixel's cosine is taken as 1"),
-                   Bug("the light's cosine is missing", at_peak, "B = I(w) / r^2"),
-                   Bug("1/r in place of 1/r^2", powered(1), "B = I(w) / r^2"),
-                   Bug("the distance is left out", powered(2), "B = I(w) / r^2"),
-                   Bug("pixels without surface count", reading(run, gbuffer__triangle_id=np.zeros_like), "surfaces")))
+               paper=PAPER, exact=(RECEIVERS[0], "lights.position"), bugs=form.bugs("strengths"),
+               variants=(form.run(),))
 
 
-def _add_length(recipe: Recipe, drawn: int) -> None:
-    def run(arrays: Arrays, real: Any, count: int = drawn) -> Arrays:
+def _add_length(recipe: Recipe, parts: tuple[str, ...], drawn: int) -> None:
+    def run(arrays: Arrays, real: Any) -> Arrays:
         ids = np.asarray(arrays[RECEIVERS[2]])
         position, normal = (np.ascontiguousarray(arrays[name], np.float64) for name in RECEIVERS[:2])
         at = Receivers(position, normal, ids >= 0)
-        return {LENGTH: np.array([reference_length(at, pixel_lights_of(arrays, real)._replace(drawn=count), BARE)])}
+        return {LENGTH: np.array([reference_length(at, pixel_lights_of(arrays, real)._replace(drawn=drawn), BARE)])}
 
-    def fixed(length: float) -> Run:
-        return lambda _, real: {LENGTH: np.array([length], real)}
-
+    form = Form(literal.reference_length, pairs_of(parts), (LENGTH,), {"drawn": drawn})
     recipe.add("range.length", "length under which 5 % of the largest peak leave 125 of 768 pairs", run,
                (*RECEIVERS, *light_names(recipe)), {LENGTH: Spec(
                    "one", "m", "sqrt(0.05 / b), b the k-th largest B over the largest I_0 of all pairs of part and "
                    "pixel, k = 125/768 of all pairs of drawn light and pixel, rounded; at most 10 diagonals of pixels "
                    "and lights; 1 where nothing is lit")},
-               paper="SII Fig. 8; E-SII-11", exact=(RECEIVERS[0], "lights.position"), bugs=(
-                   Bug("lights drawn without flux do not count", lambda a, r: run(
-                       a, r, a["lights.flux"].shape[1]), "k counts all that were drawn"),
-                   Bug("one metre", fixed(1.0), "E-SII-11"),
-                   Bug("the root is missing", writing(run, range__length=lambda a: a * a), "L^2 = 0.05 / b"),
-                   Bug("all pixels count, those without surface too", reading(
-                       run, gbuffer__triangle_id=np.zeros_like), "surfaces"),
-                   Bug("half as many pairs are left", lambda a, r: run(a, r, drawn // 2), "125 of 768")))
+               paper="SII Fig. 8; E-SII-11", exact=(RECEIVERS[0], "lights.position"), bugs=form.bugs("length"),
+               variants=(form.run(),))
 
 
 def _add_low(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
@@ -184,20 +142,9 @@ def _add_low(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
         return {LOW: np.array([threshold(np.concatenate(peaks_of(arrays, parts)), relative_reach(share, arrays))],
                               real)}
 
-    peaks = {f"range__{part}_peak": _mean for part in parts}
+    form = Form(literal.low_irradiance, {"length": LENGTH, **{f"{part}_peak": f"range.{part}_peak" for part in parts}},
+                (LOW,), {"share": share})
     recipe.add("range.low", f"I_low = {share:g} max I_0 / L^2", run,
                (LENGTH, *(f"range.{part}_peak" for part in parts)), {
         LOW: Spec("one", "W/m^2", "irradiance under which pairs are left out; 0 without lights", paper=PAPER)},
-        paper=PAPER, bugs=(
-            Bug("the length is not squared", reading(run, range__length=np.sqrt), PAPER),
-            Bug("the length is left out", reading(run, range__length=np.ones_like), PAPER),
-            Bug("the mean of the peaks in place of the largest", reading(run, **peaks), PAPER),
-            Bug("the share is in percent", writing(run, range__low=lambda a: 100 * a), "5 % is 0.05"),
-            *((Bug("lobes do not count", reading(run, range__glossy_peak=np.zeros_like), "all parts"),)
-              if "glossy" in parts else ())))
-
-
-def _mean(peaks: Array) -> Array:
-    return np.full_like(peaks, peaks.mean()) if peaks.size else peaks
-
-
+        paper=PAPER, bugs=form.bugs(*lists_of("low", parts)), variants=(form.run(),))

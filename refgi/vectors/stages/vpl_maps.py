@@ -10,6 +10,7 @@ import numpy as np
 
 from refgi.draws import IMPERFECT_MAPS, draws
 from refgi.jit import kernel
+from refgi.literal import imperfect as literal
 from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.scene import Geometry, Scene
 from refgi.truth.imperfect import (
@@ -20,12 +21,13 @@ from refgi.truth.imperfect import (
     fill_holes,
     splat_box,
 )
-from refgi.vectors.bugs.imperfect import filled_bugs, map_bugs, point_bugs
 from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.buffers import VECTOR
 
 GEOMETRY = ("scene.vertices", "scene.faces")
+MESH = {"vertices": GEOMETRY[0], "faces": GEOMETRY[1]}
 LIGHTS = ("lights.position", "lights.normal")
 POINTS = ("vpl.point", "vpl.point_face", "vpl.point_radius")
 FRAME = "vpl.frame"
@@ -64,13 +66,14 @@ def _add_points(recipe: Recipe, scene: Scene, points: int) -> None:
         return {POINTS[0]: place.astype(real), POINTS[1]: face,
                 POINTS[2]: np.full(1, math.sqrt(upto[-1] / (math.pi * points)), real)}
 
+    form = Form(literal.scattered_points, {**MESH, "shift": "vpl.shift"}, POINTS, {"count": points})
     recipe.add("vpl.points", "points of each light's map, all over the surfaces: point k at (k + x0) / n of the area, "
                "in the order of the faces, and at a = sqrt(x1 + k / g), b = x2 + k / g^2 modulo 1 of its face, "
                "(1 - a) A + a (1 - b) B + a b C; g^3 = g + 1", run, (*GEOMETRY, "vpl.shift"), {
                    POINTS[0]: Spec("light, point, xyz", "m", "the points", "world"),
                    POINTS[1]: Spec("light, point", "1", "the triangle that each lies on", tier="T0"),
                    POINTS[2]: Spec("number", "m", "r of a point's disc, pi r^2 = A / n", paper="docs/methods/vpl")},
-               paper=PAPER, exact=("vpl.shift",), bugs=point_bugs(points))
+               paper=PAPER, exact=("vpl.shift",), bugs=form.bugs("points"), variants=(form.run(),))
 
 
 @kernel
@@ -93,18 +96,11 @@ def _add_frames(recipe: Recipe) -> None:
             fill_frame(normal[k], frame[k])
         return {FRAME: frame.astype(real)}
 
-    def by(change: Any) -> Any:
-        return lambda arrays, real: {FRAME: change(run(arrays, real)[FRAME])}
-
+    form = Form(literal.frames, {"normal": LIGHTS[1]}, (FRAME,))
     recipe.add("vpl.frames", "axes of each light's map: with n its normal and e the sign of n_z, a = -1 / (e + n_z), "
                "right (1 + e n_x^2 a, e n_x n_y a, -e n_x), down (n_x n_y a, e + n_y^2 a, -n_y), forward n", run,
                (LIGHTS[1],), {FRAME: Spec("light, (right, down, forward), xyz", VECTOR, "axes of s, t and z", "world")},
-               paper="Duff et al. 2017", exact=(LIGHTS[1],), bugs=(
-                   Bug("frames are transposed", by(lambda a: a.transpose(0, 2, 1)), "rows are the axes"),
-                   Bug("right and down are exchanged", by(lambda a: a[:, [1, 0, 2]]), ""),
-                   Bug("the map looks into the surface", by(lambda a: a * ((1,), (1,), (-1,))), "forward: normal"),
-                   Bug("down points up", by(lambda a: a * ((1,), (-1,), (1,))), "right-handed"),
-                   Bug("right points left", by(lambda a: a * ((-1,), (1,), (1,))), "right-handed")))
+               paper="Duff et al. 2017", exact=(LIGHTS[1],), bugs=form.bugs("frames"), variants=(form.run(),))
 
 
 def _add_depth(recipe: Recipe, scene: Scene, settings: Imperfect) -> None:
@@ -120,12 +116,15 @@ def _add_depth(recipe: Recipe, scene: Scene, settings: Imperfect) -> None:
             _splat_all(place[k], facing[face[k]], position[k], frame[k], radius, splat, made[k])
         return {"vpl.depth": made}
 
+    names = ("point", "point_face", "radius", "light_position", "frame")
+    form = Form(literal.depth_maps, {**MESH, **dict(zip(names, (*POINTS, LIGHTS[0], FRAME), strict=True))},
+                ("vpl.depth",), {"side": side, "splat": splat})
     recipe.add("vpl.depth", "distance of the nearest point in each texel of a paraboloid map along the light's normal, "
                "(s, t) = (x, y) / (1 + z); a box r sqrt(c) (1 + s^2 + t^2) / d wide, c the cosine at the point, times "
                "its width in discs; points nearer than r or beside the light's plane are left out", run,
                (*GEOMETRY, *POINTS, LIGHTS[0], FRAME), {"vpl.depth": Spec(
                    MAP, "m", "rows along t, columns along s; inf where no box covers a texel's centre")},
-               paper=PAPER, exact=(GEOMETRY[0],), bugs=map_bugs(side, splat))
+               paper=PAPER, exact=(GEOMETRY[0],), bugs=form.bugs("depth"), variants=(form.run(),))
 
 
 @kernel
@@ -147,8 +146,9 @@ def _add_filled(recipe: Recipe, levels: int) -> str:
             fill_holes(one, levels)
         return {"vpl.filled": made}
 
+    form = Form(literal.filled, {"depth": "vpl.depth"}, ("vpl.filled",), {"levels": levels})
     recipe.add("vpl.filled", "pull: the mean of those of four texels that are no farther than 1.1 times the nearest; "
                "push: holes take from the coarser level, bilinearly, what is no farther than 1.1 times the nearest of "
                "the four", run, ("vpl.depth",), {"vpl.filled": Spec(MAP, "m", "maps whose holes are filled")},
-               paper=PAPER, bugs=filled_bugs(levels))
+               paper=PAPER, bugs=form.bugs("filled"), variants=(form.run(),))
     return "vpl.filled"

@@ -7,14 +7,11 @@ from refgi.vectors.bounds import distance, isolated_bounds
 from refgi.vectors.bugs.val_basis import chain_by
 from refgi.vectors.bugs.val_cone import Cone, searched_by
 from refgi.vectors.bugs.val_depth import basis_by, depths_by
-from refgi.vectors.bugs.val_facing import faced_by
-from refgi.vectors.bugs.val_kmeans import Metric, assigned_by, mean_of, means_by, unit_sum
 from refgi.vectors.bugs.val_lookup import Lookup
 from refgi.vectors.bugs.val_lookup import means_by as looked_up_by
 from refgi.vectors.bugs.val_mip import levels_by, mean_of_four
 from refgi.vectors.bugs.val_pcf import DepthTests, depth_tests_by
 from refgi.vectors.bugs.val_series import Penumbra, Verdict, penumbra_by, verdict_by
-from refgi.vectors.bugs.val_sum import summed_by
 from refgi.vectors.cases.val import SETUPS
 from refgi.vectors.spec import expected_of, outputs_of
 
@@ -24,14 +21,8 @@ pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # th
 def literal_forms(name):
     """Return the literal form of each stage of a case that has one."""
     settings = SETUPS[name].settings
-    kind, clusters = settings.visibility, settings.clusters
-    forms = {f"kmeans.assign{k}": assigned_by(k, (clusters.position_weight, clusters.normal_weight), Metric())
-             for k in (0, 1)}
-    forms |= {f"kmeans.means{k}": means_by(k, f"kmeans.of{k - 1}", mean_of, unit_sum) for k in (1, 2)}
-    if SETUPS[name].scene.geometry.vertex_normals is not None:
-        forms |= {"facing": faced_by()}
-    forms |= {"hard": depth_tests_by("hard", 1, DepthTests()), "search": searched_by(Cone()),
-              "sum": summed_by(lambda parts, share: (parts * share).sum(axis=0))}
+    kind = settings.visibility
+    forms = {"hard": depth_tests_by("hard", 1, DepthTests()), "search": searched_by(Cone())}
     if name in ("val-single", "val-interleaved"):
         return forms | {"visibility": depth_tests_by("visibility", 5 if name == "val-interleaved" else 1, DepthTests())}
     if name == "val-pcss":

@@ -6,7 +6,6 @@ import pytest
 from refgi.vectors.bounds import distance, isolated_bounds
 from refgi.vectors.bugs.val_basis import chain_by
 from refgi.vectors.bugs.val_cone import Cone, searched_by
-from refgi.vectors.bugs.val_depth import basis_by, depths_by
 from refgi.vectors.bugs.val_lookup import Lookup
 from refgi.vectors.bugs.val_lookup import means_by as looked_up_by
 from refgi.vectors.bugs.val_mip import levels_by, mean_of_four
@@ -29,8 +28,7 @@ def literal_forms(name):
         return forms
     levels = [one for step in SETUPS[name].case().stages if step.name == "mip" for one in step.writes]
     return forms | {
-        "series": chain_by(kind.terms), "maps.t": depths_by(kind),
-        "basis": basis_by(lambda k: (2 * k - 1) * np.pi, kind.terms), "mip": levels_by(levels, mean_of_four),
+        "series": chain_by(kind.terms), "mip": levels_by(levels, mean_of_four),
         "search.means": looked_up_by("search", "search.pending", Lookup()),
         "penumbra.means": looked_up_by("penumbra", "penumbra.shaded", Lookup()),
         "penumbra": penumbra_by(kind, Penumbra()), "visibility": verdict_by(1.0, Verdict())}

@@ -3,22 +3,19 @@
 import numpy as np
 import pytest
 
-from refgi.vectors.bounds import distance, isolated_bounds
-from refgi.vectors.bugs.val_basis import chain_by
-from refgi.vectors.bugs.val_cone import Cone, searched_by
+from refgi.cluster.settings import Csm
+from refgi.vectors.bounds import distance, isolated_bounds, large_value
 from refgi.vectors.bugs.val_depth import basis_by, depths_by
 from refgi.vectors.bugs.val_facing import faced_by
 from refgi.vectors.bugs.val_kmeans import Metric, assigned_by, mean_of, means_by, unit_sum
-from refgi.vectors.bugs.val_lookup import Lookup
-from refgi.vectors.bugs.val_lookup import means_by as looked_up_by
-from refgi.vectors.bugs.val_mip import levels_by, mean_of_four
-from refgi.vectors.bugs.val_pcf import DepthTests, depth_tests_by
-from refgi.vectors.bugs.val_series import Penumbra, Verdict, penumbra_by, verdict_by
 from refgi.vectors.bugs.val_sum import summed_by
-from refgi.vectors.cases.val import SETUPS
+from refgi.vectors.cases.val import FULL_SETUPS, SETUPS
 from refgi.vectors.spec import expected_of, outputs_of
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+
+LITERAL = ("series", "mip", "search", "search.means", "penumbra", "penumbra.means", "hard", "visibility", "blur")
+EQUAL = 1e-6  # float32 in which arrays are stored, some 8 times
 
 
 def literal_forms(name):
@@ -30,19 +27,10 @@ def literal_forms(name):
     forms |= {f"kmeans.means{k}": means_by(k, f"kmeans.of{k - 1}", mean_of, unit_sum) for k in (1, 2)}
     if SETUPS[name].scene.geometry.vertex_normals is not None:
         forms |= {"facing": faced_by()}
-    forms |= {"hard": depth_tests_by("hard", 1, DepthTests()), "search": searched_by(Cone()),
-              "sum": summed_by(lambda parts, share: (parts * share).sum(axis=0))}
-    if name in ("val-single", "val-interleaved"):
-        return forms | {"visibility": depth_tests_by("visibility", 5 if name == "val-interleaved" else 1, DepthTests())}
-    if name == "val-pcss":
+    forms |= {"sum": summed_by(lambda parts, share: (parts * share).sum(axis=0))}
+    if not isinstance(kind, Csm):
         return forms
-    levels = [one for step in SETUPS[name].case().stages if step.name == "mip" for one in step.writes]
-    return forms | {
-        "series": chain_by(kind.terms), "maps.t": depths_by(kind),
-        "basis": basis_by(lambda k: (2 * k - 1) * np.pi, kind.terms), "mip": levels_by(levels, mean_of_four),
-        "search.means": looked_up_by("search", "search.pending", Lookup()),
-        "penumbra.means": looked_up_by("penumbra", "penumbra.shaded", Lookup()),
-        "penumbra": penumbra_by(kind, Penumbra()), "visibility": verdict_by(1.0, Verdict())}
+    return forms | {"maps.t": depths_by(kind), "basis": basis_by(lambda k: (2 * k - 1) * np.pi, kind.terms)}
 
 
 @pytest.mark.parametrize("name", SETUPS)
@@ -58,6 +46,18 @@ def test_the_forms_that_bugs_are_put_into_have_none_of_their_own(name):
         for one, bound in bounds.items():
             off = (distance(made[one], known[one]) > bound.limit) & ~bound.masked
             assert not off.any(), (step.name, one, int(off.sum()))
+
+
+@pytest.mark.parametrize("name", SETUPS | FULL_SETUPS)
+def test_the_literal_text_of_a_stage_is_the_stage(name):
+    """Oracle: kernels, in float64."""
+    case = (SETUPS | FULL_SETUPS)[name].case()
+    known = expected_of(case)
+    for step in case.stages:
+        for form in step.variants if step.name in LITERAL else ():
+            for one, made in outputs_of(step, known, np.float64, form).items():
+                off = distance(made, known[one]) > EQUAL * (np.abs(known[one]) + large_value(known[one]))
+                assert not off.any(), (step.name, one, int(off.sum()))
 
 
 @pytest.mark.parametrize("name", SETUPS)

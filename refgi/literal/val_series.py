@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from refgi.literal.val_visibility import cone_region, light_size, to_map
+from refgi.literal.val_visibility import disc, light_size, penumbra_angle, square, to_map
 
 LEAST_BLOCKED = 0.02  # share of the search region: less is ripple of the series, no blocker (E-VAL-04)
 NEARLY_ALL = 0.95  # of its top: where a damped series that never reaches 1 counts as lit
@@ -105,7 +105,8 @@ def csm_penumbra(
     z = np.where(shaded, series_distance(mean, origin, slope, logarithmic), d)
     z = np.maximum(z, nearest)  # E-VAL-04
     z = np.minimum(z, d)
-    region = cone_region(local, d, size, z, alpha, squares)
+    a = penumbra_angle(size, d, z, alpha)
+    region = square(local, d, a) if squares else disc(local, d, a)
     return shaded, np.where(shaded, z, 0), np.where(shaded[:, None], region, 0), t
 
 

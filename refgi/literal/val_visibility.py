@@ -17,11 +17,12 @@ SLACK = 1e-3  # share of its distance by which a surface lies before a pixel tha
 
 def search(
     position: Any, triangle_id: Any, center: Any, frame: Any, delta: Any, near: Any, solid_angle: bool = False,
-    squares: bool = False, foreshortened: bool = False,
+    squares: bool = False, foreshortened: bool = False, axial: bool = False,
 ) -> Any:
     """Return pending (K, h, w), region and d: who searches for blockers, in which disc (Sec. 4.2).
 
-    The cone for blockers at the nearest distance that the map holds; as printed, half-way (`solid_angle`).
+    The cone for blockers at the nearest distance that the map holds; as printed, half-way (`solid_angle`). `axial`: all
+    directions in which such a blocker may lie.
     """
     local, d = to_map(position, center, frame)
     size = light_size(delta, local, d, foreshortened)
@@ -33,7 +34,8 @@ def search(
     asked = ahead & beyond & wide
     pending = asked & held & (triangle_id >= 0)
     z = d / 2 if solid_angle else nearest  # E-VAL-09
-    region = cone_region(local, d, size, z, False, squares)
+    a = widest_angle(size, d, z) if axial and not solid_angle else half_angle(size, d, z)
+    region = square(local, d, a) if squares else disc(local, d, a)
     return pending, np.where(pending[:, None], region, 0), np.where(pending, d, 0)
 
 
@@ -50,19 +52,29 @@ def light_size(delta: Any, local: Any, d: Any, foreshortened: bool) -> Any:
     return size * np.sqrt(np.maximum(local[2], 0) / d) if foreshortened else size
 
 
-def cone_region(local: Any, d: Any, size: Any, z: Any, alpha: bool, squares: bool) -> Any:
-    """Return the part of each map that may hold blockers at the distance z: a disc, or a square of side alpha / pi."""
-    a = half_angle(size, d, z)
-    a = np.arctan(2 * np.tan(a)) / 2 if alpha else a  # E-VAL-07: the printed alpha begins at the axis
-    return square(local, d, a) if squares else disc(local, d, a)
-
-
 def half_angle(size: Any, d: Any, z: Any) -> Any:
     """Return a of the cone in which a pixel sees the light past blockers at z (Sec. 4.2, Fig. 3; E-VAL-07)."""
     # Sec. 4.2: p cos(beta) = (d - z) Delta / z, alpha = 2 a = 2 arctan(p cos(beta) / 2 d)
     tangent = size * (d - z) / (2 * d * z)
     angle = np.arctan(tangent)
     return np.clip(angle, 0, STEEPEST)
+
+
+def penumbra_angle(size: Any, d: Any, z: Any, alpha: bool) -> Any:
+    """Return a of the penumbra of blockers at z; as printed, alpha / 2 of an alpha that begins at the axis."""
+    a = half_angle(size, d, z)
+    return np.arctan(2 * np.tan(a)) / 2 if alpha else a
+
+
+def widest_angle(size: Any, d: Any, z: Any) -> Any:
+    """Return the angle off the axis, seen from the map, at which a point at z still lies before the light.
+
+    There z sin a = Delta / 2 (1 - z cos a / d); where z is less than about Delta / 2, every point does.
+    """
+    slant = np.arctan(size / (2 * d))
+    sine = size * np.cos(slant) / (2 * z)
+    angle = np.arcsin(np.minimum(sine, 1)) - slant
+    return np.where(z < d, np.where(sine < 1, np.minimum(angle, STEEPEST), STEEPEST), 0)
 
 
 def disc(local: Any, d: Any, a: Any) -> Any:
@@ -155,11 +167,13 @@ def hides(z: Any, limit: Any) -> Any:
 
 def pcss_penumbra(
     position: Any, facing: Any, depth: Any, center: Any, frame: Any, delta: Any, near: Any, pending: Any, region: Any,
-    alpha: bool = False, squares: bool = False, foreshortened: bool = False,
+    alpha: bool = False, squares: bool = False, foreshortened: bool = False, axial: bool = False,
+    cone: bool = True, biased: Any = None,
 ) -> Any:
     """Return shaded (K, h, w), z_avg (K, h, w), m, and the region of the penumbra (Sec. 4.1, 4.2; A.6 P4).
 
-    z_avg is the mean distance of the texels of the search region that lie before the pixel's plane, in the cone.
+    z_avg is the mean distance of the texels of the search region that lie before the pixel's plane, in the cone;
+    `axial`: their mean depth along the axis. `biased` (K, h, w), m: a distance to be nearer than, not the plane.
     """
     local, d = to_map(position, center, frame)
     normal = np.einsum("kac,cij->akij", frame, facing)
@@ -168,21 +182,25 @@ def pcss_penumbra(
     s, t = texel_centers(depth)
     z, w = depth[:, None, None], direction(s, t)[:, None, None, None]
     place, far = local[..., None, None], d[..., None, None]
-    limit = plane_distance(w, place, far, normal[..., None, None])
+    limit = plane_distance(w, place, far, normal[..., None, None]) if biased is None else biased[..., None, None]
     blocks = hides(z, limit) & in_region(region, s, t)
-    cone = in_cone(z, w, place, far, size[..., None, None], 2 / len(s) / (1 + s * s + t * t))
-    blocks = blocks & cone
+    inside = in_cone(z, w, place, far, size[..., None, None], 2 / len(s) / (1 + s * s + t * t))
+    blocks = blocks & (inside | (not cone))
+    if axial:
+        z, nearest = z * (w * place).sum(axis=0) / far, nearest * math.cos(STEEPEST)
     count = blocks.sum(axis=(3, 4), dtype=d.dtype)
     shaded = pending & (count > 0)
     # Sec. 4.1: z_avg
     z_avg = np.where(blocks, z, 0).sum(axis=(3, 4)) / np.maximum(count, 1)
     z_avg = np.where(shaded, np.minimum(np.maximum(z_avg, nearest), d), d)
-    final = cone_region(local, d, size, z_avg, alpha, squares)
+    a = penumbra_angle(size, d, z_avg, alpha)
+    final = square(local, d, a) if squares else disc(local, d, a)
     return shaded, np.where(shaded, z_avg, 0), np.where(shaded[:, None], final, 0)
 
 
 def pcss(
     position: Any, facing: Any, depth: Any, center: Any, frame: Any, shaded: Any, region: Any, hard: Any = None,
+    biased: Any = None,
 ) -> Any:
     """Return V (K, h, w): the share of the penumbra's texels that do not hide a pixel; elsewhere 1, or `hard`."""
     local, d = to_map(position, center, frame)
@@ -190,6 +208,7 @@ def pcss(
     s, t = texel_centers(depth)
     z, w = depth[:, None, None], direction(s, t)[:, None, None, None]
     limit = plane_distance(w, local[..., None, None], d[..., None, None], normal[..., None, None])
+    limit = limit if biased is None else biased[..., None, None]
     tested = in_region(region, s, t)
     hidden = (tested & hides(z, limit)).sum(axis=(3, 4), dtype=d.dtype)
     share = 1 - hidden / np.maximum(tested.sum(axis=(3, 4), dtype=d.dtype), 1)

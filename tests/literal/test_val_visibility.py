@@ -6,18 +6,19 @@ import numpy as np
 import pytest
 
 from refgi.literal.val_visibility import (
-    cone_region,
     depth_tests,
     direction,
     disc,
     half_angle,
     pcss,
     pcss_penumbra,
+    penumbra_angle,
     plane_distance,
     search,
     square,
     texel_centers,
     two_maps,
+    widest_angle,
 )
 from refgi.rays import Tracer
 from refgi.scene import Geometry
@@ -59,8 +60,7 @@ def test_a_texel_stands_for_the_direction_that_falls_on_it():
 def test_the_printed_angle_and_the_printed_square():
     """E-VAL-07: 45 and 53.13 degrees at p cos(beta) = d; E-VAL-08: alpha / pi over the exact width."""
     assert 2 * math.degrees(half_angle(2.0, 2.0, 1.0)) == pytest.approx(53.13, abs=CENTS)
-    at = np.array([0.0, 0.0, 2.0]).reshape(3, 1, 1, 1), np.full((1, 1, 1), 2.0), 2.0, 1.0
-    assert cone_region(*at, True, True)[0, 2, 0, 0] == pytest.approx(45 / 180)
+    assert 2 * math.degrees(penumbra_angle(2.0, 2.0, 1.0, alpha=True)) == pytest.approx(45)
     for degrees, ratio in ((0, 1.27), (30, 1.19), (60, 0.95), (80, 0.75), (90, 0.635)):
         way = np.array([math.sin(math.radians(degrees)), 0, math.cos(math.radians(degrees))]).reshape(3, 1, 1, 1)
         narrow = way, np.ones((1, 1, 1)), np.full((1, 1, 1), 1e-4)
@@ -77,6 +77,14 @@ def test_the_printed_search_misses_what_is_near():
         assert pending.tolist() == [[[True, False, False, False]]]  # behind the light, nearer than all, no surface
         assert 0.2 * math.tan(2 * math.atan(region[0, 2, 0, 0])) == pytest.approx(covers)
         assert d[0, 0].tolist() == [4, 0, 0, 0]
+
+
+@pytest.mark.parametrize(("size", "d", "z"), [(1.0, 4.0, 0.6), (1.0, 4.0, 2.0), (3.0, 2.0, 1.7), (0.1, 5.0, 4.9)])
+def test_the_farthest_blocker_lies_on_the_line_to_the_light_s_edge(size, d, z):
+    a = widest_angle(size, d, z)
+    assert z * math.sin(a) == pytest.approx(size / 2 * (1 - z * math.cos(a) / d))
+    assert widest_angle(size, d, 0.3 * size) == math.radians(80)
+    assert widest_angle(size, d, d) == 0
 
 
 def test_planes_are_met_where_they_are():

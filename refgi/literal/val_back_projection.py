@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from refgi.literal.val_visibility import direction, hides, plane_distance
+from refgi.literal.val_maps import direction
+from refgi.literal.val_visibility import hides, plane_distance
 
 CELLS = 32  # of a grid along each side of the rectangle
 LEAST_SIDE = 1e-9  # of a rectangle, as a share of the farthest place: a point has none

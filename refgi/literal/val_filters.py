@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from refgi.literal.val_visibility import in_region, texel_centers
+from refgi.literal.val_maps import rounded_level, texel_centers
+from refgi.literal.val_visibility import in_region
 
 
 def mip_levels(basis: Any, in_bytes: bool = False) -> Any:
@@ -30,14 +31,6 @@ def halved(level: Any) -> Any:
     a, b = upper[..., first], upper[..., second]
     c, d = lower[..., first], lower[..., second]
     return (a + b + c + d) / 4
-
-
-def rounded_level(level: Any) -> Any:
-    """Return channels as published textures hold them: 8 bits for S and C, halves up, half floats for the rest."""
-    m = level.shape[1] // 4
-    eight = np.floor((level[:, : 2 * m] + 1) * 127.5 + 0.5001) / 127.5 - 1
-    half = level[:, 2 * m :].astype(np.float16).astype(level.dtype)
-    return np.where(level.any(axis=(1, 2, 3), keepdims=True), np.concatenate([eight, half], axis=1), 0)
 
 
 def mip_means(pending: Any, region: Any, terms: int, weighed: bool, **levels: Any) -> Any:

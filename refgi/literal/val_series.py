@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from refgi.literal.val_maps import series_depth
 from refgi.literal.val_visibility import disc, light_size, penumbra_angle, square, to_map
 
 LEAST_BLOCKED = 0.02  # share of the search region: less is ripple of the series, no blocker (E-VAL-04)
@@ -108,15 +109,6 @@ def csm_penumbra(
     a = penumbra_angle(size, d, z, alpha)
     region = square(local, d, a) if squares else disc(local, d, a)
     return shaded, np.where(shaded, z, 0), np.where(shaded[:, None], region, 0), t
-
-
-def series_depth(d: Any, origin: Any, slope: Any, end: Any, logarithmic: bool) -> Any:
-    """Return t of distances (K, h, w), m (E-VAL-05)."""
-    start, steep = origin[:, None, None], slope[:, None, None]
-    start = np.where(steep > 0, start, 1)  # an empty map has no scale
-    beyond = np.log2(d / start) if logarithmic else d - start
-    t = np.maximum(beyond * steep, 0)
-    return np.minimum(t, end)
 
 
 def series_distance(t: Any, origin: Any, slope: Any, logarithmic: bool) -> Any:

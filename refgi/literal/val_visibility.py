@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from refgi.literal.val_maps import direction, texel_centers
+
 STEEPEST = math.radians(80)  # of a cone: more would leave the hemisphere
 SLACK = 1e-3  # share of its distance by which a surface lies before a pixel that it hides
 
@@ -145,12 +147,6 @@ def two_maps(
     return np.minimum(ahead, back)
 
 
-def direction(s: Any, t: Any) -> Any:
-    """Return the unit vector (3, ...) of places of a map."""
-    q = s * s + t * t
-    return np.stack([2 * s, 2 * t, 1 - q]) / (1 + q)
-
-
 def plane_distance(w: Any, local: Any, d: Any, normal: Any) -> Any:
     """Return how far along w, m, a pixel's tangent plane lies; d where w does not meet it (E-VAL-14)."""
     height = (normal * local).sum(axis=0)
@@ -213,12 +209,6 @@ def pcss(
     hidden = (tested & hides(z, limit)).sum(axis=(3, 4), dtype=d.dtype)
     share = 1 - hidden / np.maximum(tested.sum(axis=(3, 4), dtype=d.dtype), 1)
     return np.where(shaded, share, 1 if hard is None else hard)
-
-
-def texel_centers(depth: Any) -> Any:
-    """Return s and t (n, n) of a map's texels."""
-    at = ((np.arange(depth.shape[-1]) + 0.5) * 2 / depth.shape[-1] - 1).astype(depth.dtype)
-    return np.meshgrid(at, at)
 
 
 def in_region(region: Any, s: Any, t: Any) -> Any:

@@ -41,7 +41,7 @@ class Form:
     """The literal form of a stage: which function, what it reads and writes."""
 
     function: Callable[..., Any]
-    reads: Mapping[str, str]  # parameter: array
+    reads: Mapping[str, str | tuple[str, ...]]  # parameter: array; or several, such as those of all maps
     writes: tuple[str, ...]  # in the order in which the function returns them
     numbers: Mapping[str, Any] = field(default_factory=dict)  # its other arguments
 
@@ -50,7 +50,9 @@ class Form:
         called = function or self.function
 
         def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 literal forms compute in the type of arrays
-            made = called(**{name: arrays[array] for name, array in self.reads.items()}, **self.numbers)
+            reads = {name: arrays[array] if isinstance(array, str) else [arrays[one] for one in array]
+                     for name, array in self.reads.items()}
+            made = called(**reads, **self.numbers)
             return dict(zip(self.writes, made if len(self.writes) > 1 else (made,), strict=True))
 
         return run

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refgi.literal.val_back_projection import back_projection, cells_below, covered, patches, projected
-from refgi.literal.val_visibility import direction, texel_centers
+from refgi.literal.val_maps import direction, texel_centers
 
 LEAK = 0.2  # of V: patches of a plane stand at unlike distances and leave gaps, as published; measured 0.17
 EDGE = 0.05  # of V: a texel at the plate's edge is 0.015 m on the light's plane, 0.03 of the side; half of a cell

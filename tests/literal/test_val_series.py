@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from refgi.literal.val_maps import series_depth
 from refgi.literal.val_series import (
     above_half,
     csm,
@@ -12,7 +13,6 @@ from refgi.literal.val_series import (
     first_lit,
     plateau,
     series,
-    series_depth,
     series_distance,
     shade,
     weights,

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from refgi.literal.val_maps import direction, texel_centers
 from refgi.literal.val_visibility import (
     depth_tests,
-    direction,
     disc,
     half_angle,
     pcss,
@@ -16,7 +16,6 @@ from refgi.literal.val_visibility import (
     plane_distance,
     search,
     square,
-    texel_centers,
     two_maps,
     widest_angle,
 )
@@ -49,12 +48,6 @@ def test_a_cone_is_a_circle_on_the_map(theta, a):
         np.cross(axis, up), np.sin(phi)))
     off = np.hypot(rim[0] / (1 + rim[2]) - s, rim[1] / (1 + rim[2]) - t) - radius
     assert np.abs(off).max() < CLOSE * max(1, radius)
-
-
-def test_a_texel_stands_for_the_direction_that_falls_on_it():
-    s, t = texel_centers(np.zeros((16, 16)))
-    x, y, z = direction(s, t)
-    np.testing.assert_allclose([x / (1 + z), y / (1 + z), x * x + y * y + z * z], [s, t, np.ones((16, 16))], atol=CLOSE)
 
 
 def test_the_printed_angle_and_the_printed_square():

@@ -8,11 +8,11 @@ from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.settings import Csm
 from refgi.cluster.visibility.search_region import scale_of
 from refgi.cluster.visibility.series import series
+from refgi.literal import val_maps
 from refgi.literal import val_series as literal
-from refgi.vectors.bugs.val_basis import scale_bugs
-from refgi.vectors.recipe import Recipe, reading, writing
+from refgi.vectors.recipe import Recipe
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Arrays, Bug, Spec
+from refgi.vectors.spec import Arrays, Spec
 from refgi.vectors.stages.val_maps import shadow_maps_of
 
 SCALE = ("scale.origin", "scale.slope", "series.range")
@@ -42,7 +42,9 @@ def add_series(recipe: Recipe, csm: Csm) -> None:
 
 def add_scale(recipe: Recipe, csm: Csm) -> None:
     """Add the scale of depths of each map."""
-    def run(arrays: Arrays, real: Any, kind: Any = csm.depth_scale) -> Arrays:
+    kind = csm.depth_scale
+
+    def run(arrays: Arrays, real: Any) -> Arrays:
         maps = shadow_maps_of(arrays, real)
         chain = series(csm)._replace(range=float(arrays["series.range"][0]))
         scales = [scale_of(maps, k, kind, chain) if maps.map_of[k] >= 0 else DepthScale(False, 0.0, 0.0, 0.0)
@@ -50,30 +52,15 @@ def add_scale(recipe: Recipe, csm: Csm) -> None:
         return {"scale.origin": np.array([one.origin for one in scales]),
                 "scale.slope": np.array([one.slope for one in scales])}
 
-    def other(kind: str) -> Any:
-        return lambda arrays, real: run(arrays, real, kind)
-
-    forms = {"log_map": "logarithms of what the map holds", "map": "linear in metres", "scene": "shares of the scene"}
-    every = {"maps__near": lambda a: np.where(np.isfinite(a), a.min(), a),
-             "maps__far": lambda a: np.full_like(a, a.max())}
+    form = Form(val_maps.depth_scale, {"near": "maps.near", "far": "maps.far", "scene_far": "maps.scene_far",
+                                       "end": "series.range"}, SCALE[:2], {"kind": kind})
+    others = (f"depth_scale/not {one}" for one in ("log_map", "map", "scene") if one != kind)
     unit = "depths per octave" if csm.depth_scale == "log_map" else "1/m"
     recipe.add("scale", "scale on which the depths of each map are compared", run,
                ("maps.near", "maps.far", "maps.scene_far", "series.range"),
                {"scale.origin": Spec("area light", "m", "distance of depth 0; 0 for empty maps"),
                 "scale.slope": Spec("area light", unit, "depths per octave of distance or per metre; 0 on empty maps")},
-               paper="E-VAL-05", bugs=(
-                   *(Bug(f"depths are {what}", other(kind), "E-VAL-05") for kind, what in forms.items()
-                     if kind != csm.depth_scale),
-                   *((Bug("one scale for all maps", reading(run, **every), "E-VAL-05: what each map holds"),)
-                     if csm.depth_scale != "scene" else ()),
-                   *(scale_bugs(run, csm) if csm.depth_scale != "scene" else ()),
-                   Bug("the farthest blocker's depth is the far end of the range e: no room for the bias",
-                       writing(run, scale__slope=lambda a: a * _top(csm)), "b* is left behind the farthest blocker")))
-
-
-def _top(csm: Csm) -> float:
-    end = series(csm).range
-    return end / max(2 * end - 1, end / 2)
+               paper="E-VAL-05", bugs=form.bugs("depth_scale", f"depth_scale/{kind}", *others), variants=(form.run(),))
 
 
 def scale_at(arrays: Arrays, csm: Csm, k: int) -> DepthScale:

@@ -10,8 +10,7 @@ from refgi.cluster import val
 from refgi.frame import Frame
 from refgi.vectors.bounds import distance, isolated_bounds
 from refgi.vectors.cases.val import FULL_SETUPS, SETUPS
-from refgi.vectors.spec import expected_of
-from tests.vectors.val_port import Port
+from refgi.vectors.spec import expected_of, outputs_of
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
@@ -58,16 +57,21 @@ def test_the_last_stage_is_the_method(name):
 def test_the_literal_forms_pass_as_a_port(name):
     """Oracle: the literal forms, stage by stage from stored inputs. They cover every stage of `val`."""
     case, known, steps = made(name)
-    port = Port(ALL[name], known)
     for step in steps:
         limits = isolated_bounds(case, replace(step, variants=()), known, 1)  # of the method, not of its literal form
-        literal = port.outputs(step.name)
-        assert set(literal) == set(step.writes)
+        literal = outputs_of(step, known, np.float64, step.variants[-1])
         for one in step.writes:
             got, expected = literal[one], known[one]
             assert np.shape(got) == expected.shape, one
-            off = is_off(got.astype(np.float32) if expected.dtype.kind == "f" else got, expected, limits[one])
+            off = is_off(got, expected, limits[one])
             assert not off.any(), (step.name, one, int(off.sum()), np.argwhere(off)[:3].tolist())
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_no_cause_is_named_twice_in_a_stage(name):
+    for step in made(name)[2]:
+        causes = [bug.cause for bug in step.bugs]
+        assert len(set(causes)) == len(causes), step.name
 
 
 def test_few_elements_are_masked():

@@ -9,12 +9,12 @@ import numpy as np
 from refgi.lights.importance import border
 from refgi.lights.warp import Warp
 from refgi.vectors.bugs.points import below_1
-from refgi.vectors.bugs.val_mip import FOUR
 from refgi.vectors.recipe import reading
 from refgi.vectors.spec import Array, Arrays, Bug, Run
 
 EQ, FACE = "SII Eq. 4 to 6", "SII Sec. 3.6: v chooses the map in proportion to its importance"
 BELOW_1 = 1.0 - 2.0**-24
+FOUR = ("upper left", "upper right", "lower left", "lower right")
 
 
 def warp_bugs(name: str, maps: int, warp: Warp, run: Run) -> Iterator[Bug]:

@@ -15,12 +15,12 @@ from refgi.cluster.lighting.interleave import (
 )
 from refgi.cluster.settings import BackProjection, BoxBlur, Csm, GeometryBlur, Hard, Pcf, Pcss, ValSettings
 from refgi.literal import val_areas as literal
+from refgi.literal import val_filters
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.scene import Scene
-from refgi.settings import replaced
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.facing import add_facing
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.pairs import EQ2, LOBES, READS, RECEIVERS
@@ -153,48 +153,22 @@ def _receivers(arrays: Arrays, real: Any) -> Receivers:
 
 def _add_blur(recipe: Recipe, settings: BoxBlur | GeometryBlur, block: int) -> None:
     reads = ("sum.irradiance", *RECEIVERS, "extents.visible")
+    how = {"extent": settings.extent, "cosine": settings.cosine, "every_subset": settings.every_subset} if isinstance(
+        settings, GeometryBlur) else {}
+    form = Form(val_filters.blur, {
+        "irradiance": reads[0], "position": RECEIVERS[0], "normal": RECEIVERS[1], "triangle_id": RECEIVERS[2],
+        "box": reads[-1]}, ("blur.irradiance",), {"size": block, **(how or {
+            "extent": np.inf, "cosine": -np.inf, "every_subset": False})})
 
-    def run(arrays: Arrays, real: Any, how: Any = settings, size: int = block) -> Arrays:
+    def run(arrays: Arrays, real: Any) -> Arrays:
         light, diagonal = np.ascontiguousarray(arrays["sum.irradiance"], real), extent_of(arrays, "visible").diagonal
-        return {"blur.irradiance": blur(light, _receivers(arrays, real), size, how, diagonal)}
+        return {"blur.irradiance": blur(light, _receivers(arrays, real), block, settings, diagonal)}
 
-    def turned(arrays: Arrays, real: Any) -> dict[str, Array]:
-        there = {name: arrays[name][..., ::-1, ::-1] for name in reads[:-1]}
-        return {"blur.irradiance": run({**arrays, **there}, real)["blur.irradiance"][..., ::-1, ::-1]}
-
-    def other(**how: Any) -> Any:
-        return lambda arrays, real: run(arrays, real, replaced(settings, how))
-
-    geometry = (
-        Bug("pixels of other surfaces count", lambda a, r: run(a, r, BoxBlur()), BLUR),
-        Bug("normals are not compared", other(cosine=-1.0), BLUR),
-        Bug("distances are not compared", other(extent=10.0), BLUR),
-        Bug("the least cosine is 0.5", other(cosine=0.5), BLUR),
-        Bug("the extent counts across, not around", other(extent=settings.extent / 2), BLUR),
-        Bug("subsets that an edge cuts off are " + ("left out" if settings.every_subset else "replaced"),
-            other(every_subset=not settings.every_subset), BLUR),
-    ) if isinstance(settings, GeometryBlur) else ()
     recipe.facts["blur"] = {"n": block, "window": "x - n // 2 on, moved inwards at the rim"} | (
         {"extent, of the visible box's diagonal": settings.extent, "least cosine": settings.cosine,
          "every subset": settings.every_subset} if isinstance(settings, GeometryBlur) else {})
     recipe.add("blur", "mean over n x n pixels of the same surface, each subset once", run, reads,
                {"blur.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB")},
-               paper=BLUR, exact=("gbuffer.position", "gbuffer.normal"), bugs=(
-                   *geometry,
-                   Bug("nothing is blurred", lambda a, r: {"blur.irradiance": a["sum.irradiance"]}, BLUR),  # noqa: ARG005
-                   Bug("the window is a pixel wider", lambda a, r: run(a, r, size=block + 1), BLUR),
-                   *((Bug("the window starts at x - (n - 1) // 2", turned, BLUR),) if block % 2 == 0 else ()),
-                   Bug("edges of the picture repeat in place of a moved window", _clamped(run, block), BLUR)))
-
-
-def _clamped(run: Any, block: int) -> Any:
-    """Return a blur of a picture with its rim repeated, cut back to its size."""
-    def altered(arrays: Arrays, real: Any) -> Arrays:
-        wide: dict[str, Array] = {}
-        for name in ("sum.irradiance", *RECEIVERS):
-            before = [(0, 0)] * (arrays[name].ndim - 2)
-            wide[name] = np.pad(arrays[name], [*before, (block, block), (block, block)], mode="edge")
-        inner = slice(block, -block)
-        return {"blur.irradiance": run({**arrays, **wide}, real)["blur.irradiance"][:, inner, inner]}
-
-    return altered
+               paper=BLUR, exact=("gbuffer.position", "gbuffer.normal"), variants=(form.run(),),
+               bugs=form.bugs(*(("blur/geometry", f"blur/every subset {how['every_subset']}") if how else ()), "blur",
+                              *(("blur/even",) if block % 2 == 0 else ())))

@@ -3,7 +3,6 @@
 A texel's channels are sin(c_k t) for all k, cos(c_k t), t sin(c_k t), t cos(c_k t), then t, its depth.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,11 +14,11 @@ from refgi.cluster.filters.mip_build import halve
 from refgi.cluster.filters.prefilter import LEVEL_SHIFT
 from refgi.cluster.filters.pyramid import Mip, level_offsets, mip_of, mips
 from refgi.cluster.settings import Csm
+from refgi.literal import val_filters
 from refgi.literal import val_maps as literal
-from refgi.vectors.bugs.val_mip import levels_by, mean_of_four, mip_bugs
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.val_maps import SHEET
 from refgi.vectors.stages.val_series import SCALE, add_scale, add_series, scale_at
 
@@ -85,13 +84,8 @@ def level_names(recipe: Recipe) -> tuple[str, ...]:
     return tuple(name for name in recipe.specs if name.startswith("basis."))
 
 
-def stored_by(csm: Csm) -> Callable[[Array], Array]:
-    """Return how a basis is kept: as it is, or in 8 and 16 bits."""
-    return literal.rounded_level if csm.quantisation == "published" else np.asarray
-
-
 def _add_levels(recipe: Recipe, csm: Csm) -> None:
-    terms, kept = csm.terms, stored_by(csm)
+    terms, quantised = csm.terms, csm.quantisation == "published"
     side = recipe.facts["maps"]["texels a side"]
     sides = [side]
     while sides[-1] > 1:
@@ -101,45 +95,17 @@ def _add_levels(recipe: Recipe, csm: Csm) -> None:
     def run(arrays: Arrays, real: Any) -> Arrays:
         level, made = np.ascontiguousarray(arrays["basis.0"], real), {}
         for name in names:
-            level = made[name] = kept(_halved(level, terms))
+            level = _halved(level, terms)
+            level = made[name] = literal.rounded_level(level) if quantised else level
         return made
 
-    def chained(half: Any) -> Any:
-        def altered(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
-            level, made = arrays["basis.0"], {}
-            for name in names:
-                level = made[name] = kept(half(level))
-            return made
-
-        return altered
-
+    form = Form(val_filters.mip_levels, {"basis": "basis.0"}, tuple(names), {"in_bytes": quantised})
     recipe.facts["basis.sides"] = sides
     recipe.add("mip", "each level halves the one before by means of 2 x 2 texels; of an odd side the last counts twice",
                run, ("basis.0",), {name: Spec(CHANNELS, "1", f"means over {2**level} x {2**level} texels")
                                    for level, name in enumerate(names, 1)},
-               paper="VAL Sec. 6", bugs=(
-                   Bug("one texel of four", chained(lambda a: a[:, :, ::2, ::2]), "means"),
-                   Bug("sums of four texels", chained(lambda a: 4 * _mean_of_four(a, "edge")), "means"),
-                   Bug("beyond an odd side is 0", chained(lambda a: _mean_of_four(a, "constant")), "docs/methods"),
-                   Bug("columns are halved alone, then rows shifted", chained(
-                       lambda a: _mean_of_four(np.roll(a, -1, axis=2), "edge")), "texels 2 i and 2 i + 1"),
-                   Bug("the depth is that of the nearest texel, not the mean",
-                       chained(lambda a: np.concatenate([_mean_of_four(a, "edge")[:, :-1], _least_of_four(a)], 1)),
-                       "E-VAL-02: Z = w * z"),
-                   *mip_bugs(names, kept), *(_unrounded(names, terms) if csm.quantisation == "published" else ())))
-
-
-def _unrounded(names: list[str], terms: int) -> tuple[Bug, ...]:  # noqa: ARG001
-    """Return likely bugs of levels in 8 and 16 bits."""
-    def once(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 levels of means that are rounded last
-        level, made = arrays["basis.0"], {}
-        for name in names:
-            level = _mean_of_four(level, "edge")
-            made[name] = literal.rounded_level(level)
-        return made
-
-    return (Bug("levels are not rounded to 8 and 16 bits", levels_by(names, mean_of_four), "VAL Sec. 6"),
-            Bug("levels are made of unrounded ones and rounded when they are stored", once, "of the level before"))
+               paper="VAL Sec. 6", variants=(form.run(),),
+               bugs=form.bugs("mip_levels", *(("mip_levels/bytes",) if quantised else ())))
 
 
 def _halved(level: Array, terms: int) -> Array:
@@ -159,21 +125,6 @@ def _halved(level: Array, terms: int) -> Array:
         channels = np.concatenate([*(part[new, : 2 * terms] for part in parts), depth[new, None]], axis=1)
         made[k] = channels.T.reshape(-1, half, half)
     return made
-
-
-def _padded(level: Array, mode: Any) -> Array:
-    odd = level.shape[2] % 2
-    return np.pad(level, ((0, 0), (0, 0), (0, odd), (0, odd)), mode=mode)
-
-
-def _mean_of_four(level: Array, mode: str) -> Array:
-    a = _padded(level, mode)
-    return np.asarray(a[:, :, ::2, ::2] + a[:, :, ::2, 1::2] + a[:, :, 1::2, ::2] + a[:, :, 1::2, 1::2]) / 4
-
-
-def _least_of_four(level: Array) -> Array:
-    a = _padded(level[:, -1:], "edge")
-    return np.asarray(a.reshape(*a.shape[:2], a.shape[2] // 2, 2, -1, 2).min(axis=(3, 5)))
 
 
 def filters_of(arrays: Arrays, csm: Csm, k: int, real: Any, boxes: bool) -> Any:

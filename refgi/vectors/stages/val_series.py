@@ -9,11 +9,10 @@ from refgi.cluster.settings import Csm
 from refgi.cluster.visibility.search_region import scale_of
 from refgi.cluster.visibility.series import series
 from refgi.literal import val_maps
-from refgi.settings import replaced
-from refgi.vectors.bugs.val_basis import chain_bugs
-from refgi.vectors.recipe import Recipe, writing
+from refgi.literal import val_series as literal
+from refgi.vectors.recipe import Recipe
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Arrays, Bug, Spec
+from refgi.vectors.spec import Arrays, Spec
 from refgi.vectors.stages.val_maps import shadow_maps_of
 
 SCALE = ("scale.origin", "scale.slope", "series.range")
@@ -21,8 +20,12 @@ SCALE = ("scale.origin", "scale.slope", "series.range")
 
 def add_series(recipe: Recipe, csm: Csm) -> None:
     """Add the numbers of the series."""
-    def run(arrays: Arrays, real: Any, how: Csm = csm) -> Arrays:  # noqa: ARG001
-        chain = series(how)
+    plain = csm.attenuation == 0 and csm.rescale == "none" and csm.bias is None
+    form = Form(literal.series, {}, ("series.weight", "series.bias", "series.range"), {
+        "terms": csm.terms, "attenuation": csm.attenuation, "rescale": csm.rescale, "fixed": csm.bias})
+
+    def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
+        chain = series(csm)
         return {"series.weight": chain.weight, "series.bias": np.array([chain.search_bias, chain.bias]),
                 "series.range": np.array([chain.range])}
 
@@ -33,16 +36,8 @@ def add_series(recipe: Recipe, csm: Csm) -> None:
         "series.weight": Spec("term", "1", "w_k = 2 / c_k, c_k = (2k - 1) pi", paper="E-VAL-02"),
         "series.bias": Spec("(search, comparison)", "1", "b*, where f_M is 1 for the first time", paper="E-VAL-03"),
         "series.range": Spec("one", "1", "1 - 2 b*, the depth of what is farthest", paper="E-VAL-05")},
-        paper="VAL Sec. 4.1, E-VAL-02, 03, 05", bugs=(
-            Bug("weights are half as large, w_k = 1 / c_k: the factor 2 is missing, or "
-                "frequencies are twice as high", writing(run, series__weight=lambda a: a / 2), "E-VAL-02"),
-            Bug("terms are damped more", lambda a, r: run(a, r, replaced(csm, {
-                "attenuation": csm.attenuation + 1.0})), f"A = {csm.attenuation:g}"),
-            Bug("no bias, the range right", writing(run, series__bias=np.zeros_like), "E-VAL-03"),
-            Bug("depths fill the whole period", writing(run, series__range=np.ones_like), "E-VAL-05"),
-            Bug("the bias is that of one term less", lambda a, r: {
-                **run(a, r, replaced(csm, {"terms": csm.terms - 1})), "series.weight": series(csm).weight}, "b*(M)"),
-            *(chain_bugs(run, csm) if csm.attenuation == 0 and csm.rescale == "none" and csm.bias is None else ())))
+        paper="VAL Sec. 4.1, E-VAL-02, 03, 05", variants=(form.run(),),
+        bugs=form.bugs("series", "series/plain" if plain else "series/damped"))
 
 
 def add_scale(recipe: Recipe, csm: Csm) -> None:

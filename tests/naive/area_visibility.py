@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from tests.naive import filters
-from tests.naive.crossings import crossings
 
 SLACK = 1e-3  # share of its distance by which a blocker lies before a receiver
 STEEPEST = math.tan(math.radians(80))  # of a search's cone
@@ -46,14 +45,6 @@ def texels(n):
     s, t = np.meshgrid(*[(np.arange(n) + 0.5) * 2 / n - 1] * 2)
     square = s * s + t * t
     return s, t, square <= 1, np.stack([2 * s, 2 * t, 1 - square], axis=2) / (1 + square)[..., None]
-
-
-def draw(corners, center, frame, n, least, scene_far):
-    """Cast a ray through each texel, past what lies nearer than `least`."""
-    _, _, inside, toward = texels(n)
-    far = crossings(corners, center, toward.reshape(-1, 3) @ frame)
-    nearest = np.where(far >= least, far, math.inf).min(axis=1, initial=math.inf).reshape(n, n)
-    return Seen(center, frame, np.where(inside, nearest, math.inf), scene_far)
 
 
 # filter sizes: tangents of half-angles

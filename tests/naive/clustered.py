@@ -21,15 +21,12 @@ from refgi.cluster.settings import (
     RaysVpls,
 )
 from refgi.lights.selection import choose_lights, footprints
+from refgi.literal import val_areas, val_maps
 from tests.naive import area_visibility as soft
-from tests.naive import interleaving, kmeans
+from tests.naive import interleaving
 from tests.naive.crossings import LIFT, corners_of, face_normals, free
 from tests.naive.pair_term import contributions
-from tests.naive.val import is_between, view_frame
 
-ABOVE = 4e-6  # of map centres off their lights, as a share of the lit surfaces' largest coordinate
-HULL = 1e-6  # of the diagonal: what lies beyond a plane by less is not beyond it
-FLAT = 1e-5  # of a cluster's radius: a narrower rectangle is a line
 BACK = 0.75  # of the area lights that were enough: the one step back
 FROM_BEHIND = (np.arange(4) + 0.5) / 4  # points along a side of the rectangle that rays from behind end at
 NEAR = {"csm": 0.4, "pcss": 0.7, "pcf": 0.6, "hard": 0.6, "back_projection": 0.25, "rays_rectangle": 0.7}
@@ -69,11 +66,11 @@ def picture(frame, settings):
     block = settings.interleaving.block or 1
     areas, shares = grouped(view)
     light = np.zeros((3, frame.height, frame.width))
+    subset = val_areas.interleaving(area_of(areas, len(view.light)), block, settings.interleaving.assignment)
     for p, (row, column) in enumerate(view.pixels):
-        of = area_of(areas, len(view.light)) if settings.interleaving.assignment == "cluster" else None
-        mine = interleaving.lights_of(column, row, block, len(view.light), of)
+        mine = subset == row % block * block + column % block
         light[:, row, column] = block**2 * sum(
-            share[p] * view.light[sorted({*area.members} & {*mine}), p].sum(axis=0)
+            share[p] * view.light[[i for i in area.members if mine[i]], p].sum(axis=0)
             for area, share in zip(areas, shares, strict=True))
     if block == 1 or settings.blur is None:
         return light
@@ -103,8 +100,11 @@ def every_light(view):
 
 
 def area_of(areas, count):
-    """Return C(i) of each light."""
-    return [next(k for k, area in enumerate(areas) if i in area.members) for i in range(count)]
+    """Return C(i) of each light, (N,)."""
+    of = np.zeros(count, int)
+    for k, area in enumerate(areas):
+        of[area.members] = k
+    return of
 
 
 # how many area lights
@@ -163,48 +163,22 @@ def trial(view, count):
 
 def area_lights(view, count):
     """Group the pixel lights."""
-    kind, positions, normals = view.settings.clusters, view.lights.position.T, view.lights.normal.T
-    centers, axes, of, *_ = kmeans.cluster(positions.astype(float).tolist(), normals.astype(float).tolist(), count,
-                                           kind.distance, (kind.position_weight, kind.normal_weight),
-                                           diagonal(lit_points(view.frame)), kind.rounds)
-    return [rectangle(view, np.array(center), np.array(axis), [i for i in range(len(of)) if of[i] == k])
-            for k, (center, axis) in enumerate(zip(centers, axes, strict=True))]
-
-
-def rectangle(view, center, normal, members):
-    """Return the bounding rectangle of a cluster."""
-    settings = view.settings.area
-    right, down = (np.array(v) for v in view_frame(normal.tolist()))
-    away = view.lights.position[:, members].T.astype(float) - center
-    c, s = turn(away @ right, away @ down, settings.axes)
-    axes = np.array([c * right + s * down, c * down - s * right])
-    flat = away @ axes.T
-    radius = float(np.linalg.norm(away, axis=1).max(initial=0))
-    low, high = (flat.min(axis=0), flat.max(axis=0)) if members else np.zeros((2, 2))
-    side = np.where(high - low < FLAT * radius, 0.0, high - low)
-    if settings.unbiased_area and len(members) > 1:  # ((n - 1) / (n + 1))^2 of the area, in the mean
-        side = side * (len(members) + 1) / (len(members) - 1)
-    if settings.single_light == "footprint" and len(members) == 1:
-        side = np.full(2, math.sqrt(footprint(view, members[0])))
-    delta = {"root": math.sqrt(side[0] * side[1]), "longer": side.max(), "shorter": side.min()}[settings.extent]
-    return Area(center, np.array([right, down, normal]), axes, side, (low + high) / 2, float(delta), radius, members)
-
-
-def turn(s, t, axes):
-    """Return cosine and sine of how far the axes are turned within the plane."""
-    if axes == "fixed" or len(s) < 2:
-        return 1.0, 0.0
-    if axes == "pca":
-        _, vectors = np.linalg.eigh(np.cov(s, t))
-        return vectors[0, 1], vectors[1, 1]
-    best = (math.inf, (1.0, 0.0))  # along an edge of the hull, so along a line through two points
-    for i in range(len(s)):
-        for j in range(i):
-            length = math.hypot(s[i] - s[j], t[i] - t[j])
-            if length > 0:
-                c, d = (s[i] - s[j]) / length, (t[i] - t[j]) / length
-                best = min(best, (np.ptp(c * s + d * t) * np.ptp(c * t - d * s), (c, d)))
-    return best[1]
+    kind, how = view.settings.clusters, view.settings.area
+    position, normal = (getattr(view.lights, key).astype(float) for key in ("position", "normal"))
+    normal = normal / np.linalg.norm(normal, axis=0)
+    if count >= position.shape[1]:
+        center, axis, of = val_areas.kmeans_each(position, normal)
+    else:
+        center, axis, of = val_areas.kmeans(
+            position, normal, val_areas.box(lit_points(view.frame).T), *val_areas.kmeans_start(position, normal, count),
+            kind.distance, kind.position_weight, kind.normal_weight, kind.rounds)
+    frame, axes, side, offset, delta, radius, members = val_areas.areas(
+        position, center, axis, of, how.axes, how.extent, how.unbiased_area)
+    if how.single_light == "footprint":
+        for k in np.flatnonzero(members == 1):
+            side[:, k] = delta[k] = math.sqrt(footprint(view, int(np.flatnonzero(of == k)[0])))
+    return [Area(center[:, k], frame[k], axes[k], side[:, k], offset[:, k], delta[k], radius[k],
+                 np.flatnonzero(of == k).tolist()) for k in range(len(members))]
 
 
 def footprint(view, i):
@@ -398,21 +372,15 @@ def share_by_map(settings, area, seen, channels, local, facing):
 def map_of(view, area, sign):
     """Draw the map of an area light past what cannot block or lies too near."""
     settings = view.settings.maps
-    lit = lit_points(view.frame)
-    takes_part = np.concatenate([view.position, lit])
-    low, high = takes_part.min(axis=0), takes_part.max(axis=0)
-    center = area.center + ABOVE * np.abs(lit).max() * area.frame[2]
-    near = near_share(view.settings) * area.radius
-    corners = blockers(view, HULL * float(np.linalg.norm(high - low)))
-    corners = without_near_planes(corners, center, near) if settings.near_geometry == "planes" else corners
-    farthest = float(np.linalg.norm(np.maximum(np.abs(low - center), np.abs(high - center))))
-    return soft.draw(corners, center, area.frame * np.array([sign, 1.0, sign])[:, None], settings.resolution,
-                     near if settings.near_geometry == "ball" else 0.0, farthest)
-
-
-def blockers(view, tolerance):
-    """Leave out triangles with all lights and all triangles in view on one side; or those alone that lie outside."""
-    seen = np.unique(view.frame.gbuffer.triangle_id[view.frame.gbuffer.covered])
-    ends = np.concatenate([view.corners[seen].reshape(-1, 3), view.lights.position.T.astype(float)]).tolist()
-    tolerance = tolerance if view.settings.maps.occluders_alone else -tolerance
-    return np.array([t for t in view.corners if is_between(t.tolist(), ends, tolerance)]).reshape(-1, 3, 3)
+    boxes = [val_areas.box(points.T) for points in (view.position, lit_points(view.frame))]
+    center, ball, farthest = (one[0] for one in val_maps.map_views(
+        *boxes, area.center[:, None], area.frame[2][:, None], np.array([area.radius]), near_share(view.settings)))
+    corners = view.corners[val_maps.blockers(
+        view.corners.reshape(-1, 3), np.arange(view.corners.size // 3).reshape(-1, 3),
+        view.frame.gbuffer.triangle_id, view.lights.position.astype(float), *boxes, not settings.occluders_alone)]
+    corners = without_near_planes(corners, center, ball) if settings.near_geometry == "planes" else corners
+    frame = area.frame * np.array([sign, 1.0, sign])[:, None]
+    depth = val_maps.depth_maps(
+        corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3), np.ones(len(corners), bool), center[None],
+        frame[None], np.array([ball if settings.near_geometry == "ball" else 0.0]), np.ones(1), settings.resolution)
+    return soft.Seen(center, frame, depth[0], farthest)

@@ -1,35 +1,9 @@
-"""Slow literal twins of interleaved sampling and the geometry-aware blur (Dong et al. 2009, Sec. 6)."""
+"""Slow literal twin of the geometry-aware blur (Dong et al. 2009, Sec. 6)."""
 
 import functools
 import math
 
 import numpy as np
-
-
-def bayer(x, y):
-    """Return the rank of a place in Bayer's ordered dither, from its bits, the lowest of x and y counting most."""
-    if x == y == 0:
-        return 0.0
-    return {(0, 0): 0, (1, 1): 1, (1, 0): 2, (0, 1): 3}[x % 2, y % 2] / 4 + bayer(x // 2, y // 2) / 4
-
-
-def lights_of(x, y, side, count, area_of=None):
-    """Return the lights that pixel (x, y) sums: one of n^2, in their order.
-
-    By index; or, given the area light of each, up to three runs of lights sorted by these: run j goes to the place
-    of rank j mod n^2, runs of one length as near as can be.
-    """
-    if area_of is None:
-        return [i for i in range(count) if i % (side * side) == (y % side) * side + x % side]
-    places = sorted(((i, j) for i in range(side) for j in range(side)), key=lambda place: bayer(*place))
-    mine = places.index((x % side, y % side))
-    each = min(3, max(1, count // side**2))
-    by_area = sorted(range(count), key=lambda i: (area_of[i], i))
-    chosen = []
-    for turn in range(each):
-        run, runs = turn * side**2 + mine, each * side**2
-        chosen += by_area[-(-run * count // runs) : -(-(run + 1) * count // runs)]
-    return sorted(chosen)
 
 
 def window(place, count, side):

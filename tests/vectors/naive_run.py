@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from refgi.vectors.cases import kit_cases
-from refgi.vectors.cases.val import SETUPS
 from refgi.vectors.check import Asked, Kit
+from refgi.vectors.spec import outputs_of
 from tests.vectors import screen_space_port
 from tests.vectors.naive_port import NaivePort
-from tests.vectors.val_port import Port
 
 CLUSTERED = ("val-",)
 SPLATTING, SCREEN = ("pairs-", "sii-halton", "sii-three", "sii-warp", "sii-grid"), ("hssil-",)
@@ -31,8 +30,8 @@ def outputs(kit, case):
     """Yield what each stage writes; None where no twin covers it."""
     known = {name: kit.array(case, name) for name in case.arrays}
     if case.id.startswith(CLUSTERED):
-        port, first = Port(SETUPS[case.id], known), [step.name for step in case.stages].index("extents")
-        yield from (port.outputs(step.name) for step in case.stages[first:])
+        yield from (outputs_of(step, known, np.float64, step.variants[-1]) for step in kit_cases("quick")[case.id](
+            ).stages if step.variants)
         return
     splatted = case.id.startswith(SPLATTING)
     steps = NaivePort(case) if splatted else kit_cases("quick")[case.id]()

@@ -1,5 +1,6 @@
-"""Stages of clustered visibility: as the method, as the literal twins, and blind to no bug."""
+"""Stages of clustered visibility: as the method, as their literal forms, and blind to no bug."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -9,8 +10,7 @@ from refgi.cluster import val
 from refgi.frame import Frame
 from refgi.vectors.bounds import distance, isolated_bounds
 from refgi.vectors.cases.val import FULL_SETUPS, SETUPS
-from refgi.vectors.spec import expected_of
-from tests.vectors.val_port import Port
+from refgi.vectors.spec import expected_of, outputs_of
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
@@ -27,10 +27,9 @@ def made(name):
     return case, expected_of(case), case.stages[first:]
 
 
-@cache
 def bounds(name):
-    _, known, steps = made(name)
-    case = ALL[name].case()
+    """Return the bounds of a case's arrays."""
+    case, known, steps = made(name)
     return {step.name: isolated_bounds(case, step, known, 1) for step in steps}
 
 
@@ -55,26 +54,31 @@ def test_the_last_stage_is_the_method(name):
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_the_twins_pass_as_a_port(name):
-    """Oracle: the twins of `tests/naive`, stage by stage from stored inputs. They cover every stage of `val`."""
-    _, known, steps = made(name)
-    port = Port(ALL[name], known)
+def test_the_literal_forms_pass_as_a_port(name):
+    """Oracle: the literal forms, stage by stage from stored inputs. They cover every stage of `val`."""
+    case, known, steps = made(name)
     for step in steps:
-        made_by_twin = port.outputs(step.name)
-        assert set(made_by_twin) == set(step.writes)
+        limits = isolated_bounds(case, replace(step, variants=()), known, 1)  # of the method, not of its literal form
+        literal = outputs_of(step, known, np.float64, step.variants[-1])
         for one in step.writes:
-            got, expected = made_by_twin[one], known[one]
+            got, expected = literal[one], known[one]
             assert np.shape(got) == expected.shape, one
-            off = is_off(got.astype(np.float32) if expected.dtype.kind == "f" else got, expected,
-                         bounds(name)[step.name][one])
+            off = is_off(got, expected, limits[one])
             assert not off.any(), (step.name, one, int(off.sum()), np.argwhere(off)[:3].tolist())
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_no_cause_is_named_twice_in_a_stage(name):
+    for step in made(name)[2]:
+        causes = [bug.cause for bug in step.bugs]
+        assert len(set(causes)) == len(causes), step.name
 
 
 def test_few_elements_are_masked():
     for name in ALL:
-        for step in made(name)[2]:
-            for one, bound in bounds(name)[step.name].items():
-                assert bound.masked.sum() <= MASKED * bound.masked.size, (name, one)
+        for step, found in bounds(name).items():
+            for one, bound in found.items():
+                assert bound.masked.sum() <= MASKED * bound.masked.size, (name, step, one)
 
 
 def test_the_cases_hold_what_they_say():

@@ -4,11 +4,12 @@ from typing import Any
 
 import numpy as np
 
+from refgi.literal import val_areas as literal
 from refgi.rsm import facing_normals
 from refgi.scene import Scene
-from refgi.vectors.bugs.val_facing import facing_bugs
-from refgi.vectors.recipe import Recipe, writing
-from refgi.vectors.spec import Arrays, Bug, Spec
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import Arrays, Spec
 from refgi.vectors.stages.buffers import VECTOR, geometry_of
 
 FACING = "gbuffer.facing"
@@ -25,10 +26,10 @@ def add_facing(recipe: Recipe, scene: Scene) -> None:
             return {FACING: normal}
         return {FACING: facing_normals(geometry_of(arrays, scene), np.asarray(arrays["gbuffer.triangle_id"]), normal)}
 
+    reads = {"vertices": "scene.vertices", "faces": "scene.faces"} if smooth else {}
+    form = Form(literal.facing, {"normal": "gbuffer.normal", "triangle_id": "gbuffer.triangle_id", **reads}, (FACING,))
     recipe.add("facing", "normals of the triangles that pixels see, on the side of the interpolated ones", run,
                ("gbuffer.normal", "gbuffer.triangle_id", *source),
                {FACING: Spec("xyz, row, column", VECTOR, "plane of what a pixel sees; 0 without surface", "world")},
-               paper="A.6 P4: receiver's plane", bugs=(
-                   Bug("they point away from the viewer", writing(run, **{"gbuffer__facing": lambda a: -a}), ""),
-                   *((Bug("interpolated normals", lambda a, r: {FACING: a["gbuffer.normal"]}, "d_plane"),  # noqa: ARG005
-                      *facing_bugs()) if smooth else ())))
+               paper="A.6 P4: receiver's plane", bugs=form.bugs("facing/smooth" if smooth else "facing/flat"),
+               variants=(form.run(),))

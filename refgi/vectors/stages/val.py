@@ -14,15 +14,16 @@ from refgi.cluster.lighting.interleave import (
     subsets,
 )
 from refgi.cluster.settings import BackProjection, BoxBlur, Csm, GeometryBlur, Hard, Pcf, Pcss, ValSettings
+from refgi.literal import val_areas as literal
+from refgi.literal import val_filters
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.scene import Scene
-from refgi.settings import replaced
-from refgi.vectors.bugs.val_sum import sum_bugs
-from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.facing import add_facing
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
-from refgi.vectors.stages.pairs import EQ2, RECEIVERS
+from refgi.vectors.stages.pairs import EQ2, LOBES, READS, RECEIVERS
 from refgi.vectors.stages.val_areas import add_areas
 from refgi.vectors.stages.val_basis import add_basis
 from refgi.vectors.stages.val_clusters import add_extents, add_kmeans, clusters_of, extent_of
@@ -77,21 +78,17 @@ def add_lighting(recipe: Recipe, settings: ValSettings) -> None:
         _add_subsets(recipe, settings, block)
     _add_parts(recipe, settings, block)
 
-    def run(arrays: Arrays, real: Any, shadowed: bool = True) -> Arrays:
+    def run(arrays: Arrays, real: Any) -> Arrays:
         made = np.zeros(arrays["parts.irradiance"].shape[1:], real)
         for part, share in zip(arrays["parts.irradiance"], arrays["visibility.share"], strict=True):
-            made += part * (share if shadowed else 1)
+            made += part * share
         return {"sum.irradiance": made}
 
+    form = Form(literal.shadowed, {"irradiance": "parts.irradiance", "share": "visibility.share"}, ("sum.irradiance",))
     recipe.add("sum", "E = sum V_m E_m over all area lights", run, ("parts.irradiance", "visibility.share"),
                {"sum.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance" + (
-                   ", not blurred" if block > 1 else ""), "linear RGB")}, paper="VAL Sec. 4", bugs=(
-                   Bug("nothing is shadowed", lambda a, r: run(a, r, shadowed=False), "VAL Sec. 4"),
-                   Bug("V of another area light", reading(run, visibility__share=lambda a: np.roll(a, 1, 0)), ""),
-                   Bug("shadows are squared", reading(run, visibility__share=np.square), ""),
-                   Bug("the mean over area lights", lambda a, r: run(
-                       {**a, "visibility.share": a["visibility.share"] / len(a["visibility.share"])}, r), "a sum"),
-                   *sum_bugs()))
+                   ", not blurred" if block > 1 else ""), "linear RGB")}, paper="VAL Sec. 4",
+               bugs=form.bugs("shadowed"), variants=(form.run(),))
     if block > 1 and settings.blur is not None:
         _add_blur(recipe, settings.blur, block)
 
@@ -99,20 +96,17 @@ def add_lighting(recipe: Recipe, settings: ValSettings) -> None:
 def _add_subsets(recipe: Recipe, settings: ValSettings, block: int) -> None:
     kind = settings.interleaving.assignment
 
-    def run(arrays: Arrays, real: Any, how: Any = kind, side: int = block) -> Arrays:  # noqa: ARG001
-        return {"interleaving.subset": assigned_subsets(np.asarray(arrays["clusters.of"]), side, how)}
+    def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
+        return {"interleaving.subset": assigned_subsets(np.asarray(arrays["clusters.of"]), block, kind)}
 
-    other = "cluster" if kind == "index" else "index"
+    form = Form(literal.interleaving, {"of": "clusters.of"}, ("interleaving.subset",),
+                {"side": block, "assignment": kind})
     recipe.facts["interleaving"] = {"n": block, "assignment": kind,
                                     "subset of a pixel": "(row mod n) n + column mod n"}
     recipe.add("interleaving", "which of n^2 subsets each light belongs to", run, ("clusters.of",),
                {"interleaving.subset": Spec("light", "1", "0 to n^2 - 1", tier="T0")},
-               paper="VAL Sec. 6, E-VAL-13", bugs=(
-                   Bug(f"lights are dealt out by {other}", lambda a, r: run(a, r, other), f"by {kind}"),
-                   Bug("n subsets, not n^2", writing(run, interleaving__subset=lambda a: a % block), "n x n pixels"),
-                   Bug("subsets count from 1", writing(run, interleaving__subset=lambda a: (a + 1) % block**2), "0"),
-                   Bug("rows and columns of the block are exchanged", writing(
-                       run, interleaving__subset=lambda a: a % block * block + a // block), "row n + column")))
+               paper="VAL Sec. 6, E-VAL-13", bugs=form.bugs("interleaving", f"interleaving/{kind}"),
+               variants=(form.run(),))
 
 
 def _add_parts(recipe: Recipe, settings: ValSettings, block: int) -> None:
@@ -121,7 +115,7 @@ def _add_parts(recipe: Recipe, settings: ValSettings, block: int) -> None:
     area = ("lights.area",) if pairs.needs_footprints else ()
     own = ("interleaving.subset",) if block > 1 else ()
 
-    def run(arrays: Arrays, real: Any, factor: float = block**2) -> Arrays:
+    def run(arrays: Arrays, real: Any) -> Arrays:
         receivers = _receivers(arrays, real)
         packed = checked(receivers, pixel_lights_of(arrays, real), pairs,
                          np.ascontiguousarray(arrays["lights.area"], real) if area else None)
@@ -135,28 +129,21 @@ def _add_parts(recipe: Recipe, settings: ValSettings, block: int) -> None:
         for m in range(count):
             sums = np.zeros_like(position)
             add_members(position, normal, parts, members, m, sums)
-            scatter_pixels(sums, parts, real(factor), made[m].reshape(3, -1))
+            scatter_pixels(sums, parts, real(block**2), made[m].reshape(3, -1))
         return {"parts.irradiance": made}
 
-    interleaved = (
-        Bug("the factor n^2 is missing", lambda a, r: run(a, r, 1), "E-VAL-13"),
-        Bug("the factor is n", lambda a, r: run(a, r, block), "E-VAL-13"),
-        Bug("pixels count rows and columns the other way round", reading(
-            run, interleaving__subset=lambda a: a % block * block + a // block), "(row mod n) n + column mod n"),
-    ) if own else ()
+    form = Form(literal.parts, {
+        **READS, "triangle_id": RECEIVERS[2], "of": "clusters.of", "center": "clusters.center",
+        **(LOBES if "lights.lobe_flux" in lights else {}), **({"area": "lights.area"} if area else {}),
+        **({"subset": own[0]} if own else {})}, ("parts.irradiance",), {"side": block})
     recipe.facts["pairs.clamp"] = "none" if pairs.clamp is None else pairs.clamp.name()
     recipe.add("parts", "light of each area light's members, without visibility" + (
         ": n^2 times those of the pixel's subset" if own else ""), run,
         (*RECEIVERS, *lights, "clusters.of", "clusters.center", *own, *area),
         {"parts.irradiance": Spec("area light, rgb, row, column", "W/m^2", "irradiance of the cluster's lights",
                                   "linear RGB", EQ2)},
-        paper="VAL Sec. 4, E-VAL-01, E-VAL-13", exact=("gbuffer.position", "lights.position"), bugs=(
-            *interleaved,
-            Bug("Phi in place of Phi / pi", writing(run, parts__irradiance=lambda a: a * np.pi), "E-VAL-01"),
-            Bug("every light has its cluster's normal", _with_one_normal(run), "VAL Sec. 4: V alone is shared"),
-            Bug("clusters are shifted by one", reading(
-                run, clusters__of=lambda a: (a + 1) % (int(a.max()) + 1)), "C(i)"),
-            Bug("the receiver's normal points inwards", reading(run, gbuffer__normal=lambda a: -a), EQ2)))
+        paper="VAL Sec. 4, E-VAL-01, E-VAL-13", exact=("gbuffer.position", "lights.position"),
+        bugs=form.bugs("parts", *(("parts/interleaved",) if own else ())), variants=(form.run(),))
 
 
 def _receivers(arrays: Arrays, real: Any) -> Receivers:
@@ -164,60 +151,24 @@ def _receivers(arrays: Arrays, real: Any) -> Receivers:
     return Receivers(position, normal, np.ascontiguousarray(np.asarray(arrays[RECEIVERS[2]]) >= 0))
 
 
-def _with_one_normal(run: Run) -> Run:
-    """Return a stage whose lights face where the first light of their cluster does."""
-    def altered(arrays: Arrays, real: Any) -> Arrays:
-        of = np.asarray(arrays["clusters.of"])
-        first = np.array([int(np.flatnonzero(of == k)[0]) for k in of])
-        return run({**arrays, "lights.normal": arrays["lights.normal"][:, first]}, real)
-
-    return altered
-
-
 def _add_blur(recipe: Recipe, settings: BoxBlur | GeometryBlur, block: int) -> None:
     reads = ("sum.irradiance", *RECEIVERS, "extents.visible")
+    how = {"extent": settings.extent, "cosine": settings.cosine, "every_subset": settings.every_subset} if isinstance(
+        settings, GeometryBlur) else {}
+    form = Form(val_filters.blur, {
+        "irradiance": reads[0], "position": RECEIVERS[0], "normal": RECEIVERS[1], "triangle_id": RECEIVERS[2],
+        "box": reads[-1]}, ("blur.irradiance",), {"size": block, **(how or {
+            "extent": np.inf, "cosine": -np.inf, "every_subset": False})})
 
-    def run(arrays: Arrays, real: Any, how: Any = settings, size: int = block) -> Arrays:
+    def run(arrays: Arrays, real: Any) -> Arrays:
         light, diagonal = np.ascontiguousarray(arrays["sum.irradiance"], real), extent_of(arrays, "visible").diagonal
-        return {"blur.irradiance": blur(light, _receivers(arrays, real), size, how, diagonal)}
+        return {"blur.irradiance": blur(light, _receivers(arrays, real), block, settings, diagonal)}
 
-    def turned(arrays: Arrays, real: Any) -> dict[str, Array]:
-        there = {name: arrays[name][..., ::-1, ::-1] for name in reads[:-1]}
-        return {"blur.irradiance": run({**arrays, **there}, real)["blur.irradiance"][..., ::-1, ::-1]}
-
-    def other(**how: Any) -> Any:
-        return lambda arrays, real: run(arrays, real, replaced(settings, how))
-
-    geometry = (
-        Bug("pixels of other surfaces count", lambda a, r: run(a, r, BoxBlur()), BLUR),
-        Bug("normals are not compared", other(cosine=-1.0), BLUR),
-        Bug("distances are not compared", other(extent=10.0), BLUR),
-        Bug("the least cosine is 0.5", other(cosine=0.5), BLUR),
-        Bug("the extent counts across, not around", other(extent=settings.extent / 2), BLUR),
-        Bug("subsets that an edge cuts off are " + ("left out" if settings.every_subset else "replaced"),
-            other(every_subset=not settings.every_subset), BLUR),
-    ) if isinstance(settings, GeometryBlur) else ()
     recipe.facts["blur"] = {"n": block, "window": "x - n // 2 on, moved inwards at the rim"} | (
         {"extent, of the visible box's diagonal": settings.extent, "least cosine": settings.cosine,
          "every subset": settings.every_subset} if isinstance(settings, GeometryBlur) else {})
     recipe.add("blur", "mean over n x n pixels of the same surface, each subset once", run, reads,
                {"blur.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB")},
-               paper=BLUR, exact=("gbuffer.position", "gbuffer.normal"), bugs=(
-                   *geometry,
-                   Bug("nothing is blurred", lambda a, r: {"blur.irradiance": a["sum.irradiance"]}, BLUR),  # noqa: ARG005
-                   Bug("the window is a pixel wider", lambda a, r: run(a, r, size=block + 1), BLUR),
-                   *((Bug("the window starts at x - (n - 1) // 2", turned, BLUR),) if block % 2 == 0 else ()),
-                   Bug("edges of the picture repeat in place of a moved window", _clamped(run, block), BLUR)))
-
-
-def _clamped(run: Any, block: int) -> Any:
-    """Return a blur of a picture with its rim repeated, cut back to its size."""
-    def altered(arrays: Arrays, real: Any) -> Arrays:
-        wide: dict[str, Array] = {}
-        for name in ("sum.irradiance", *RECEIVERS):
-            before = [(0, 0)] * (arrays[name].ndim - 2)
-            wide[name] = np.pad(arrays[name], [*before, (block, block), (block, block)], mode="edge")
-        inner = slice(block, -block)
-        return {"blur.irradiance": run({**arrays, **wide}, real)["blur.irradiance"][:, inner, inner]}
-
-    return altered
+               paper=BLUR, exact=("gbuffer.position", "gbuffer.normal"), variants=(form.run(),),
+               bugs=form.bugs(*(("blur/geometry", f"blur/every subset {how['every_subset']}") if how else ()), "blur",
+                              *(("blur/even",) if block % 2 == 0 else ())))

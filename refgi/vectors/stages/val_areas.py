@@ -7,10 +7,11 @@ import numpy as np
 from refgi.cluster.clustering.kmeans import Clustering
 from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.settings import AreaLightSettings
+from refgi.literal import val_areas as literal
 from refgi.pairs.pixel_lights import PixelLights
-from refgi.settings import replaced
-from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Arrays, Bug, Spec
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import Arrays, Spec
 from refgi.vectors.stages.buffers import VECTOR
 from refgi.vectors.stages.val_clusters import LIGHTS
 
@@ -19,10 +20,16 @@ AREA = ("frame", "axes", "side", "offset", "delta", "radius", "members")
 
 def add_areas(recipe: Recipe, settings: AreaLightSettings) -> None:
     """Add the rectangle of each cluster."""
-    def run(arrays: Arrays, real: Any, **how: Any) -> Arrays:  # noqa: ARG001
-        made = _areas(arrays, replaced(settings, how))
+    def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
+        made = _areas(arrays, settings)
         return {f"areas.{key}": getattr(made, key) for key in AREA}
 
+    reads = {"position": LIGHTS[0], "center": "clusters.center", "normal": "clusters.normal", "of": "clusters.of"}
+    form = Form(literal.areas, reads, tuple(f"areas.{key}" for key in AREA),
+                {"axes": settings.axes, "extent": settings.extent, "unbiased": settings.unbiased_area})
+    lists = ("areas/root" if settings.extent == "root" else "areas/not root",
+             "areas/fixed" if settings.axes == "fixed" else "areas/not fixed",
+             "areas/unbiased" if settings.unbiased_area else "areas/biased")
     recipe.facts["areas"] = {"axes": settings.axes, "extent": settings.extent, "up": [0, 1, 0],
                              "up where |y| of the normal >= 0.999": [0, 0, -1], "flat below, of the radius": 1e-5}
     recipe.add("areas", "bounding rectangle of each cluster's lights in its plane", run,
@@ -36,23 +43,7 @@ def add_areas(recipe: Recipe, settings: AreaLightSettings) -> None:
                    "areas.radius": Spec("cluster", "m", "from the centre to its farthest light"),
                    "areas.members": Spec("cluster", "1", "how many lights it has", tier="T0")},
                paper="VAL Sec. 6, E-VAL-10", exact=(LIGHTS[0], "clusters.center"),
-               bugs=_area_bugs(run, settings))
-
-
-def _area_bugs(run: Any, settings: AreaLightSettings) -> tuple[Bug, ...]:
-    other = "longer" if settings.extent == "root" else "root"
-    turned = "min_area" if settings.axes == "fixed" else "fixed"
-    return (
-        Bug(f"Delta is another size of the rectangle: {other}", lambda a, r: run(a, r, extent=other), "E-VAL-10"),
-        Bug(f"the axes are others: {turned}", lambda a, r: run(a, r, axes=turned), "E-VAL-10"),
-        Bug("the area is " + ("not " if settings.unbiased_area else "") + "corrected for the sample",
-            lambda a, r: run(a, r, unbiased_area=not settings.unbiased_area), "E-VAL-10"),
-        Bug("Delta is half of the size", writing(run, areas__delta=lambda a: a / 2), "sides, not half sides"),
-        Bug("the rectangle lies around the centre", writing(run, areas__offset=np.zeros_like), "VAL Sec. 6"),
-        Bug("the map's second axis is up", writing(run, areas__frame=lambda a: a * ((1,), (-1,), (1,))),
-            "rows run downwards"),
-        Bug("frames are transposed", writing(run, areas__frame=lambda a: a.transpose(0, 2, 1)), "rows are the axes"),
-        Bug("the map looks into the surface", reading(run, clusters__normal=lambda a: -a), "along the normal"))
+               bugs=form.bugs("areas", *lists), variants=(form.run(),))
 
 
 def _areas(arrays: Arrays, settings: AreaLightSettings) -> AreaLights:

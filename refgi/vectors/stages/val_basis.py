@@ -3,8 +3,6 @@
 A texel's channels are sin(c_k t) for all k, cos(c_k t), t sin(c_k t), t cos(c_k t), then t, its depth.
 """
 
-from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,12 +14,11 @@ from refgi.cluster.filters.mip_build import halve
 from refgi.cluster.filters.prefilter import LEVEL_SHIFT
 from refgi.cluster.filters.pyramid import Mip, level_offsets, mip_of, mips
 from refgi.cluster.settings import Csm
-from refgi.cluster.visibility.series import frequencies
-from refgi.vectors.bugs.val_bytes import in_bytes, rounding_bugs
-from refgi.vectors.bugs.val_depth import basis_bugs, basis_by, depth_bugs
-from refgi.vectors.bugs.val_mip import levels_by, mean_of_four, mip_bugs
-from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.literal import val_filters
+from refgi.literal import val_maps as literal
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.val_maps import SHEET
 from refgi.vectors.stages.val_series import SCALE, add_scale, add_series, scale_at
 
@@ -41,33 +38,26 @@ def add_basis(recipe: Recipe, csm: Csm) -> None:
 def _add_series_depths(recipe: Recipe, csm: Csm) -> None:
     mirrored = csm.prefilter == "mip"
 
-    def run(arrays: Arrays, real: Any, mirror: bool = mirrored) -> Arrays:
+    def run(arrays: Arrays, real: Any) -> Arrays:
         depth = np.ascontiguousarray(arrays["maps.depth"], real)
         made = np.zeros_like(depth)
         for k in np.flatnonzero(arrays["scale.slope"] > 0):
             normalise(depth[k], scale_at(arrays, csm, int(k)), made[k])
-            fill_beyond(beyond_disc(depth.shape[1], mirror), made[k])
+            fill_beyond(beyond_disc(depth.shape[1], mirrored), made[k])
         return {"maps.t": made}
 
-    def natural(arrays: Arrays, real: Any) -> Arrays:
-        return run({**arrays, "scale.slope": arrays["scale.slope"] * np.log(2)}, real)
-
+    logs = csm.depth_scale == "log_map"
+    form = Form(literal.map_depths, {"depth": "maps.depth", "origin": SCALE[0], "slope": SCALE[1], "end": SCALE[2]},
+                ("maps.t",), {"logarithmic": logs, "mirrored": mirrored})
+    lists = ("map_depths/log_map" if logs else "map_depths/linear", *(("map_depths/mirrored",) if mirrored else ()))
     recipe.add("maps.t", "depths of the series: log2(z / origin) slope, 0 to the range" + (
         "; beyond the disc the texel at (s, t) / (s^2 + t^2)" if mirrored else ""), run, ("maps.depth", *SCALE),
         {"maps.t": Spec(SHEET, "1", "depth; the range where nothing is; 0 on empty maps", paper="E-VAL-05")},
-        paper="E-VAL-05", exact=("maps.depth",), bugs=(
-            Bug("the natural logarithm, ln for log2", natural, "log2"),
-            Bug("the range is twice as far: empty texels lie beyond it", reading(run, series__range=lambda a: a * 2),
-                "E-VAL-05"),
-            *((Bug("texels beyond the disc are not mirrored: the square's corners hold nothing",
-                   lambda a, r: run(a, r, mirror=False),
-                   "docs/methods/val_visibility"),) if mirrored else ()),
-            *depth_bugs(csm)))
+        paper="E-VAL-05", exact=("maps.depth",), bugs=form.bugs("map_depths", *lists), variants=(form.run(),))
 
 
 def _add_level_0(recipe: Recipe, csm: Csm) -> None:
     quantised = csm.quantisation == "published"
-    kept = stored_by(csm)
 
     def run(arrays: Arrays, real: Any) -> Arrays:
         t = np.ascontiguousarray(arrays["maps.t"], real)
@@ -78,51 +68,15 @@ def _add_level_0(recipe: Recipe, csm: Csm) -> None:
             made[k] = np.moveaxis(np.concatenate(parts, axis=2), 2, 0)
         return {"basis.0": made}
 
-    def literal(c: Array, weigh: bool = True) -> Any:
-        def altered(arrays: Arrays, real: Any) -> Arrays:
-            t = np.asarray(arrays["maps.t"], real)
-            sine, cosine = (np.moveaxis(of(np.multiply.outer(t, c.astype(real))), 3, 1) for of in (np.sin, np.cos))
-            by = t[:, None] if weigh else 1
-            made = np.concatenate([sine, cosine, by * sine, by * cosine, t[:, None]], axis=1)
-            made[~np.asarray(t.any(axis=(1, 2)))] = 0
-            return {"basis.0": kept(made)}
-
-        return altered
-
-    k, right = np.arange(1, csm.terms + 1), frequencies(csm.terms)
-    bugs = (
-        Bug("c_k = k pi", literal(k * np.pi), "c_k = (2k - 1) pi"),
-        Bug("even multiples of pi: c_k = 2 k pi", literal(2 * k * np.pi), "c_k = (2k - 1) pi"),
-        Bug("c_k = (2k + 1) pi", literal(right + 2 * np.pi), "k from 1 on"),
-        Bug("sines and cosines of the second half are not weighed by the depth", literal(right, weigh=False),
-            "E-VAL-02"),
-        Bug("sines and cosines are exchanged, also those times the depth",
-            writing(run, basis__0=_exchanged), "E-VAL-02"),
-        Bug("sines and cosines alternate (interleaved), also those times the depth",
-            writing(run, basis__0=_in_turns), "order of channels"),
-        Bug("the mean depth itself is left out",
-            writing(run, basis__0=lambda a: np.concatenate([a[:, :-1], 0 * a[:, -1:]], axis=1)), "E-VAL-02: Z"),
-        *basis_bugs(run, csm.terms))
+    form = Form(literal.basis, {"t": "maps.t"}, ("basis.0",), {"terms": csm.terms, "in_bytes": quantised})
     if quantised:
-        bugs = (*(Bug(one.cause, writing(one.run, basis__0=kept), one.paper) for one in bugs),
-                *rounding_bugs(basis_by(lambda k: (2 * k - 1) * np.pi, csm.terms), "basis.0", csm.terms))
         recipe.facts["basis.stored"] = {"sines and cosines": "8 bits: floor((x + 1) 127.5 + 0.5001) / 127.5 - 1",
                                         "times the depth, and the depth": "half floats"}
     recipe.add("basis", "sines and cosines of each texel's depth, and the same times the depth" + (
         ", in 8 and 16 bits" if quantised else ""), run, ("maps.t",), {
         "basis.0": Spec(CHANNELS, "1", "S_1.., C_1.., t S_1.., t C_1.., t; 0 on empty maps", paper="E-VAL-02")},
-        paper="VAL Sec. 4.1, E-VAL-02" + (", 6" if quantised else ""), exact=("maps.t",), variants=(literal(right),),
-        bugs=bugs)
-
-
-def _exchanged(basis: Array) -> Array:
-    m = basis.shape[1] // 4
-    return basis[:, [*range(m, 2 * m), *range(m), *range(3 * m, 4 * m), *range(2 * m, 3 * m), 4 * m]]
-
-
-def _in_turns(basis: Array) -> Array:
-    m = basis.shape[1] // 4
-    return basis[:, [j + half for half in (0, 2 * m) for k in range(m) for j in (k, m + k)] + [4 * m]]
+        paper="VAL Sec. 4.1, E-VAL-02" + (", 6" if quantised else ""), exact=("maps.t",), variants=(form.run(),),
+        bugs=form.bugs("basis", *(("basis/bytes",) if quantised else ())))
 
 
 def level_names(recipe: Recipe) -> tuple[str, ...]:
@@ -130,13 +84,8 @@ def level_names(recipe: Recipe) -> tuple[str, ...]:
     return tuple(name for name in recipe.specs if name.startswith("basis."))
 
 
-def stored_by(csm: Csm) -> Callable[[Array], Array]:
-    """Return how a basis is kept: as it is, or in 8 and 16 bits."""
-    return partial(in_bytes, terms=csm.terms) if csm.quantisation == "published" else np.asarray
-
-
 def _add_levels(recipe: Recipe, csm: Csm) -> None:
-    terms, kept = csm.terms, stored_by(csm)
+    terms, quantised = csm.terms, csm.quantisation == "published"
     side = recipe.facts["maps"]["texels a side"]
     sides = [side]
     while sides[-1] > 1:
@@ -146,45 +95,17 @@ def _add_levels(recipe: Recipe, csm: Csm) -> None:
     def run(arrays: Arrays, real: Any) -> Arrays:
         level, made = np.ascontiguousarray(arrays["basis.0"], real), {}
         for name in names:
-            level = made[name] = kept(_halved(level, terms))
+            level = _halved(level, terms)
+            level = made[name] = literal.rounded_level(level) if quantised else level
         return made
 
-    def chained(half: Any) -> Any:
-        def altered(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
-            level, made = arrays["basis.0"], {}
-            for name in names:
-                level = made[name] = kept(half(level))
-            return made
-
-        return altered
-
+    form = Form(val_filters.mip_levels, {"basis": "basis.0"}, tuple(names), {"in_bytes": quantised})
     recipe.facts["basis.sides"] = sides
     recipe.add("mip", "each level halves the one before by means of 2 x 2 texels; of an odd side the last counts twice",
                run, ("basis.0",), {name: Spec(CHANNELS, "1", f"means over {2**level} x {2**level} texels")
                                    for level, name in enumerate(names, 1)},
-               paper="VAL Sec. 6", bugs=(
-                   Bug("one texel of four", chained(lambda a: a[:, :, ::2, ::2]), "means"),
-                   Bug("sums of four texels", chained(lambda a: 4 * _mean_of_four(a, "edge")), "means"),
-                   Bug("beyond an odd side is 0", chained(lambda a: _mean_of_four(a, "constant")), "docs/methods"),
-                   Bug("columns are halved alone, then rows shifted", chained(
-                       lambda a: _mean_of_four(np.roll(a, -1, axis=2), "edge")), "texels 2 i and 2 i + 1"),
-                   Bug("the depth is that of the nearest texel, not the mean",
-                       chained(lambda a: np.concatenate([_mean_of_four(a, "edge")[:, :-1], _least_of_four(a)], 1)),
-                       "E-VAL-02: Z = w * z"),
-                   *mip_bugs(names, kept), *(_unrounded(names, terms) if csm.quantisation == "published" else ())))
-
-
-def _unrounded(names: list[str], terms: int) -> tuple[Bug, ...]:
-    """Return likely bugs of levels in 8 and 16 bits."""
-    def once(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 levels of means that are rounded last
-        level, made = arrays["basis.0"], {}
-        for name in names:
-            level = _mean_of_four(level, "edge")
-            made[name] = in_bytes(level, terms)
-        return made
-
-    return (Bug("levels are not rounded to 8 and 16 bits", levels_by(names, mean_of_four), "VAL Sec. 6"),
-            Bug("levels are made of unrounded ones and rounded when they are stored", once, "of the level before"))
+               paper="VAL Sec. 6", variants=(form.run(),),
+               bugs=form.bugs("mip_levels", *(("mip_levels/bytes",) if quantised else ())))
 
 
 def _halved(level: Array, terms: int) -> Array:
@@ -204,21 +125,6 @@ def _halved(level: Array, terms: int) -> Array:
         channels = np.concatenate([*(part[new, : 2 * terms] for part in parts), depth[new, None]], axis=1)
         made[k] = channels.T.reshape(-1, half, half)
     return made
-
-
-def _padded(level: Array, mode: Any) -> Array:
-    odd = level.shape[2] % 2
-    return np.pad(level, ((0, 0), (0, 0), (0, odd), (0, odd)), mode=mode)
-
-
-def _mean_of_four(level: Array, mode: str) -> Array:
-    a = _padded(level, mode)
-    return np.asarray(a[:, :, ::2, ::2] + a[:, :, ::2, 1::2] + a[:, :, 1::2, ::2] + a[:, :, 1::2, 1::2]) / 4
-
-
-def _least_of_four(level: Array) -> Array:
-    a = _padded(level[:, -1:], "edge")
-    return np.asarray(a.reshape(*a.shape[:2], a.shape[2] // 2, 2, -1, 2).min(axis=(3, 5)))
 
 
 def filters_of(arrays: Arrays, csm: Csm, k: int, real: Any, boxes: bool) -> Any:

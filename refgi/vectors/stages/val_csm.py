@@ -9,16 +9,18 @@ from refgi.cluster.settings import Csm, ValSettings
 from refgi.cluster.visibility.csm import compare_filtered, find_penumbra
 from refgi.cluster.visibility.search_region import BIAS, CONSTANTS, GAIN, ON_SERIES, SCRATCH_ROWS, filter_sizing
 from refgi.cluster.visibility.series import Series, series
-from refgi.vectors.bugs.val import compared_bugs, means_bugs, size_bugs
-from refgi.vectors.bugs.val_lookup import lookup_bugs
-from refgi.vectors.bugs.val_series import series_search_bugs, verdict_bugs
+from refgi.literal import val_filters
+from refgi.literal import val_series as literal
 from refgi.vectors.recipe import Recipe
+from refgi.vectors.rows import Form
 from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.val_basis import filters_of, level_names
 from refgi.vectors.stages.val_search import (
     LIGHT,
     PIXELS,
     PLACE,
+    PLACES,
+    SIZES,
     by_default,
     lanes,
     penumbra_planes,
@@ -26,6 +28,7 @@ from refgi.vectors.stages.val_search import (
     put_penumbra,
     searched,
     share_spec,
+    sizing,
 )
 from refgi.vectors.stages.val_series import SCALE, scale_at
 
@@ -34,17 +37,25 @@ def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
     """Add V by the series."""
     _add_means(recipe, settings, csm, "search", "search.pending", 4 * csm.terms + 1)
 
-    def penumbra(arrays: Arrays, real: Any, how: ValSettings = settings) -> Arrays:
+    exact = ("cone",) if by_default(settings) else ()
+    series_of = {"weight": "series.weight", "bias": "series.bias"}
+    form = Form(literal.csm_penumbra, {
+        **PLACES, **SIZES, **series_of, "origin": "scale.origin", "slope": "scale.slope", "end": "series.range",
+        "pending": "search.pending", "means": "search.means"},
+        ("penumbra.shaded", "penumbra.z_avg", "penumbra.region", "penumbra.t"),
+        {"logarithmic": csm.depth_scale == "log_map", **sizing(settings)})
+
+    def penumbra(arrays: Arrays, real: Any) -> Arrays:
         out, weight, chain = penumbra_planes(arrays, real), *_chain(arrays, csm, real)
         out.new("penumbra.t")
         for lane in lanes(arrays, real, 4 * csm.terms + 1, chain):
-            searched(lane, how)
+            searched(lane, settings)
             flags, rows = lane.scratch.pending, lane.scratch.rows
             flags[:] = np.asarray(arrays["search.pending"])[lane.k].reshape(-1)
             means = np.ascontiguousarray(arrays["search.means"][lane.k], real).reshape(4 * csm.terms + 1, -1)
             asked = flags.copy()
-            find_penumbra(lane.constants, filter_sizing(how), scale_at(arrays, csm, lane.k), weight, means, len(flags),
-                          flags, rows)
+            find_penumbra(lane.constants, filter_sizing(settings), scale_at(arrays, csm, lane.k), weight, means,
+                          len(flags), flags, rows)
             put_penumbra(out, lane)
             out.put("penumbra.t", lane.k, rows[ON_SERIES], asked)
         return out.made
@@ -53,9 +64,13 @@ def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
                (*PIXELS, *LIGHT, *SCALE, "series.weight", "series.bias", "search.pending", "search.means"),
                {**penumbra_specs(), "penumbra.t": Spec(PLACE, "1", "depth of the pixel on the series' scale")},
                paper="VAL Sec. 4.1, E-VAL-02, 04, 07", exact=("maps.center",),
-               bugs=(*size_bugs(penumbra, settings), *(series_search_bugs(csm) if by_default(settings) else ())))
+               variants=(form.run(),), bugs=(*form.bugs("penumbra", "region", *exact, of="val_visibility"),
+                                             *form.bugs(*(("csm_penumbra", "shade") if exact else ()))))
     _add_means(recipe, settings, csm, "penumbra", "penumbra.shaded", 2 * csm.terms)
     hard = ("hard.share",) if "hard.share" in recipe.specs else ()
+    final = Form(literal.csm, {"shaded": "penumbra.shaded", "t": "penumbra.t", "means": "penumbra.means", **series_of,
+                               **({"hard": "hard.share"} if hard else {})}, ("visibility.share",),
+                 {"gain": series(csm).gain})
 
     def share(arrays: Arrays, real: Any) -> Arrays:
         made = np.array(arrays["hard.share"], real) if hard else np.ones(arrays["penumbra.shaded"].shape, real)
@@ -72,34 +87,37 @@ def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
 
     recipe.add("visibility", "V = gain (1/2 + sum w_k (cos(c_k d') S_k - sin(c_k d') C_k)), where shaded", share,
                ("penumbra.shaded", "penumbra.t", "penumbra.means", "series.weight", "series.bias", *hard),
-               {"visibility.share": share_spec()}, paper="VAL Sec. 4.1, E-VAL-02",
-               bugs=(*compared_bugs(share), *verdict_bugs(series(csm).gain, bool(hard))))
+               {"visibility.share": share_spec()}, paper="VAL Sec. 4.1, E-VAL-02", variants=(final.run(),),
+               bugs=final.bugs("csm", "shade", *(("csm/hard",) if hard else ())))
 
 
 def _add_means(recipe: Recipe, settings: ValSettings, csm: Csm, name: str, flag: str, channels: int) -> None:
     levels = level_names(recipe) + (("maps.t",) if csm.quantisation == "published" else ())
-    boxes = "val_alpha_over_pi" in settings.as_published
+    boxes, by_mips = "val_alpha_over_pi" in settings.as_published, csm.prefilter == "mip"
+    basis = {f"level_{one[6:]}" if by_mips else "basis": one for one in level_names(recipe)}
+    mean = val_filters.mip_means if by_mips else val_filters.box_means if boxes else val_filters.disc_means
+    form = Form(mean, {"pending": flag, "region": f"{name}.region", **basis}, (f"{name}.means",),
+                {"terms": csm.terms, "weighed": channels > 2 * csm.terms})
 
-    def run(arrays: Arrays, real: Any, kind: Csm = csm) -> Arrays:
+    def run(arrays: Arrays, real: Any) -> Arrays:
         region, flags = np.asarray(arrays[f"{name}.region"], real), np.asarray(arrays[flag])
         made = np.zeros((len(flags), channels, *flags.shape[1:]), real)
         for k in np.flatnonzero(flags.any(axis=(1, 2))):
-            filters = filters_of(arrays, kind, int(k), real, boxes)
+            filters = filters_of(arrays, csm, int(k), real, boxes)
             s, t, radius = (np.ascontiguousarray(one).reshape(-1) for one in region[k])
             asked = flags[k].reshape(-1)
-            means = np.zeros((4 * kind.terms + 1, len(asked)), real)
-            filter_means(filters, s, t, radius, asked, len(asked), channels > 2 * kind.terms, means)
+            means = np.zeros((4 * csm.terms + 1, len(asked)), real)
+            filter_means(filters, s, t, radius, asked, len(asked), channels > 2 * csm.terms, means)
             made[k].reshape(channels, -1)[:, asked] = means[:channels, asked]
         return {f"{name}.means": made}
 
-    read = "8 texels of two levels" if csm.prefilter == "mip" else "all texels"
-    recipe.facts["mip"] = {"level": "max(0, log2(radius * texels a side) - 1)" if csm.prefilter == "mip" else "none"}
+    read = "8 texels of two levels" if by_mips else "all texels"
+    recipe.facts["mip"] = {"level": "max(0, log2(radius * texels a side) - 1)" if by_mips else "none"}
     recipe.add(f"{name}.means", f"means of the channels over the disc, by {read}", run,
                (flag, f"{name}.region", *levels),
                {f"{name}.means": Spec("area light, channel, row, column", "1",
                                       "means of the channels of basis.0 over the disc; 0 where none is asked for")},
-               paper="VAL Sec. 6",
-               bugs=(*means_bugs(run, name, csm), *(lookup_bugs(name, flag) if csm.prefilter == "mip" else ())))
+               paper="VAL Sec. 6", variants=(form.run(),), bugs=form.bugs("means", mean.__name__))
 
 
 def _chain(arrays: Arrays, csm: Csm, real: Any) -> tuple[Array, Series]:

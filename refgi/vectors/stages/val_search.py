@@ -21,9 +21,9 @@ from refgi.cluster.visibility.search_region import (
     light_constants,
 )
 from refgi.cluster.visibility.series import Series
-from refgi.vectors.bugs.val import search_bugs
-from refgi.vectors.bugs.val_cone import search_disc_bugs
+from refgi.literal import val_visibility as literal
 from refgi.vectors.recipe import Recipe
+from refgi.vectors.rows import Form
 from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.val_maps import VIEW, shadow_maps_of
 
@@ -31,6 +31,8 @@ PIXELS = ("gbuffer.position", "gbuffer.triangle_id")
 PLACE = "area light, row, column"
 REGION = Spec("area light, (s, t, radius), row, column", "1", "disc of the map, [-1, 1] units; 0 where none")
 LIGHT = (*VIEW, "areas.delta", "maps.near")
+PLACES = {"position": "gbuffer.position", "center": "maps.center", "frame": "areas.frame"}  # literal: pixels and maps
+SIZES = {"delta": "areas.delta", "near": "maps.near"}
 
 
 class Lane(NamedTuple):
@@ -80,6 +82,12 @@ class Planes:
         here[..., flags] = values[..., flags]
 
 
+def sizing(settings: ValSettings) -> dict[str, bool]:
+    """Return by which printed forms the literal penumbra is sized."""
+    return {"alpha": "val_alpha" in settings.as_published, "squares": "val_alpha_over_pi" in settings.as_published,
+            "foreshortened": settings.area.foreshortened}
+
+
 def by_default(settings: ValSettings) -> bool:
     """Tell whether discs are found as errata say: by no printed form, nor by the light's foreshortened size."""
     return not settings.as_published and not settings.area.foreshortened
@@ -116,13 +124,18 @@ def put_penumbra(out: Planes, lane: Lane) -> None:
 
 def add_search(recipe: Recipe, settings: ValSettings) -> None:
     """Add the disc in which each pixel searches for blockers."""
-    def run(arrays: Arrays, real: Any, how: ValSettings = settings) -> Arrays:
+    printed = {"solid_angle": "val_search_solid_angle" in settings.as_published,
+               "squares": "val_alpha_over_pi" in settings.as_published, "foreshortened": settings.area.foreshortened}
+    form = Form(literal.search, {**PLACES, **SIZES, "triangle_id": "gbuffer.triangle_id"},
+                ("search.pending", "search.region", "search.distance"), printed)
+
+    def run(arrays: Arrays, real: Any) -> Arrays:
         out = Planes(arrays, real)
         out.new("search.pending", kind=np.bool_)
         out.new("search.region", 3)
         out.new("search.distance")
         for lane in lanes(arrays, real):
-            searched(lane, how)
+            searched(lane, settings)
             flags, rows = lane.scratch.pending, lane.scratch.rows
             out.put("search.pending", lane.k, flags, flags)
             out.put("search.region", lane.k, rows[S : RADIUS + 1], flags)
@@ -137,4 +150,5 @@ def add_search(recipe: Recipe, settings: ValSettings) -> None:
                    "search.region": REGION,
                    "search.distance": Spec(PLACE, "m", "d, from the map's centre; 0 where not pending")},
                paper="VAL Sec. 4.2, E-VAL-09; disc: E-VAL-08", exact=("maps.center",),
-               bugs=(*search_bugs(run, settings), *(search_disc_bugs(run) if by_default(settings) else ())))
+               variants=(form.run(),),
+               bugs=form.bugs("search", "region", *(("search/exact", "cone") if by_default(settings) else ())))

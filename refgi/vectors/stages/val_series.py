@@ -8,10 +8,11 @@ from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.settings import Csm
 from refgi.cluster.visibility.search_region import scale_of
 from refgi.cluster.visibility.series import series
-from refgi.settings import replaced
-from refgi.vectors.bugs.val_basis import chain_bugs, scale_bugs
-from refgi.vectors.recipe import Recipe, reading, writing
-from refgi.vectors.spec import Arrays, Bug, Spec
+from refgi.literal import val_maps
+from refgi.literal import val_series as literal
+from refgi.vectors.recipe import Recipe
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import Arrays, Spec
 from refgi.vectors.stages.val_maps import shadow_maps_of
 
 SCALE = ("scale.origin", "scale.slope", "series.range")
@@ -19,8 +20,12 @@ SCALE = ("scale.origin", "scale.slope", "series.range")
 
 def add_series(recipe: Recipe, csm: Csm) -> None:
     """Add the numbers of the series."""
-    def run(arrays: Arrays, real: Any, how: Csm = csm) -> Arrays:  # noqa: ARG001
-        chain = series(how)
+    plain = csm.attenuation == 0 and csm.rescale == "none" and csm.bias is None
+    form = Form(literal.series, {}, ("series.weight", "series.bias", "series.range"), {
+        "terms": csm.terms, "attenuation": csm.attenuation, "rescale": csm.rescale, "fixed": csm.bias})
+
+    def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001
+        chain = series(csm)
         return {"series.weight": chain.weight, "series.bias": np.array([chain.search_bias, chain.bias]),
                 "series.range": np.array([chain.range])}
 
@@ -31,21 +36,15 @@ def add_series(recipe: Recipe, csm: Csm) -> None:
         "series.weight": Spec("term", "1", "w_k = 2 / c_k, c_k = (2k - 1) pi", paper="E-VAL-02"),
         "series.bias": Spec("(search, comparison)", "1", "b*, where f_M is 1 for the first time", paper="E-VAL-03"),
         "series.range": Spec("one", "1", "1 - 2 b*, the depth of what is farthest", paper="E-VAL-05")},
-        paper="VAL Sec. 4.1, E-VAL-02, 03, 05", bugs=(
-            Bug("weights are half as large, w_k = 1 / c_k: the factor 2 is missing, or "
-                "frequencies are twice as high", writing(run, series__weight=lambda a: a / 2), "E-VAL-02"),
-            Bug("terms are damped more", lambda a, r: run(a, r, replaced(csm, {
-                "attenuation": csm.attenuation + 1.0})), f"A = {csm.attenuation:g}"),
-            Bug("no bias, the range right", writing(run, series__bias=np.zeros_like), "E-VAL-03"),
-            Bug("depths fill the whole period", writing(run, series__range=np.ones_like), "E-VAL-05"),
-            Bug("the bias is that of one term less", lambda a, r: {
-                **run(a, r, replaced(csm, {"terms": csm.terms - 1})), "series.weight": series(csm).weight}, "b*(M)"),
-            *(chain_bugs(run, csm) if csm.attenuation == 0 and csm.rescale == "none" and csm.bias is None else ())))
+        paper="VAL Sec. 4.1, E-VAL-02, 03, 05", variants=(form.run(),),
+        bugs=form.bugs("series", "series/plain" if plain else "series/damped"))
 
 
 def add_scale(recipe: Recipe, csm: Csm) -> None:
     """Add the scale of depths of each map."""
-    def run(arrays: Arrays, real: Any, kind: Any = csm.depth_scale) -> Arrays:
+    kind = csm.depth_scale
+
+    def run(arrays: Arrays, real: Any) -> Arrays:
         maps = shadow_maps_of(arrays, real)
         chain = series(csm)._replace(range=float(arrays["series.range"][0]))
         scales = [scale_of(maps, k, kind, chain) if maps.map_of[k] >= 0 else DepthScale(False, 0.0, 0.0, 0.0)
@@ -53,30 +52,15 @@ def add_scale(recipe: Recipe, csm: Csm) -> None:
         return {"scale.origin": np.array([one.origin for one in scales]),
                 "scale.slope": np.array([one.slope for one in scales])}
 
-    def other(kind: str) -> Any:
-        return lambda arrays, real: run(arrays, real, kind)
-
-    forms = {"log_map": "logarithms of what the map holds", "map": "linear in metres", "scene": "shares of the scene"}
-    every = {"maps__near": lambda a: np.where(np.isfinite(a), a.min(), a),
-             "maps__far": lambda a: np.full_like(a, a.max())}
+    form = Form(val_maps.depth_scale, {"near": "maps.near", "far": "maps.far", "scene_far": "maps.scene_far",
+                                       "end": "series.range"}, SCALE[:2], {"kind": kind})
+    others = (f"depth_scale/not {one}" for one in ("log_map", "map", "scene") if one != kind)
     unit = "depths per octave" if csm.depth_scale == "log_map" else "1/m"
     recipe.add("scale", "scale on which the depths of each map are compared", run,
                ("maps.near", "maps.far", "maps.scene_far", "series.range"),
                {"scale.origin": Spec("area light", "m", "distance of depth 0; 0 for empty maps"),
                 "scale.slope": Spec("area light", unit, "depths per octave of distance or per metre; 0 on empty maps")},
-               paper="E-VAL-05", bugs=(
-                   *(Bug(f"depths are {what}", other(kind), "E-VAL-05") for kind, what in forms.items()
-                     if kind != csm.depth_scale),
-                   *((Bug("one scale for all maps", reading(run, **every), "E-VAL-05: what each map holds"),)
-                     if csm.depth_scale != "scene" else ()),
-                   *(scale_bugs(run, csm) if csm.depth_scale != "scene" else ()),
-                   Bug("the farthest blocker's depth is the far end of the range e: no room for the bias",
-                       writing(run, scale__slope=lambda a: a * _top(csm)), "b* is left behind the farthest blocker")))
-
-
-def _top(csm: Csm) -> float:
-    end = series(csm).range
-    return end / max(2 * end - 1, end / 2)
+               paper="E-VAL-05", bugs=form.bugs("depth_scale", f"depth_scale/{kind}", *others), variants=(form.run(),))
 
 
 def scale_at(arrays: Arrays, csm: Csm, k: int) -> DepthScale:

@@ -10,13 +10,13 @@ from refgi.cluster.clustering.rectangle import area_lights, map_frames
 from refgi.cluster.settings import ValSettings
 from refgi.errors import InputError
 from refgi.lights import PixelLights
+from refgi.literal.val_areas import areas as literal_areas
 from refgi.rsm.raster.projection import paraboloid_projection
 from refgi.settings import replaced
-from tests.naive import kmeans as naive
 
 PUBLISHED = ValSettings()
 ROUNDING = 1e-14  # relative to the room's size of about 1 m
-TURNS = 400  # of the twin's axes within a quarter turn
+TURNS = 400  # of axes within a quarter turn
 SIGMAS = 4.0  # of the mean over all clusters: 1 in 16,000 by chance
 
 
@@ -104,24 +104,31 @@ def test_a_turned_square_doubles_its_area_of_fixed_axes(evidence):
 
 
 @pytest.mark.parametrize("axes", ["fixed", "pca", "min_area"])
-def test_every_light_lies_in_its_rectangle_as_in_the_twin(axes):
+@pytest.mark.parametrize("extent", ["root", "longer", "shorter"])
+def test_rectangles_are_those_of_the_literal_text(axes, extent):
     rng = np.random.default_rng(3)
     position, normal = rng.random((3, 200)), rng.normal(size=(3, 200))
-    normal /= np.linalg.norm(normal, axis=0)
     clusters = cluster(position, normal, 12, diagonal=1.7)
-    found = area_lights(lights_at(position, normal), clusters, replaced(PUBLISHED, {"axes": axes}).area)
-    for m in range(12):
-        mine = position[:, clusters.of == m].T.tolist()
-        right, down = found.axes[m]
-        assert abs(right @ down) < ROUNDING
-        np.testing.assert_allclose(found.axes[m] @ clusters.normal[:, m], 0, atol=ROUNDING)
-        sides, middle = naive.rectangle(mine, clusters.center[:, m].tolist(), right.tolist(), down.tolist())
-        np.testing.assert_allclose(found.side[:, m], sides, atol=ROUNDING)
-        np.testing.assert_allclose(found.offset[:, m], middle, atol=ROUNDING)
-        least = naive.least_rectangle(mine, *found.frame[m, :2].tolist(), steps=TURNS)
-        area, coarse = found.side[:, m].prod(), math.pi / 2 / TURNS / 2 * (found.side[:, m] ** 2).sum()
-        assert area > least - coarse  # no turn makes the twin's rectangle larger by more than half a step does
-        assert axes != "min_area" or area < least + ROUNDING
+    options = {"axes": axes, "area_extent": extent, "unbiased_area": extent == "longer"}
+    found = area_lights(lights_at(position, normal), clusters, replaced(PUBLISHED, options).area)
+    frame, along, side, offset, delta, radius, members = literal_areas(
+        position, clusters.center, clusters.normal, clusters.of, axes, extent, extent == "longer")
+    for ours, theirs in ((found.frame, frame), (found.axes, along), (found.side, side), (found.offset, offset),
+                         (found.delta, delta), (found.radius, radius), (found.members, members)):
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=ROUNDING)
+
+
+def test_no_turn_makes_a_smaller_rectangle():
+    rng = np.random.default_rng(3)
+    s, t = rng.random((2, 15))
+    frame = map_frames(np.array([[0.0], [1.0], [0.0]]))[0]
+    found = area_lights(lights_at(on_plane(frame, s, t), on_plane(frame, s, t)),
+                        one_cluster(on_plane(frame, s, t), (0, 1, 0)), replaced(PUBLISHED, {"axes": "min_area"}).area)
+    turns = np.pi / 2 * np.arange(TURNS)[:, None] / TURNS
+    c, d = np.cos(turns), np.sin(turns)
+    areas = np.ptp(c * s + d * t, axis=1) * np.ptp(c * t - d * s, axis=1)
+    area, coarse = found.side[:, 0].prod(), math.pi / 2 / TURNS / 2 * (found.side[:, 0] ** 2).sum()
+    assert areas.min() - coarse < area < areas.min() + ROUNDING  # a turn is off by half a step at most
 
 
 def test_pca_follows_the_longer_spread():

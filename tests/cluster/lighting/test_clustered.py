@@ -15,6 +15,7 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights import PixelLights
 from refgi.lights.selection import choose_lights
+from refgi.literal.val_areas import interleaving
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
 from refgi.rsm import facing_normals
@@ -22,7 +23,6 @@ from refgi.scene import load_scene
 from refgi.settings import of
 from tests.cluster.maps.lights import hard_visibility
 from tests.naive import eq2
-from tests.naive.interleaving import lights_of
 from tests.pairs import sets
 
 ROUNDING = 1e-12  # of sums over some hundred lights in another order, relative to the largest
@@ -84,10 +84,10 @@ def test_every_pixel_sums_its_lights_under_their_visibility(side, count, assignm
     settings = of(ValSettings, visibility="none", assignment=assignment)
     result = clustered_irradiance(to, to.normal, lights, grouped(owner, 6), None, settings, visibility_of=striped,
                                   interleaving=side)
-    expected = np.zeros_like(result)
+    expected, subset = np.zeros_like(result), interleaving(owner, side, assignment)
     for y, x in np.argwhere(to.covered):
         at, up = to.position[:, y, x], to.normal[:, y, x]
-        for i in lights_of(x, y, side, count, owner if assignment == "cluster" else None):
+        for i in np.flatnonzero(subset == y % side * side + x % side):
             pair = eq2.pair(at, up, lights.position[:, i], lights.normal[:, i], lights.flux[:, i])
             expected[:, y, x] += side**2 * pair * striped(owner[i], at, up)
     error = np.abs(result - expected).max() / expected.max()

@@ -77,9 +77,8 @@ def biased_distance(bias, seen, d, near, far):
 def means_of(kind, texels, squares):
     """Return what takes means of a basis (1, C, n, n) over regions."""
     if kind.prefilter == "mip":
-        levels = {f"level_{k}": one for k, one in enumerate(
-            [texels, *mip_levels(texels, kind.quantisation == "published")])}
-        return lambda asked, region, weighed: mip_means(asked, region, kind.terms, weighed, **levels)
+        levels = [texels, *mip_levels(texels, kind.quantisation == "published")]
+        return lambda asked, region, weighed: mip_means(asked, region, kind.terms, weighed, levels)
     mean = box_means if squares else disc_means
     return lambda asked, region, weighed: mean(asked, region, kind.terms, weighed, texels)
 

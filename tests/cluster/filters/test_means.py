@@ -21,8 +21,8 @@ def reference(depth, terms, discs, mean):
 
 def by_mip(asked, region, terms, weighed, texels, in_bytes=False):
     """Return means by levels of the disc's whole diameter; the literal text reads those of half."""
-    levels = {f"level_{k}": one for k, one in enumerate([texels, *val_filters.mip_levels(texels, in_bytes)])}
-    return val_filters.mip_means(asked, region * np.array([1, 1, 2])[:, None, None], terms, weighed, **levels)
+    levels = [texels, *val_filters.mip_levels(texels, in_bytes)]
+    return val_filters.mip_means(asked, region * np.array([1, 1, 2])[:, None, None], terms, weighed, levels)
 
 
 @pytest.mark.feature("VAL-16")

@@ -121,9 +121,9 @@ def from_levels(edge, terms, scale, n):
     """Return what reads levels of half the disc's diameter between texels."""
     grid = (np.arange(n) + 0.5) * 2 / n - 1
     texels = channels(radial_depth(*np.meshgrid(grid, grid), edge), terms, scale)
-    levels = {f"level_{k}": one for k, one in enumerate([texels[None], *val_filters.mip_levels(texels[None])])}
+    levels = [texels[None], *val_filters.mip_levels(texels[None])]
     return lambda point, angle: val_filters.mip_means(np.ones((1, 1, 1), bool), region(point, angle), terms, True,
-                                                      **levels)[0, :, 0, 0]
+                                                      levels)[0, :, 0, 0]
 
 
 def chain(delta, edge, points, facing, resolution, **settings):

@@ -33,13 +33,12 @@ def halved(level: Any) -> Any:
     return (a + b + c + d) / 4
 
 
-def mip_means(pending: Any, region: Any, terms: int, weighed: bool, **levels: Any) -> Any:
+def mip_means(pending: Any, region: Any, terms: int, weighed: bool, levels: Any) -> Any:
     """Return means (K, C, h, w) over discs, where pending: 8 texels of two levels, C = 4 M + 1 or, not `weighed`, 2 M.
 
     A read between texels is a tent twice as wide as a texel: one level finer than log2 of the disc's diameter.
     """
-    maps = list(levels.values())
-    n, top = maps[0].shape[2], len(maps) - 1
+    n, top = levels[0].shape[2], len(levels) - 1
     s, t, radius = region.swapaxes(0, 1)
     x = (s + 1) / 2 * n
     y = (t + 1) / 2 * n
@@ -48,18 +47,18 @@ def mip_means(pending: Any, region: Any, terms: int, weighed: bool, **levels: An
     level = np.clip(level, 0, top)
     fine = np.floor(level)
     part = (level - fine)[:, None]
-    near = read_level(maps, fine, x, y)
-    far = read_level(maps, np.minimum(fine + 1, top), x, y)
+    near = read_level(levels, fine, x, y)
+    far = read_level(levels, np.minimum(fine + 1, top), x, y)
     means = near + part * (far - near)
     means = means if weighed else means[:, : 2 * terms]
     return np.where(pending[:, None], means, 0)
 
 
-def read_level(maps: Any, level: Any, x: Any, y: Any) -> Any:
-    """Return (K, C, h, w) at places x, y of level 0, in texels, each read of its own level."""
-    made = np.zeros((*level.shape, maps[0].shape[1]), maps[0].dtype)
-    for number, texels in enumerate(maps):
-        here = level == number
+def read_level(levels: Any, of: Any, x: Any, y: Any) -> Any:
+    """Return (K, C, h, w) at places x, y of level 0, in texels, each read of the level `of` (K, h, w)."""
+    made = np.zeros((*of.shape, levels[0].shape[1]), levels[0].dtype)
+    for number, texels in enumerate(levels):
+        here = of == number
         k = np.nonzero(here)[0]
         shrink = 0.5**number
         made[here] = bilinear(texels, k, x[here] * shrink, y[here] * shrink)

@@ -218,9 +218,8 @@ def in_region(region: Any, s: Any, t: Any) -> Any:
     n, at = len(s), np.arange(len(s))
     column, row = (np.clip(np.floor((one + 1) / 2 * n), 0, n - 1) for one in (s0, t0))
     own = (at == column) & (at[:, None] == row)
-    hemisphere = s * s + t * t <= 1
-    inside = inside & hemisphere
-    return np.where(inside.any(axis=(3, 4), keepdims=True), inside, own & hemisphere)
+    inside = inside & (s * s + t * t <= 1)  # the hemisphere
+    return np.where(inside.any(axis=(3, 4), keepdims=True), inside, own)
 
 
 def in_cone(z: Any, w: Any, local: Any, d: Any, size: Any, width: Any) -> Any:

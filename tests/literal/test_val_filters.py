@@ -35,8 +35,7 @@ def discs(count=40, wide=0.4, seed=2):
 
 
 def by_levels(basis, region):
-    levels = {f"level_{k}": one for k, one in enumerate([basis, *mip_levels(basis)])}
-    return mip_means(np.ones((1, *region.shape[2:]), bool), region, 1, True, **levels)
+    return mip_means(np.ones((1, *region.shape[2:]), bool), region, 1, True, [basis, *mip_levels(basis)])
 
 
 def test_a_level_is_half_of_the_one_before():

@@ -12,18 +12,14 @@ import numpy as np
 from refgi.cluster.settings import (
     AdaptiveClusters,
     BackProjection,
-    Csm,
     GeometryBlur,
-    Hard,
-    Pcf,
-    Pcss,
     RaysRectangle,
     RaysVpls,
 )
 from refgi.lights.selection import choose_lights, footprints
 from refgi.literal import val_areas, val_maps
-from tests.naive import area_visibility as soft
-from tests.naive import interleaving
+from refgi.literal.val_filters import blur
+from tests.literal.shadows import Seen, projected, shadow
 from tests.naive.crossings import LIFT, corners_of, face_normals, free
 from tests.naive.pair_term import contributions
 
@@ -75,11 +71,10 @@ def picture(frame, settings):
     if block == 1 or settings.blur is None:
         return light
     by_geometry = isinstance(settings.blur, GeometryBlur)
-    extent = settings.blur.extent * diagonal(view.position) if by_geometry else math.inf
-    buffer = frame.gbuffer
-    return interleaving.blurred(light, buffer.position, buffer.normal, buffer.covered, block, extent,
-                                settings.blur.cosine if by_geometry else -math.inf,
-                                by_geometry and settings.blur.every_subset)
+    extent, cosine = (settings.blur.extent, settings.blur.cosine) if by_geometry else (math.inf, -math.inf)
+    buffer, box = frame.gbuffer, np.array([one(view.position, axis=0) for one in (np.min, np.max)])
+    return blur(light, buffer.position, buffer.normal, buffer.triangle_id, box, block, extent, cosine,
+                by_geometry and settings.blur.every_subset)
 
 
 def view_of(frame, settings, areas=None):
@@ -333,40 +328,14 @@ def without_near_planes(corners, center, distance):
 
 def by_map(view, area, sign):
     """Return V by the map ahead (1), or by that of the hemisphere behind (-1): right and forward turned round."""
-    settings, seen = view.settings, map_of(view, area, sign)
-    shares, kind = np.ones(len(view.pixels)), settings.visibility
-    if not np.isfinite(seen.near):
-        return shares
-    projected = isinstance(kind, BackProjection)
-    boxes = "val_alpha_over_pi" in settings.as_published
-    channels = soft.filtered(seen, kind, boxes) if isinstance(kind, Csm) else None
-    for p in np.flatnonzero(view.light[area.members].any(axis=(0, 2))):
-        local = seen.frame @ (view.position[p] - seen.center)
-        if local[2] <= 0:
-            continue
-        if projected:
-            axes = np.array([*area.axes, seen.frame[2]])
-            shares[p] = soft.back_projected(seen, area, axes, view.position[p], view.facing[p])
-        else:
-            shares[p] = share_by_map(settings, area, seen, channels, local, seen.frame @ view.facing[p])
+    seen, shares = map_of(view, area, sign), np.ones(len(view.pixels))
+    lit = view.light[area.members].any(axis=(0, 2))
+    points, facing = view.position[lit].T, view.facing[lit].T
+    if isinstance(view.settings.visibility, BackProjection):
+        shares[lit] = projected(seen, area, points, facing)
+    elif lit.any():
+        shares[lit] = shadow(view.settings, seen, area.delta, points, facing)[0]
     return shares
-
-
-def share_by_map(settings, area, seen, channels, local, facing):
-    """Return V of a receiver in the map's own axes."""
-    kind, printed = settings.visibility, settings.as_published
-    if isinstance(kind, Hard) or area.delta == 0:
-        return soft.pcf_share(seen, local, facing, 1)
-    if isinstance(kind, Pcf):
-        return soft.pcf_share(seen, local, facing, kind.texels)
-    d = math.hypot(*local)
-    if d <= seen.near:
-        return 1.0
-    delta = area.delta * math.sqrt(local[2] / d) if settings.area.foreshortened else area.delta
-    if isinstance(kind, Pcss):
-        bias = 0.0 if kind.constant_bias is None else kind.constant_bias.value
-        return soft.pcss_share(seen, kind, soft.series(Csm(bias=bias)).end, delta, local, facing, printed)
-    return soft.csm_share(seen, channels, kind, delta, local, printed)
 
 
 def map_of(view, area, sign):
@@ -383,4 +352,4 @@ def map_of(view, area, sign):
     depth = val_maps.depth_maps(
         corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3), np.ones(len(corners), bool), center[None],
         frame[None], np.array([ball if settings.near_geometry == "ball" else 0.0]), np.ones(1), settings.resolution)
-    return soft.Seen(center, frame, depth[0], farthest)
+    return Seen(center, frame, depth[0], farthest)

@@ -94,8 +94,8 @@ def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
 def _add_means(recipe: Recipe, settings: ValSettings, csm: Csm, name: str, flag: str, channels: int) -> None:
     levels = level_names(recipe) + (("maps.t",) if csm.quantisation == "published" else ())
     boxes, by_mips = "val_alpha_over_pi" in settings.as_published, csm.prefilter == "mip"
-    basis = {f"level_{one[6:]}" if by_mips else "basis": one for one in level_names(recipe)}
     mean = val_filters.mip_means if by_mips else val_filters.box_means if boxes else val_filters.disc_means
+    basis = {"levels": level_names(recipe)} if by_mips else {"basis": "basis.0"}
     form = Form(mean, {"pending": flag, "region": f"{name}.region", **basis}, (f"{name}.means",),
                 {"terms": csm.terms, "weighed": channels > 2 * csm.terms})
 

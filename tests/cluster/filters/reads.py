@@ -5,6 +5,7 @@ import numpy as np
 from refgi.cluster.filters.brute import brute_means, brutes, build_brute
 from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.cluster.filters.mip import build_mip, mip_means, mip_of, mips
+from refgi.literal.val_maps import basis, series_depth
 from tests.cluster.filters.sat import build_sat, sat_means, sats
 
 MOST = 0.85  # far end of the range of depths
@@ -13,6 +14,17 @@ MOST = 0.85  # far end of the range of depths
 def linear(per_metre):
     """A scale of depths that starts at 0 m."""
     return DepthScale(False, 0.0, per_metre, MOST)
+
+
+def texels(depth, terms, per_metre=MOST / 4, in_bytes=False):
+    """Return the literal basis (1, C, n, n) of one map."""
+    return basis(depths(depth, per_metre)[None], terms, in_bytes)
+
+
+def depths(depth, per_metre=MOST / 4):
+    """Return the literal depths (n, n) of one map."""
+    t = series_depth(np.asarray(depth, float)[None], np.zeros(1), np.array([per_metre]), np.array([MOST]), False)
+    return t[0]
 
 
 def random_map(n, dtype, seed=1):

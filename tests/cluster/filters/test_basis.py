@@ -2,6 +2,7 @@
 
 import math
 import re
+import struct
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ import pytest
 from refgi.cluster.filters.basis import eight_bits, fill_basis, half_precision, normalise, sine_cosine
 from refgi.cluster.filters.depth_scale import DepthScale
 from refgi.jit import kernel
-from tests.naive import filters as naive
+from refgi.literal.val_maps import basis, rounded_level, series_depth
+from refgi.literal.val_series import above_half, frequencies, shade, weights
 
 EXACT = 1e-12  # 64 turns of rounded sines and cosines
 # float32: turn k of an angle is off by 2.4e-7 (2k - 1) at most, and a term's weight is 2 sqrt(2) / ((2k - 1) pi)
@@ -70,19 +72,23 @@ def basis_of(t, terms, dtype, quantised=False):
     return np.concatenate([basis, basis_z], axis=2)[0].T
 
 
+def summed(channels, d, weight):
+    """Sum sines and cosines (2 M, n) to the series at a depth."""
+    return shade(channels[None, :, None], np.full((1, 1, channels.shape[1]), d), 0, weight)[0, 0]
+
+
 @pytest.mark.feature("VAL-12")
 @pytest.mark.parametrize("terms", [1, 4, 64])
 def test_channels_add_up_to_the_series(terms, evidence):
     depths = np.linspace(0, 0.99, 34)
     errors = {}
     for dtype in (np.float64, np.float32):
-        given = depths.astype(dtype)
-        found, error = basis_of(given, terms, dtype).astype(np.float64), 0.0
-        for i, z in enumerate(given):
-            for d in depths[::3]:
-                error = max(error, abs(naive.seen_share(found[:, i], d, terms) - naive.step_series(d, float(z), terms)))
-                by_z = 0.5 * float(z) - float(z) * (naive.step_series(d, float(z), terms) - 0.5)
-                error = max(error, abs(naive.blocker_sum(found[:, i], d, terms) - by_z))
+        given, weight = depths.astype(dtype), weights(terms, 0.0)
+        found, z, error = basis_of(given, terms, dtype).astype(np.float64), given.astype(np.float64), 0.0
+        for d in depths[::3]:
+            lit = above_half(z - d, weight)
+            error = max(error, np.abs(summed(found[: 2 * terms], d, weight) - lit).max(),
+                        np.abs(summed(found[2 * terms : 4 * terms], d, weight) - z * lit).max())
         errors[dtype] = error
     assert errors[np.float64] < EXACT
     assert errors[np.float32] < PER_TERM * terms
@@ -93,7 +99,7 @@ def test_channels_add_up_to_the_series(terms, evidence):
 @pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-13), (np.float32, 2e-6)])  # 7 turns
 def test_channels_are_sines_and_cosines(dtype, tolerance):
     t = np.linspace(0, 1, 41, dtype=dtype)
-    expected = np.array([naive.channels(float(z), 4) for z in t]).T
+    expected = basis(t.astype(float)[None, None], 4, False)[0, :, 0]
     assert np.abs(basis_of(t, 4, dtype) - expected).max() < tolerance
 
 
@@ -101,7 +107,8 @@ def test_nothing_seen_lies_at_the_far_end():
     depth = np.array([[0.0, 1.0], [4.0, 7.0], [np.inf, 3.999999]], np.float32)
     out = np.empty_like(depth)
     normalise(depth, DepthScale(False, 0.0, 0.2, 0.8), out)
-    assert np.abs(out - naive.normalised(depth, 0.2, 0.8)).max() < 1e-7
+    expected = series_depth(depth[None], np.zeros(1), np.array([0.2]), np.array([0.8]), False)[0]
+    assert np.abs(out - expected).max() < 1e-7
     assert out[1, 1] == out[2, 0] == np.float32(0.8)
 
 
@@ -110,12 +117,10 @@ def test_eight_bits_move_visibility_by_less_than_the_bound(evidence):
     terms = 4
     depths = np.linspace(0, 1, 4001)
     plain, rounded = basis_of(depths, terms, np.float64), basis_of(depths, terms, np.float64, quantised=True)
-    bound = sum(2 * math.sqrt(2) / (255 * naive.frequency(k)) for k in range(1, terms + 1))
+    bound = (2 * math.sqrt(2) / (255 * frequencies(terms))).sum()
     worst = 0.0
     for d in np.linspace(0, 1, 101):
-        c = np.array([naive.frequency(k) for k in range(1, terms + 1)])
-        factors = np.concatenate([2 / c * np.cos(c * d), -2 / c * np.sin(c * d)])
-        worst = max(worst, float(np.abs(factors @ (rounded - plain)[: 2 * terms]).max()))
+        worst = max(worst, np.abs(summed((rounded - plain)[: 2 * terms], d, weights(terms, 0.0))).max())
     assert bound == pytest.approx(WORST, abs=DIGIT)
     assert MEASURED < worst < bound
     evidence(f"8 bits: V off by {worst:.4f} at most, bound {bound:.4f} (M = 4)")
@@ -127,9 +132,11 @@ def test_sixteen_bits_move_the_blocker_depth_little(evidence):
     plain, rounded = basis_of(depths, terms, np.float64), basis_of(depths, terms, np.float64, quantised=True)
     worst = 0.0
     for d in np.linspace(0, 0.85, 51):
-        worst = max(worst, *(abs(naive.blocker_sum(rounded[:, i] - plain[:, i], d, terms)) for i in range(0, 2001, 40)))
+        off = rounded - plain
+        by_depth = 0.5 * off[4 * terms] - summed(off[2 * terms : 4 * terms], d, weights(terms, 0.0))
+        worst = max(worst, np.abs(by_depth[::40]).max())
     # a half is off by 2^-12 of numbers below 1: Z/2 and 2 sqrt(2)/c_k for each term
-    bound = 2.0**-12 * (0.5 + sum(2 * math.sqrt(2) / naive.frequency(k) for k in range(1, terms + 1)))
+    bound = 2.0**-12 * (0.5 + (2 * math.sqrt(2) / frequencies(terms)).sum())
     assert 0 < worst < bound
     evidence(f"16 bits: sum of blockers' depths off by {worst:.1e} of the range at most, bound {bound:.1e}")
 
@@ -139,7 +146,8 @@ def test_rounding_is_that_of_the_formats():
     rng = np.random.default_rng(3)
     special = [0, 1, -1, 2**-24, 2**-25, 1.5 * 2**-24, 1 + 2**-11, 1 + 3 * 2**-11, 65504, 1 / 3]
     values = np.concatenate([rng.uniform(-1, 1, 300), 10 ** rng.uniform(-9, 4, 200), special])
-    assert [half_precision(float(v)) for v in values] == [naive.half_precision(float(v)) for v in values]
+    assert [half_precision(float(v)) for v in values] == [struct.unpack("e", struct.pack("e", v))[0] for v in values]
     inside = values[np.abs(values) <= 1]
-    assert max(abs(eight_bits(float(v)) - naive.eight_bits(float(v))) for v in inside) < 1e-15
+    bytes_ = rounded_level(np.tile(inside, (1, 5, 1, 1)))[0, 0, 0]
+    assert max(abs(eight_bits(float(v)) - b) for v, b in zip(inside, bytes_, strict=True)) < 1e-15
     assert [eight_bits(v) for v in (-1.0, 1.0)] == [-1.0, 1.0]

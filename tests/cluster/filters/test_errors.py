@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from refgi.literal.val_maps import map_depths
+from refgi.literal.val_series import shade, weights
 from refgi.rsm.raster.depth_maps import paraboloid_depth_maps
 from refgi.scene import load_scene
 from tests.cluster.filters import reads
-from tests.naive import filters as naive
 
 ROUNDED = 1e-12  # sums of 64^2 texels
 EDGE = 1 / 16  # of a mip map: an edge where texels of the level meet is off by this part of its height at most
@@ -37,9 +38,8 @@ def test_mip_has_steps_where_boxes_and_discs_have_none(evidence):
 
 def seen(means, d):
     """V of each disc, cut to [0, 1]."""
-    c = np.array([[naive.frequency(k)] for k in range(1, TERMS + 1)])
-    terms = 2 / c * (np.cos(c * d) * means[:TERMS] - np.sin(c * d) * means[TERMS : 2 * TERMS])
-    return np.clip(0.5 + terms.sum(axis=0), 0, 1)
+    means = means[None, : 2 * TERMS, None].astype(float)
+    return np.clip(0.5 + shade(means, d[None, None], 0, weights(TERMS, 0.0))[0, 0], 0, 1)
 
 
 def maps_of(geometry, count, rng):
@@ -93,8 +93,9 @@ def test_error_against_the_disc_on_real_maps(name, data_dir, evidence):
 @pytest.mark.parametrize("n", [1, 4, 7, 16, 33])
 def test_the_square_beyond_the_disc_mirrors_it(n):
     depth = reads.random_map(n, np.float64)
-    expected, plain = (naive.normalised(z, reads.MOST / 4, reads.MOST) for z in (naive.mirrored(depth), depth))
+    scale = np.zeros(1), np.array([reads.MOST / 4]), np.array([reads.MOST])
+    expected, plain = (map_depths(depth[None], *scale, False, mirrored)[0] for mirrored in (True, False))
     for kind in ("mip", "sat", "brute"):
         assert np.abs(getattr(reads, kind)(depth, 1, mirrored=True).depth - expected).max() < ROUNDED
-    squares = [naive.centre(i, n) ** 2 for i in range(n)]
+    squares = ((np.arange(n) + 0.5) * 2 / n - 1) ** 2
     assert ((expected == plain) | (np.add.outer(squares, squares) > 1)).all()

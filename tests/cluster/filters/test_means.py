@@ -1,11 +1,11 @@
-"""Means over discs and boxes against plain loops, and the three filters against each other (VAL-16, VAL-17)."""
+"""Means over discs and boxes against the literal text, and the three filters against each other (VAL-16, VAL-17)."""
 
 import numpy as np
 import pytest
 
 from refgi.cluster.filters.mip import Mip, build_mips, mips
+from refgi.literal import val_filters, val_series
 from tests.cluster.filters import reads
-from tests.naive import filters as naive
 
 EXACT = 1e-13  # sums of some 100 numbers of float64
 SUMS = 1e-11  # differences of sums of 33^2 over an area of one texel
@@ -15,12 +15,14 @@ SIZES = [1, 2, 7, 16, 33]
 
 def reference(depth, terms, discs, mean):
     """Read each disc of the exact channels by `mean`."""
-    channels = naive.planes(naive.normalised(depth, reads.MOST / 4, reads.MOST), terms)
-    return np.array([mean(channels, float(s), float(t), float(r)) for s, t, r in zip(*discs, strict=True)]).T
+    region = np.array(discs, float)[None, :, None]
+    return mean(np.ones((1, *region.shape[2:]), bool), region, terms, True, reads.texels(depth, terms))[0, :, 0]
 
 
-def by_mip(channels, s, t, radius):
-    return naive.trilinear(naive.mip_levels(channels), s, t, radius)
+def by_mip(asked, region, terms, weighed, texels, in_bytes=False):
+    """Return means by levels of the disc's whole diameter; the literal text reads those of half."""
+    levels = [texels, *val_filters.mip_levels(texels, in_bytes)]
+    return val_filters.mip_means(asked, region * np.array([1, 1, 2])[:, None, None], terms, weighed, levels)
 
 
 @pytest.mark.feature("VAL-16")
@@ -44,7 +46,7 @@ def test_boxes_texel_by_texel_equal_summed_areas(evidence):
             boxes = reads.means(reads.brute(depth, 4, box=True), discs, 4)
             error = np.abs(reads.means(reads.sat(depth, 4), discs, 4) - boxes).max()
             assert error < tolerance
-            assert np.abs(boxes - reference(depth, 4, discs, naive.box_mean)).max() < tolerance
+            assert np.abs(boxes - reference(depth, 4, discs, val_filters.box_means)).max() < tolerance
             worst[dtype] = max(error, worst.get(dtype, 0.0))
     evidence(f"summed areas less box: {worst[np.float64]:.1e} (float64), {worst[np.float32]:.1e} (float32)")
 
@@ -54,7 +56,7 @@ def test_boxes_texel_by_texel_equal_summed_areas(evidence):
 def test_discs_texel_by_texel(n):
     depth, discs = reads.random_map(n, np.float64), reads.random_discs(30, np.float64)
     found = reads.means(reads.brute(depth, 3), discs, 3)
-    assert np.abs(found - reference(depth, 3, discs, naive.disc_mean)).max() < EXACT
+    assert np.abs(found - reference(depth, 3, discs, val_filters.disc_means)).max() < EXACT
 
 
 @pytest.mark.parametrize("kind", ["mip", "sat", "brute"])
@@ -75,7 +77,7 @@ def test_lanes_that_are_not_wanted(kind):
 @pytest.mark.parametrize("kind", ["mip", "sat", "brute"])
 def test_one_depth_everywhere_is_its_own_mean(kind):
     depth, discs = np.full((9, 9), 2.0), reads.random_discs(40, np.float64)
-    expected = naive.channels(2.0 * reads.MOST / 4, 4)
+    expected = reads.texels(depth, 4)[0, :, 0, 0]
     found = reads.means(getattr(reads, kind)(depth, 4), discs, 4)
     assert np.abs(found - expected[:, None]).max() < SUMS
 
@@ -106,26 +108,17 @@ def test_several_maps_at_once_are_those_of_each():
 def test_every_level_of_a_mip_is_rounded(n, evidence):
     depth, terms = reads.random_map(n, np.float64), 4
     filters = reads.mip(depth, terms, quantised=True)
-    levels = [naive.planes(naive.normalised(depth, reads.MOST / 4, reads.MOST), terms)]
-    rounded = [_rounded(levels[0], terms)]
-    while len(rounded[-1]) > 1:
-        rounded.append(_rounded(naive.mip_levels(rounded[-1])[1], terms))
     discs = reads.random_discs(40, np.float64)
-    expected = np.array([naive.trilinear(rounded, *map(float, disc)) for disc in zip(*discs, strict=True)]).T
+    region, texels = np.array(discs)[None, :, None], reads.texels(depth, terms, in_bytes=True)
+    expected = by_mip(np.ones((1, 1, 40), bool), region, terms, True, texels, in_bytes=True)[0, :, 0]
     found = reads.means(filters, discs, terms)
     assert np.abs(found - expected).max() < EXACT
     plain = reads.means(reads.mip(depth, terms), discs, terms)
-    errors = [abs(naive.seen_share(found[:, i] - plain[:, i], d, terms) - 0.5) for i in range(40) for d in (0.2, 0.5)]
-    assert 0 < max(errors) < 0.006
+    weight, off = val_series.weights(terms, 0.0), (found - plain)[None, : 2 * terms, None]
+    worst = max(np.abs(val_series.shade(off, np.full((1, 1, 40), d), 0, weight)).max() for d in (0.2, 0.5))
+    assert 0 < worst < 0.006
     if n == 16:
-        evidence(f"8 bits on every level of a mip map: V off by {max(errors):.4f} at most")
-
-
-def _rounded(level, terms):
-    flat = level.reshape(-1, 4 * terms + 1)
-    out = [[*(naive.eight_bits(v) for v in texel[: 2 * terms]), *(naive.half_precision(v) for v in texel[2 * terms :])]
-           for texel in flat]  # fmt: skip
-    return np.array(out).reshape(level.shape)
+        evidence(f"8 bits on every level of a mip map: V off by {worst:.4f} at most")
 
 
 def test_a_pyramid_has_no_room_for_the_map_itself():

@@ -1,4 +1,4 @@
-"""The geometry-aware blur against its literal twin, and what it must not do."""
+"""The geometry-aware blur against its literal text, and what it must not do."""
 
 import numpy as np
 import pytest
@@ -6,13 +6,19 @@ import pytest
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.settings import BoxBlur, GeometryBlur
 from refgi.jit import threads
+from refgi.literal import val_filters as literal
 from refgi.pairs.irradiance import Receivers
-from tests.naive.interleaving import blurred, window
 
 ROUNDING = 1e-12  # of means of some dozen float64 values, relative to the largest
 ROUNDING_SINGLE = 2e-6  # the same of float32: 64 differences, half a unit of rounding each
 DIAGONAL = 10.0  # m: an extent of 1 m as published
 BETWEEN = 0.103  # of the diagonal: no two pixels of `rough` are this far apart, so that rounding does not decide
+
+
+def blurred(light, position, normal, covered, side, extent, cosine, every_subset=False):
+    """Return the literal mean; `extent`, m."""
+    box = np.array([[0.0, 0, 0], [1, 0, 0]])
+    return literal.blur(light, position, normal, np.where(covered, 0, -1), box, side, extent, cosine, every_subset)
 
 
 def plane(height, width, real=np.float64):
@@ -36,13 +42,13 @@ def rough(rng, height, width, real=np.float64):
 
 @pytest.mark.feature("VAL-24")
 @pytest.mark.parametrize(("height", "width", "side"), [(19, 77, 8), (7, 5, 8), (1, 1, 3), (21, 67, 5), (18, 130, 1)])
-def test_equals_the_twin(height, width, side, evidence):
+def test_equals_the_literal_text(height, width, side, evidence):
     rng = np.random.default_rng(height)
     to, light = rough(rng, height, width), rng.random((3, height, width))
     plain, full = (blurred(light, *to, side, BETWEEN * DIAGONAL, 0.8, every) for every in (False, True))
     error, farther = (np.abs(blur(light, to, side, GeometryBlur(BETWEEN, 0.8, every), DIAGONAL) - expected).max()
                       for every, expected in ((False, plain), (True, full)))
-    evidence(f"{width} x {height}, n = {side}: {error:.1e} off the loops, {farther:.1e} with every subset")
+    evidence(f"{width} x {height}, n = {side}: {error:.1e} off the literal text, {farther:.1e} with every subset")
     assert max(error, farther) < ROUNDING
     assert (np.abs(full - plain).max() > 0.05) == (side > 1 and height > side)
     # any normal: what has no surface has none, and is to be left out for that
@@ -69,7 +75,7 @@ def test_a_step_along_one_axis_parts_two_surfaces(axis, sign, across, evidence):
     error = max(np.abs(blur(light, to, 8, GeometryBlur(every_subset=some), DIAGONAL) - picture).max()
                 for some, picture in ((False, expected), (True, every)))
     mixed = np.abs(blur(light, to, 8, BoxBlur(), DIAGONAL) - expected).max()
-    evidence(f"axis {axis}, {sign:+d}: {error:.0e} off the loops, where a mean of all is {mixed:.2f} off")
+    evidence(f"axis {axis}, {sign:+d}: {error:.0e} off the literal text, where a mean of all is {mixed:.2f} off")
     assert error < ROUNDING
     assert mixed > 0.05
 
@@ -143,9 +149,3 @@ def test_beside_an_edge_every_subset_counts_once(edge, evidence):
     evidence(f"{edge} edge: off by {error:.0e} of subsets 0 to 63, by {left_out:.1f} without those that windows miss")
     assert error < ROUNDING * 200
     assert left_out > 1
-
-
-def test_a_window_sees_every_subset_once():
-    for count in (8, 9, 31):
-        for place in range(count):
-            assert sorted(i % 8 for i in window(place, count, 8)) == list(range(8))

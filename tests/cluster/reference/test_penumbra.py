@@ -11,9 +11,9 @@ import pytest
 
 from refgi.cluster.maps.shadow_maps import shadow_maps
 from refgi.cluster.visibility.evaluate import visibility
+from refgi.literal import val_filters, val_maps, val_series, val_visibility
 from refgi.settings import replaced
 from tests.cluster.reference.edge import EDGE, RECEIVER, SETTINGS, receivers, scene, square_light, width_of
-from tests.naive import filters, soft_shadow
 
 FARTHEST = math.sqrt(27)  # of the ceiling's corners
 PLACES = (0.0, 0.07, 0.19, 0.31)  # of the edge, m: 0 is where texels of all levels of a map meet
@@ -47,9 +47,15 @@ def radial_depth(s, t, edge):
     return np.minimum(plane(EDGE, edge - 3, edge, 2.5), plane(RECEIVER, -3, 3, 3))
 
 
+def region(point, angle):
+    """Return the disc of a cone around a receiver, (1, 3, 1, 1)."""
+    one = np.ones((1, 1, 1))
+    return val_visibility.disc(np.reshape(point, (3, 1, 1, 1)), np.linalg.norm(point) * one, angle * one)
+
+
 def places(point, angle):
     """Return places spread evenly over the disc that a cone around a receiver is on the map (Vogel's spiral)."""
-    s, t, radius = soft_shadow.cone_disc(*point, angle)
+    s, t, radius = region(point, angle).ravel()
     k = np.arange(PLACES_IN_DISC) + 0.5
     r, turn = radius * np.sqrt(k / PLACES_IN_DISC), math.pi * (3 - math.sqrt(5)) * k
     return s + r * np.cos(turn), t + r * np.sin(turn)
@@ -79,24 +85,31 @@ def step_share(point, delta, edge):
 
 def series_share(point, delta, terms, scale, means_of):
     """Return V by the series (Sec. 4.1) with `means_of(point, angle)` the means of its channels over a filter."""
-    bias = soft_shadow.first_one(terms)
-    to, back = soft_shadow.scales([[EDGE, FARTHEST]], scale, FARTHEST, bias, bias)
+    weight, bias, _ = val_series.series(terms)
     d = float(np.linalg.norm(point))
-    means = means_of(point, filter_angle(delta, d, EDGE))
-    blocked = 1 - filters.seen_share(means, to(d) - bias, terms)
-    if blocked < soft_shadow.NOTHING:
-        return 1.0
-    z = min(max(back(filters.blocker_sum(means, to(d) - bias, terms) / blocked), EDGE), d)
-    return min(max(filters.seen_share(means_of(point, filter_angle(delta, d, z)), to(d) - bias, terms), 0.0), 1.0)
+
+    def mean(angle):
+        return means_of(point, angle)[None, :, None, None]
+
+    shaded, z_avg, _, t = val_series.csm_penumbra(
+        np.reshape(point, (3, 1, 1)), np.zeros((1, 3)), np.eye(3)[None], np.array([delta]), np.array([EDGE]),
+        *depths(terms, scale), weight, bias, np.ones((1, 1, 1), bool), mean(filter_angle(delta, d, EDGE)),
+        scale == "log_map")
+    z = z_avg[0, 0, 0] if shaded.all() else d
+    return val_series.csm(shaded, t, mean(filter_angle(delta, d, z))[:, : 2 * terms], weight, bias)[0, 0, 0]
+
+
+def depths(terms, scale):
+    """Return origin, slope and end of the series' depths."""
+    end = val_series.series(terms)[2]
+    return *val_maps.depth_scale(np.array([EDGE]), np.array([FARTHEST]), np.array([FARTHEST]), end, scale), end
 
 
 def channels(depth, terms, scale):
     """Return S, C, SZ, CZ and Z of depths, (4 M + 1, ...)."""
-    bias = soft_shadow.first_one(terms)
-    to, _ = soft_shadow.scales([[EDGE, FARTHEST]], scale, FARTHEST, bias, bias)
-    z = np.vectorize(to)(np.minimum(depth, 1e9))
-    waves = [wave(filters.frequency(k) * z) for wave in (np.sin, np.cos) for k in range(1, terms + 1)]
-    return np.stack([*waves, *(z * wave for wave in waves), z])
+    sheet = np.atleast_2d(np.minimum(depth, 1e9))[None]
+    t = val_series.series_depth(sheet, *depths(terms, scale), scale == "log_map")
+    return val_maps.basis(t, terms, False)[0].reshape(-1, *np.shape(depth))
 
 
 def over_the_disc(edge, terms, scale):
@@ -108,8 +121,9 @@ def from_levels(edge, terms, scale, n):
     """Return what reads levels of half the disc's diameter between texels."""
     grid = (np.arange(n) + 0.5) * 2 / n - 1
     texels = channels(radial_depth(*np.meshgrid(grid, grid), edge), terms, scale)
-    levels = filters.mip_levels(np.moveaxis(texels, 0, -1))
-    return lambda point, angle: filters.trilinear(levels, *soft_shadow.cone_disc(*point, angle), shift=-1.0)
+    levels = [texels[None], *val_filters.mip_levels(texels[None])]
+    return lambda point, angle: val_filters.mip_means(np.ones((1, 1, 1), bool), region(point, angle), terms, True,
+                                                      levels)[0, :, 0, 0]
 
 
 def chain(delta, edge, points, facing, resolution, **settings):

@@ -1,5 +1,6 @@
 """Rays to a rectangle and its map projected back: what counts, what does not, and how the two agree."""
 
+from types import SimpleNamespace
 
 import numba
 import numpy as np
@@ -12,22 +13,22 @@ from refgi.cluster.maps.shadow_maps import shadow_maps
 from refgi.cluster.reference import back_projection_visibility, rectangle_visibility, reference_visibility
 from refgi.cluster.reference.rays import rectangle_points
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.pcf import SLACK
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
+from refgi.literal.val_back_projection import CELLS
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from tests.cluster.reference.edge import SETTINGS as EDGE
 from tests.cluster.reference.edge import receivers, square_light
 from tests.cluster.reference.edge import scene as edge_scene
-from tests.naive import back_projection as naive
+from tests.literal.shadows import Seen, projected
 from tests.naive import truth
 
 # nothing near six large clusters, so that rays to a rectangle and one view from its centre meet the same surfaces
 SETTINGS = of(ValSettings, lights=200, clusters_count=6, maps_resolution=128, near_geometry="planes", near_distance=1.0)
 PAIRS = 150
-RECEIVERS = 10  # of each area light, against the twin
+RECEIVERS = 10  # of each area light, against the literal text
 TIES = 1.5 / 32**2  # a point on a patch's side, to rounding
 # rms and mean over area lights and pixels: one view from the centre misses what hides behind the nearest surface, and
 # patches are a texel of 128 wide; measured 0.042 and -0.011
@@ -76,23 +77,21 @@ def test_one_point_of_the_rectangle_is_a_ray_against_every_triangle(box, evidenc
 
 @pytest.mark.feature("REF-15")
 @pytest.mark.parametrize("size", [17, 40])
-def test_the_map_projected_back_hides_the_points_that_the_twin_hides(box, size, evidence):
-    """Twin: each of 32 x 32 points of the rectangle against each patch of the map, in world space."""
+def test_the_map_projected_back_hides_the_points_that_the_literal_text_hides(box, size, evidence):
     frame, _, areas, points, facing = box
     maps = shadow_maps(frame.scene.geometry, areas, replaced(SETTINGS, {"maps_resolution": size}).maps, np.float64)
     given, off, found = back_projection_visibility(areas, maps), [], []
     for m in np.flatnonzero(maps.map_of >= 0):
         k, ahead = maps.map_of[m], np.flatnonzero(height_above(areas, m, points) > 0)
-        middle = areas.center[:, m] + areas.offset[:, m] @ areas.axes[m]
-        for i in np.random.default_rng(m).choice(ahead, RECEIVERS):
-            expected = naive.visible(maps.depth[k], maps.frame[k], maps.center[k], middle,
-                                     areas.axes[m] * areas.side[:, m, None], areas.normal[:, m], points[:, i],
-                                     facing[:, i], SLACK)
-            found.append(given(m, points[:, i : i + 1], facing[:, i : i + 1])[0])
-            off.append(found[-1] - expected)
+        some = np.random.default_rng(m).choice(ahead, RECEIVERS)
+        seen = Seen(maps.center[k], maps.frame[k], maps.depth[k], maps.scene_far[k])
+        area = SimpleNamespace(axes=areas.axes[m], side=areas.side[:, m], offset=areas.offset[:, m],
+                               center=areas.center[:, m])
+        found += list(given(m, points[:, some], facing[:, some]))
+        off += list(found[-RECEIVERS:] - projected(seen, area, points[:, some], facing[:, some]))
     partly = np.count_nonzero((np.array(found) > 0) & (np.array(found) < 1))
     evidence(f"map of {size}^2: {len(off)} receivers, {partly} of them in a penumbra: V at most "
-             f"{np.abs(off).max() * naive.CELLS**2:.1f} of {naive.CELLS**2} points off the twin")
+             f"{np.abs(off).max() * CELLS**2:.1f} of {CELLS**2} points off the literal text")
     assert partly > RECEIVERS
     assert np.abs(off).max() < TIES
 

@@ -1,4 +1,4 @@
-"""Soft shadows by filtered series: the chain against its literal twin, its limits and its failures."""
+"""Soft shadows by filtered series: the chain against its literal text, its limits and its failures."""
 
 from typing import NamedTuple
 
@@ -35,7 +35,8 @@ from tests.cluster.visibility.plates import (
     shadow_by_summed_areas,
     square_share,
 )
-from tests.naive import soft_shadow as naive
+from tests.literal.shadows import at_origin
+from tests.literal.shadows import shadow as literal_shadow
 
 ROUNDING = 1e-10  # float64 sums over discs of some hundred texels, in another order
 PLATES = [(-0.6, -0.1, -0.3, 0.3, 1.0), (0.1, 0.6, -0.3, 0.3, 1.0)]
@@ -60,17 +61,16 @@ def shadow(areas, maps, points, normals, **settings):
 @pytest.mark.feature("VAL-12")
 @pytest.mark.parametrize("scale", ["log_map", "map", "scene"])
 @pytest.mark.parametrize("terms", [1, 4, 9])
-def test_chain_is_its_literal_twin(terms, scale):
+def test_chain_is_its_literal_text(terms, scale):
     depth = map_of_plates(24, PLATES, 3.0)
     points, normals = on_plane(3.0, 2.2, 7)
     for delta in (0.2, 1.0):
         areas, maps = lit_by(depth, delta, FAR)
-        got = shadow(areas, maps, points, normals, prefilter="brute", terms=terms, depth_scale=scale)
-        expected = [naive.series_shadow(depth.tolist(), p, delta, FAR, terms, kind=scale)[0] for p in points.T]
-        assert np.abs(got - expected).max() < ROUNDING
-    got = shadow(areas, maps, points, normals, prefilter="brute", terms=terms, bias=0.2, depth_scale=scale)
-    expected = [naive.series_shadow(depth.tolist(), p, 1.0, FAR, terms, 0.2, scale)[0] for p in points.T]
-    assert np.abs(got - expected).max() < ROUNDING
+        for prefilter, bias in (("brute", None), ("brute", 0.2), ("mip", None)):
+            how = {"prefilter": prefilter, "terms": terms, "depth_scale": scale, "bias": bias}
+            got = shadow(areas, maps, points, normals, **how)
+            expected, _ = literal_shadow(of(ValSettings, **how), at_origin(depth, FAR), delta, points, normals)
+            assert np.abs(got - expected).max() < ROUNDING
 
 
 def mixture(terms, *parts):

@@ -16,9 +16,9 @@ from refgi.cluster.visibility.kernel_size import (
     published_tangent,
     solid_angle_tangent,
 )
+from refgi.literal import val_series, val_visibility
 from refgi.settings import of
 from tests.cluster.visibility.plates import directions, lit_by
-from tests.naive import soft_shadow as naive
 
 EXACT = 2e-15
 CENTS = 0.005  # half of the last digit of the known ratios
@@ -34,7 +34,9 @@ WIDTH = 0.002
 def test_cone_is_a_disc(theta, a):
     x, y, z = 3 * math.sin(theta) * 0.6, 3 * math.sin(theta) * 0.8, 3 * math.cos(theta)
     found = disc(x, y, z, 3.0, math.tan(a))
-    assert found == pytest.approx(naive.cone_disc(x, y, z, a), abs=EXACT * 10)
+    one = np.ones((1, 1, 1))
+    literal = val_visibility.disc(np.array([x, y, z]).reshape(3, 1, 1, 1), 3 * one, a * one)
+    assert found == pytest.approx(literal[0, :, 0, 0], abs=EXACT * 10)
     axis, phi = np.array([x, y, z]) / 3, np.linspace(0, 6, 7)
     right = np.cross(axis, [0.8, -0.6, 0.0])
     rim = math.cos(a) * axis[:, None] + math.sin(a) * (
@@ -93,10 +95,10 @@ def penumbra(theta, *published):
 
 def of_the_series(share):
     """Return V of four terms where a share of the filter is free, all at FAR, and NEAR hides the rest."""
-    bias = naive.first_one(4)
-    to, _ = naive.scales([[NEAR, FAR]], "log_map", FAR, bias, bias)
-    left = naive.step_series(to(FAR) - bias, to(NEAR), 4)
-    return np.where((1 - share) * (1 - left) < naive.NOTHING, 1, np.clip(left + (1 - left) * share, 0, 1))
+    weight, bias, end = val_series.series(4)
+    apart = max(2 * end[0] - 1, end[0] / 2)  # of the farthest from the nearest
+    left = 0.5 + val_series.above_half(bias[1] - apart, weight)
+    return np.where((1 - share) * (1 - left) < val_series.LEAST_BLOCKED, 1, np.clip(left + (1 - left) * share, 0, 1))
 
 
 def width_of(v, turn):

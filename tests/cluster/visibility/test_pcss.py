@@ -1,4 +1,4 @@
-"""Percentage closer soft shadows: against plain loops, against area sampling, and the depth test they need."""
+"""Percentage closer soft shadows: against the literal text, area sampling, and the depth test they need."""
 
 import math
 
@@ -27,7 +27,8 @@ from tests.cluster.visibility.plates import (
     shadow_by_summed_areas,
     square_share,
 )
-from tests.naive import soft_shadow as naive
+from tests.literal.shadows import at_origin
+from tests.literal.shadows import shadow as literal_shadow
 
 ROUNDING = 1e-13  # a count over a count
 PLATES = [(-0.6, -0.1, -0.3, 0.3, 1.0), (0.1, 0.6, -0.3, 0.3, 1.0)]
@@ -49,7 +50,7 @@ def shadow(areas, maps, points, normals, **settings):
 @pytest.mark.parametrize("axial", [True, False])
 @pytest.mark.parametrize("plane", [True, False])
 @pytest.mark.parametrize("cone", [True, False])
-def test_pcss_is_its_literal_twin(plane, cone, axial):
+def test_pcss_is_its_literal_text(plane, cone, axial):
     slope = np.array([0.3, -0.2, 1.0]) / np.linalg.norm([0.3, -0.2, 1.0])
     depth = map_of_plates(24, PLATES, 2.8, slope)
     points, normals = on_plane(3.0, 2.2, 7)
@@ -60,7 +61,7 @@ def test_pcss_is_its_literal_twin(plane, cone, axial):
         kind = {"visibility": "pcss", "cone": cone, "constant_bias": None if plane else ConstantBias(),
                 "blocker_depth": "axial" if axial else "distance"}
         got = shadow(areas, maps, points, normals, **kind)
-        expected = [naive.step_shadow(depth.tolist(), p, -slope, delta, cone, plane, axial)[0] for p in points.T]
+        expected, _ = literal_shadow(of(ValSettings, **kind), at_origin(depth, FAR), delta, points, normals)
         assert np.abs(got - expected).max() < ROUNDING
         assert np.array_equal(
             got, shadow(areas, maps, points, -normals, **kind))
@@ -77,14 +78,14 @@ def test_mean_depth_is_that_of_the_blockers(evidence):
     chosen, test = filter_sizing(settings), blocker_test(settings.visibility, METRES)
     count = find_search_regions(constants, chosen, points, 25, np.ones(25, np.bool_), pending, visible, scratch)
     compare_texels(PcssShadow(constants, chosen, test, depth), normals, 25, pending, visible, scratch)
-    expected = [naive.step_shadow(depth.tolist(), p, (0, 0, -1), 0.3, cone=False) for p in points.T]
-    found = [k for k in range(25) if expected[k][1] is not None]
+    v, z_avg = literal_shadow(settings, at_origin(depth, 2.0), 0.3, points, normals)
+    found = np.flatnonzero(z_avg)
     assert count == 25
     assert len(found) > 5
-    assert np.allclose(scratch[DEPTH, found], [expected[k][1] for k in found], rtol=1e-14)
-    assert np.allclose(visible, [v for v, _ in expected], atol=ROUNDING)
+    assert np.allclose(scratch[DEPTH, found], z_avg[found], rtol=1e-14)
+    assert np.allclose(visible, v, atol=ROUNDING)
     means = scratch[DEPTH, found]
-    evidence(f"z_avg of blockers at 0.3 before 0.7: {means.min():.3f} .. {means.max():.3f}, as the plain loop's")
+    evidence(f"z_avg of blockers at 0.3 before 0.7: {means.min():.3f} .. {means.max():.3f}, as the literal text's")
 
 
 def table(delta):

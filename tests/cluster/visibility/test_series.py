@@ -7,7 +7,7 @@ import pytest
 
 from refgi.cluster.settings import Csm
 from refgi.cluster.visibility.series import above_half, first_lit, plateau, series, weights
-from tests.naive import soft_shadow as naive
+from refgi.literal import val_series as literal
 
 EXACT = 1e-13  # sums of up to 64 sines in another order
 PRINTED = 5.1e-5  # half of the last digit of the known crossings, and rounding
@@ -20,7 +20,7 @@ LEAST = 0.84  # of the way to the top: the undershoot of two terms, the deepest,
 def test_series_is_the_sum_of_sines(terms):
     differences = np.linspace(-1.2, 1.2, 49)
     for attenuation in (0.0, 1.0):
-        expected = [naive.step_series(0.0, u, terms, attenuation) - 0.5 for u in differences]
+        expected = literal.above_half(differences, literal.weights(terms, attenuation))
         assert np.abs(above_half(differences, weights(terms, attenuation)) - expected).max() < EXACT
 
 
@@ -48,7 +48,7 @@ def test_bias_is_the_first_crossing_of_one(evidence):
     found = {terms: first_lit(weights(terms)) for terms in (4, 8, 16)}
     for terms, known in ((4, 0.0763), (8, 0.0383), (16, 0.0192)):
         assert found[terms] == pytest.approx(known, abs=PRINTED)
-        assert found[terms] == pytest.approx(naive.first_one(terms), abs=1e-12)
+        assert found[terms] == pytest.approx(literal.first_lit(literal.weights(terms, 0.0)), abs=1e-12)
         assert series(Csm(terms=terms)).bias == found[terms]
     evidence("b* = " + ", ".join(f"{b:.4f} (M = {m})" for m, b in found.items()))
 

@@ -12,11 +12,10 @@ import pytest
 from refgi.frame import Frame
 from refgi.pairs.settings import PairSettings
 from refgi.splat import multires
-from refgi.splat.multires.subsplats.upsample import black_level, filled_cells
-from refgi.vectors.bugs.upsample import tent
 from refgi.vectors.cases.multires import FULL_PLANS, QUICK_PLANS, settings_of
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import outputs_of
 from refgi.vectors.stages.lights import pixel_lights_of
-from refgi.vectors.stages.multires_list import subsplats_of
 from tests.naive import multires as twin
 from tests.naive import per_light, refinement, upsample
 from tests.naive.crossings import LIFT, corners_of, face_normals, free
@@ -25,6 +24,7 @@ from tests.vectors.splat_ports import LARGEST_MASK, expect_within, made, masked_
 
 PLANS = QUICK_PLANS | FULL_PLANS
 STORED = 2e-6  # of the picture's largest value: each of a dozen stages rounds its outputs to float32
+ROUNDING = 1e-6  # of float64 results that are stored as float32
 SUBSPLATS = "multires.level", "multires.row", "multires.column"
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")
@@ -316,17 +316,10 @@ def test_rounding_decides_few_elements(id):
 
 
 @pytest.mark.parametrize("id", PLANS)
-def test_the_tent_that_bugs_are_put_into_has_none_of_its_own(id):
-    settings, known, view, top = of(id)
-    if settings.subsplats.upsampling != "tent" or "multires.first" in known:  # of all lights at once
-        return
-    subsplats, light = subsplats_of(known, top), known["multires.irradiance"].astype(np.float64)
-    for level, filled in enumerate(filled_cells(view.covered, top)):
-        layer, here = np.zeros((3, *filled.shape)), subsplats.level == level
-        layer[:, subsplats.row[here], subsplats.column[here]] = light[:, here]
-        coarse = black_level(filled, np.float64) if level == top else (
-            known[f"multires.upsampled.{level + 1}"], known[f"multires.known.{level + 1}"])
-        made_here = tent(layer, subsplats.leaf[level], coarse, filled, every="ams_filter_all" in settings.as_published,
-                         corner="ams_all_corners" not in settings.as_published)
-        expect_within(id, f"multires.upsample.{level}", dict(zip(
-            (f"multires.upsampled.{level}", f"multires.known.{level}"), made_here, strict=True)))
+def test_the_literal_text_is_the_stage(id):
+    case, known = made(id)
+    for step in case.stages:
+        for form in (one for one in step.variants if isinstance(one, Form) and step.name.startswith("multires")):
+            for name, got in outputs_of(step, known, np.float64, form).items():
+                scale = np.abs(known[name][np.isfinite(known[name])]).max(initial=0)
+                np.testing.assert_allclose(got, known[name], rtol=ROUNDING, atol=ROUNDING * scale, err_msg=name)

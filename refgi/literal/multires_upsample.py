@@ -64,6 +64,7 @@ def upsample_level(
     shown = of_cells(lambda cell: cell.any(), triangle_id >= 0, at)
     own, leaf = layer(level, row, column, irradiance, at, shown.shape)
     if coarse is None:
+        filter_all = filter_all and mode == "tent"  # the demo's coarsest level is its layer as it is
         coarse, coarse_known = np.zeros((3, *grid(shown.shape, 1)), own.dtype), np.zeros(grid(shown.shape, 1), bool)
     i, j = np.indices(shown.shape) // 2  # a cell lies in cell i / 2, j / 2 of the level above
     inherited = coarse_known[i, j] & shown

@@ -122,7 +122,7 @@ def demo(own: Any, leaf: Any, coarse: Any, coarse_known: Any) -> Any:
     total, weights = np.zeros_like(own), np.zeros(leaf.shape, own.dtype)
     for y, x in np.ndindex(3, 3):
         counts = known[y, x] & (known[y, 1] | known[1, x] | (y == 1) | (x == 1))
-        w = (1 - down, 1, down)[y] * (1 - across, 1, across)[x] * counts
+        w = ((1 - down, 1, down)[y] * (1 - across, 1, across)[x] * counts).astype(own.dtype)
         total = total + w * taps[y, x]
         weights = weights + w
     return np.divide(total, weights, out=np.zeros_like(total), where=weights > 0)

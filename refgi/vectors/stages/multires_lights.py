@@ -86,8 +86,7 @@ def _add_samples(recipe: Recipe, pairs: PairSettings, top: int) -> None:
 
     form = LevelForm(literal.samples, {"position": RECEIVERS[0], "normal": RECEIVERS[1],
                                        **light_parameters(recipe, bool(area))}, names, {}, {"pixels": places})
-    bugs = [one for one in pair_bugs(form, recipe, bool(area))
-            if not any(word in one.cause for word in SINGLE)]
+    bugs = [one for one in pair_bugs(form, recipe, bool(area)) if not any(word in one.cause for word in SINGLE)]
     recipe.add("multires.samples", "irradiance of each light at the representative of every cell", run,
                (*RECEIVERS, *lights, *area, *places), {name: Spec(
                    "light, rgb, row, column", "W/m^2", "its irradiance; 0 without surface", "linear RGB", EQ2)
@@ -97,7 +96,6 @@ def _add_samples(recipe: Recipe, pairs: PairSettings, top: int) -> None:
 
 def _add_splits(recipe: Recipe, settings: ByIrradiance, top: int) -> None:
     names = _names("split", top, 1)
-
     form = LevelForm(literal.splits, {}, names, {"finest": settings.finest, "threshold": settings.threshold,
                                                  "relative": settings.form == "relative"},
                      {"pixels": _names("representative", top), "sampled": _names("sample", top)})
@@ -113,7 +111,6 @@ def _add_splits(recipe: Recipe, settings: ByIrradiance, top: int) -> None:
 
 def _add_leaves(recipe: Recipe, top: int) -> None:
     reads = (*_names("representative", top), *_names("sample", top), *_names("split", top, 1))
-
     form = LevelForm(literal.lists, {}, (FIRST, *SUBSPLATS[:3], LIGHT), {}, {
         "pixels": _names("representative", top), "sampled": _names("sample", top),
         "split_levels": _names("split", top, 1)})
@@ -129,7 +126,6 @@ def _add_leaves(recipe: Recipe, top: int) -> None:
 
 def _add_picture(recipe: Recipe, settings: ByIrradiance, top: int, filter_all: bool, corner: bool) -> None:
     name = "multires.upsampled.0"
-
     form = Form(enlarging.sum_of_pictures, {**LIST, "first": FIRST}, (name,), {
         "top": top, "mode": settings.upsampling, "filter_all": filter_all, "corner_rule": corner})
 

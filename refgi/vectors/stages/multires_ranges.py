@@ -38,8 +38,12 @@ class LevelForm(Form):
     def by(self, function: Callable[..., Any], arrays: Arrays) -> Arrays:
         """Return what the stage writes with another function, such as an edited one."""
         lists = {name: [arrays[one] for one in names] for name, names in self.levels.items()}
-        made = function(**{name: arrays[one] for name, one in self.reads.items()}, **lists, **self.numbers)
-        return dict(zip(self.writes, made, strict=True))
+
+        def of_levels(**others: Any) -> Any:
+            made = function(**others, **lists)
+            return made if len(self.writes) > 1 else made[0]
+
+        return super().by(of_levels, arrays)
 
 
 def covered_of(arrays: Arrays) -> Array:
@@ -56,7 +60,6 @@ def add_ranges(recipe: Recipe, what: str, top: int, rim: int, components: int) -
     """Add least and largest depths or normals (`what`) of levels 1 to `top`."""
     source = f"gbuffer.{what}"
     lows, highs = of_levels(f"{what}_least", top), of_levels(f"{what}_largest", top)
-
     components_of = {} if what == "depth" else {"components": components}
     form = LevelForm(literal.depth_ranges if what == "depth" else literal.normal_ranges,
                      {what: source, "triangle_id": IDS}, (*lows, *highs), {"top": top, "rim": rim, **components_of})
@@ -81,7 +84,6 @@ def add_ranges(recipe: Recipe, what: str, top: int, rim: int, components: int) -
 def add_slopes(recipe: Recipe, top: int, relative: bool) -> None:
     """Add the steepest change of depth of levels 1 to `top`."""
     names = of_levels("slope", top)
-
     form = LevelForm(literal.slopes, {"depth": "gbuffer.depth", "triangle_id": IDS}, names,
                      {"top": top, "relative": relative})
 
@@ -100,7 +102,6 @@ def add_slopes(recipe: Recipe, top: int, relative: bool) -> None:
 def add_curvatures(recipe: Recipe, top: int, rate: bool) -> None:
     """Add the largest chord between neighbouring normals of levels 1 to `top`."""
     names = of_levels("curvature", top)
-
     form = LevelForm(literal.curvatures, {
         "normal": "gbuffer.normal", "position": "gbuffer.position", "triangle_id": IDS}, names,
         {"top": top, "rate": rate})

@@ -148,7 +148,7 @@ class Frame:
 
         parts = [direct_irradiance(self.gbuffer, light, self._visible_from_light(index))
                  for index, light in enumerate(self.scene.lights)]
-        return parts[0] if len(parts) == 1 else np.asarray(sum(parts[1:], start=parts[0]))
+        return parts[0] if len(parts) == 1 else sum_of_lamps(parts)
 
     @cached_property
     def glossy_receivers(self) -> bool:
@@ -174,9 +174,9 @@ class Frame:
         from refgi.rsm.buffers.glossy import direct_lobes, spread_over_picture
 
         points = self.glossy_points
-        total = np.zeros_like(points.position)
-        for index, light in enumerate(self.scene.lights):
-            total += direct_lobes(points, light, self._visible_from_light(index))
+        parts = [direct_lobes(points, light, self._visible_from_light(index))
+                 for index, light in enumerate(self.scene.lights)]
+        total = parts[0] if len(parts) == 1 else sum_of_lamps(parts)
         return spread_over_picture(points, total, (self.height, self.width))
 
     @property
@@ -219,6 +219,23 @@ class Frame:
                                          interpolated=buffer.facing is not buffer.normal)
         visible: Array = self.tracer.visible_from_light(buffer.position, buffer.facing, buffer.covered, light)
         return visible
+
+
+@stage("frame.sum_of_lamps")
+def sum_of_lamps(parts: list[Array]) -> Array:
+    """Add up what receivers have of each lamp.
+
+    Parameters
+    ----------
+    parts : list of (3, ...) ndarray
+        Irradiance, W/m^2, or radiance of lobes, W/m^2/sr; one a lamp.
+
+    Returns
+    -------
+    (3, ...) ndarray
+        Their sum.
+    """
+    return np.asarray(sum(parts[1:], start=parts[0]))
 
 
 @stage("frame.compose")

@@ -40,6 +40,8 @@ class Run:
     reason: str = ""
     inputs: Mapping[str, Any] | None = None  # by parameter, defaults among them; kept only when recording
     output: Any = None
+    arguments: Mapping[str, Any] | None = None  # the inputs as the stage was handed them, kept likewise
+    value: Any = None  # the output as the stage returned it
 
 
 @dataclasses.dataclass
@@ -296,7 +298,9 @@ def _observed(
         log.progress(name, 1.0)
     run = Run(name, "ran", seconds, log._depth)
     if log.record:
-        run = dataclasses.replace(run, inputs=_inputs(function, args, kwargs), output=_recorded(output))
+        arguments = _arguments(function, args, kwargs)
+        run = dataclasses.replace(run, inputs={name: recorded(value) for name, value in arguments.items()},
+                                  output=recorded(output), arguments=arguments, value=output)
     log.runs.insert(position, run)
     if memory is not None:
         memory.keep(name, inputs, output)
@@ -322,17 +326,17 @@ def _bytes_made(value: Any, known: dict[int, weakref.ref[Any]]) -> int:
     return sum(_bytes_made(one, known) for one in value)
 
 
-def _inputs(function: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:
+def _arguments(function: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:
     """Return what a stage was called with, by parameter."""
     bound = inspect.signature(function).bind(*args, **kwargs)
     bound.apply_defaults()
-    return {name: _recorded(value) for name, value in bound.arguments.items()}
+    return dict(bound.arguments)
 
 
-def _recorded(value: Any) -> Any:
+def recorded(value: Any) -> Any:
     """Return a value as a log keeps it: what computes its arrays on first use gives them all, unobserved."""
     if type(value) in (tuple, list):
-        return type(value)(map(_recorded, value))
+        return type(value)(map(recorded, value))
     if not hasattr(value, "recorded"):
         return value
     token = _log.set(None)

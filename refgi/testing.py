@@ -1,13 +1,14 @@
 """For pytest suites of ports: assertions on stages and pictures, and kits made once.
 
 `assert_stage_close(my_flux, "sii-warp-a", "rsm0.flux")` judges one array by the quick kit, which is made on first use;
+`stages(scene, "val", folder=...)` gives the arrays of every stage of any scene and settings;
 `pytest_plugins = ["refgi.testing"]` in a conftest.py gives the fixture `refgi_kit`.
 """
 
 import functools
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,7 @@ import numpy.typing as npt
 from refgi.errors import InputError
 
 if TYPE_CHECKING:
+    from refgi.scene import Scene
     from refgi.vectors.check import Kit
 
 Array = npt.NDArray[Any]
@@ -90,6 +92,88 @@ def assert_stage_close(
         from refgi.vectors.words import story
 
         raise AssertionError("\n".join(story(verdict)))
+
+
+class StageData(Mapping[str, Array]):
+    """Arrays of every stage of a method on a scene, by name, as `stages` makes them.
+
+    Parameters
+    ----------
+    kit : Kit
+        A kit of one case.
+    """
+
+    def __init__(self, kit: "Kit") -> None:
+        from refgi.vectors.kit import Asked
+
+        self.kit = kit
+        self.case, = kit.cases(Asked())
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self.case.arrays:
+            raise KeyError(name)
+        return self.kit.array(self.case, name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.case.arrays)
+
+    def __len__(self) -> int:
+        return len(self.case.arrays)
+
+    def assert_close(self, got: npt.ArrayLike, name: str, *, tier: str = "T1") -> None:
+        """Assert that an array of a port is what it should be, as `assert_stage_close` does.
+
+        Parameters
+        ----------
+        got : array_like
+            What the port has.
+        name : str
+            Name of an array, such as "pairs.sum".
+        tier : {"T0", "T1", "T2", "T2B"}
+            As for `assert_stage_close`.
+
+        Raises
+        ------
+        AssertionError
+            If it is not.
+        """
+        assert_stage_close(got, self.case.id, name, tier=tier, kit=self.kit)
+
+
+def stages(
+    scene: "Scene | str | Path", method: str = "sii", settings: Any = None, *, folder: str | Path, only: str = "",
+    **options: Any,
+) -> StageData:
+    """Return what every stage of a method reads and writes on a scene, with the bounds of a port's arrays.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene, or what `refgi.scene.load_scene` takes.
+    method : str
+        Short name of the method.
+    settings : object, optional
+        Its settings; its defaults where absent.
+    folder : str or Path
+        Where the arrays are written: a kit, such as below pytest's `tmp_path_factory`.
+    only : str
+        Start of the names of stages to keep; all where empty.
+    **options : object
+        As of `refgi.methods.render`: width, height, rsm_resolution, shadows.
+
+    Returns
+    -------
+    StageData
+        Arrays by name.
+    """
+    from refgi.scene import load_scene
+    from refgi.vectors.check import Kit
+    from refgi.vectors.export import export_case
+    from refgi.vectors.recorded import recorded_case
+
+    loaded = load_scene(scene) if isinstance(scene, str | Path) else scene
+    export_case(recorded_case(method, loaded, method, settings, only=only, **options), Path(folder))
+    return StageData(Kit(Path(folder)))
 
 
 def assert_image_close(

@@ -1,15 +1,19 @@
 """`refgi vectors`: stage-by-stage test vectors for ports, and the check of a port's arrays against them."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
-from refgi.cli.options import speech
+from refgi.cli.options import seen, shadows, speech
 from refgi.cli.session import Session, progress, say, table
+from refgi.cli.settings import preset
 
 if TYPE_CHECKING:
-    from refgi.vectors.manifest import Result, StageVerdict
+    from refgi.vectors.manifest import KitManifest, Result, StageVerdict
+
+SMALL, MAP = (64, 48), 64  # size of a picture and side of a light's map, where nothing is said
 
 
 @click.group("vectors")
@@ -18,21 +22,69 @@ def command() -> None:
 
 
 @command.command("export")
-@click.option("--kit", default="quick", show_default=True, type=click.Choice(["quick", "full"]), help="Which cases.")
+@click.argument("scene", required=False)
+@click.option("--kit", type=click.Choice(["quick", "full"]), help="Ready cases, where no SCENE is named.  [quick]")
+@click.option("--case", help="Of a kit: only cases whose id begins so.")
+@click.option("--method", default="sii", show_default=True, help="Of SCENE: short name of a method.")
+@preset
+@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
+@seen
+@shadows("auto")
+@click.option("--rsm-resolution", type=click.IntRange(1, 16384), default=MAP, show_default=True,
+              help="Texels along a side of a light's map.")
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Which random numbers, where a method has any.")
+@click.option("--stage", default="", metavar="NAME", help="Of SCENE: only stages whose name begins so.")
+@click.option("--most", type=click.FloatRange(min=0, min_open=True), default=50.0, show_default=True, metavar="MB",
+              help="Of SCENE: refuse what would take more.")
 @click.option("--out", required=True, help="Folder of the kit; a kit there is replaced.")
-@click.option("--case", help="Only cases whose id begins so.")
 @speech
-@click.pass_obj
-def _export(session: Session, /, kit: str, out: str, case: str | None) -> None:
-    """Write a kit: arrays of every stage, bounds, likely bugs, scenes, schemas, and how to read them."""
-    from refgi.vectors.export import export_kit
+@click.pass_context
+def _export(ctx: click.Context, /, **options: Any) -> None:
+    """Write arrays of every stage, bounds, likely bugs, scene, schemas, and how to read them.
 
+    Of SCENE by a method with its settings, at 64x48 pixels unless --size says otherwise; without SCENE a kit of ready
+    cases of all methods.
+    """
+    session, out = ctx.ensure_object(Session), Path(options["out"])
     with progress() as tell:
-        made = export_kit(kit, Path(out), tell, case)
-    size = sum(file.stat().st_size for file in Path(out).rglob("*") if file.is_file())
+        made = _of_kit(ctx, options, out, tell) if options["scene"] is None else _of_scene(options, out, tell)
+    size = sum(file.stat().st_size for file in out.rglob("*") if file.is_file())
     rows = [("case", "what it holds"), *((entry.id, entry.what) for entry in made.cases)]
     session.result(f"{table(rows)}\n{out}: {len(made.cases)} cases, {size / 1e6:.1f} MB, vectors {made.vectors}",
-                   {"kit": kit, "vectors": made.vectors, "cases": [entry.id for entry in made.cases], "bytes": size})
+                   {"kit": made.kit, "vectors": made.vectors, "cases": [entry.id for entry in made.cases],
+                    "bytes": size})
+
+
+def _of_kit(ctx: click.Context, options: dict[str, Any], out: Path, tell: Any) -> "KitManifest":
+    from refgi.vectors.export import export_kit
+
+    for parameter in ctx.command.params:
+        asked = ctx.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
+        if asked and parameter.name not in ("kit", "case", "out", "debug", "as_json", "json"):
+            raise click.UsageError(f"{parameter.opts[0]}: expected a SCENE, which it is said of, got none", ctx)
+    return export_kit(options["kit"] or "quick", out, tell, options["case"])
+
+
+def _of_scene(options: dict[str, Any], out: Path, tell: Any) -> "KitManifest":
+    import dataclasses
+
+    from refgi.cli.job import stem
+    from refgi.cli.settings import settings_for
+    from refgi.cli.view import View
+    from refgi.vectors.export import export_case
+    from refgi.vectors.recorded import recorded_case
+
+    if options["kit"] is not None or options["case"] is not None:
+        raise click.UsageError("--kit and --case say which ready cases; they take no SCENE")
+    method = options["method"]
+    settings = settings_for(method, options["pairs"], options["seed"], options["preset"])
+    options["size"] = options["size"] or SMALL
+    scene = View(**{field.name: options[field.name] for field in dataclasses.fields(View)}).load()
+    tell(f"{method} of {scene.name}", 0.0)
+    case = recorded_case(f"{method}-{stem(options['scene'])}", scene, method, settings, only=options["stage"],
+                         what=f"{method} of {scene.name}", rsm_resolution=options["rsm_resolution"],
+                         shadows=options["shadows"])
+    return export_case(case, out, tell, options["most"] * 1e6)
 
 
 @command.command("check")
@@ -44,7 +96,7 @@ def _export(session: Session, /, kit: str, out: str, case: str | None) -> None:
 @click.option("--tier", "tiers", multiple=True, metavar="[STAGE=]TIER",
               help="T0 equal, T1 float32 rounding, T2 storage in half floats, T2B in 8 bits; repeatable.")
 @click.option("--search", "seconds", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
-              help="Try single changes of refgi's own source on the first wrong stage, for so long.")
+              help="Try single changes of the first wrong stage's literal text, for so long.")
 @click.option("--json", "json_file", metavar="FILE", help="Write the verdicts as JSON.")
 @click.option("--html", "html_file", metavar="FILE", help="Write a page with the arrays side by side.")
 def _check(

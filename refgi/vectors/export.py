@@ -6,9 +6,11 @@ the last bit on the platform's libm where a stage uses it.
 
 import hashlib
 import io
+import math
 import secrets
 import shutil
 from collections.abc import Callable, Mapping
+from functools import partial
 from importlib import resources
 from pathlib import Path
 
@@ -33,11 +35,12 @@ from refgi.vectors.manifest import (
     schema_text,
     text_of,
 )
-from refgi.vectors.scenefile import write_scene
-from refgi.vectors.spec import Array, Arrays, Bug, Case, Stage, expected_of, kind_of, outputs_of
+from refgi.vectors.scenefile import is_plain, write_scene
+from refgi.vectors.spec import Array, Arrays, Bug, Case, Stage, expected_of, kind_of, outputs_of, stored
 
 SEED = 20090101  # of the changes that bounds are measured by
 TOLD_BY, BESIDE = 96, 32  # elements of a likely bug that are kept: those that tell it, and others
+PARTS = 2  # of the bytes of an array that it takes with its bounds
 TOLD_IN = 3  # cases of a method that tell a likely bug: it is tried in no further ones
 ISOLATED = "float32 runs and 4 float64 runs on inputs changed by up to 2 roundings of float32, x 4; plus rounding"
 CHAINED = "4 float64 runs, the inputs of every stage changed by up to 2 roundings of float32, x 4"
@@ -70,10 +73,49 @@ def export_kit(kit: str, out: Path, tell: Tell = lambda _, __: None, only: str |
     InputError
         If the folder holds something else, a likely bug is told by no case of the kit, or the disk is full.
     """
-    from refgi.provenance import program
-
     cases = {name: make for name, make in kit_cases(kit).items() if only is None or name.startswith(only)}
     expect(bool(cases), "case", f"the start of one of {', '.join(kit_cases(kit))}", only)
+    return _write_kit(kit, cases, out, tell, whole=only is None)
+
+
+def export_case(case: Case, out: Path, tell: Tell = lambda _, __: None, most: float = math.inf) -> KitManifest:
+    """Write a kit of one case.
+
+    Parameters
+    ----------
+    case : Case
+        The case, such as `refgi.vectors.recorded.recorded_case` makes of any scene.
+    out : Path
+        Its folder; must not exist, or hold a kit, which is replaced.
+    tell : callable, optional
+        Called with what runs and the share done.
+    most : float
+        Bytes of arrays and bounds that it may take.
+
+    Returns
+    -------
+    KitManifest
+        What was written.
+
+    Raises
+    ------
+    InputError
+        If it would take more, the folder holds something else, or the disk is full.
+    """
+    taken = sum(stored(array).nbytes for array in case.given.values()) + PARTS * sum(
+        array.nbytes for name, array in expected_of(case).items() if name not in case.given)
+    if taken > most:
+        raise InputError(f"{out}: expected a kit of at most {most / 1e6:g} MB, got {taken / 1e6:.3g} MB: a smaller "
+                         "size or map (--size, --rsm-resolution), fewer stages (--stage) or more room (--most)")
+    return _write_kit("scene", {case.id: lambda: case}, out, tell, whole=False)
+
+
+def _write_kit(
+    kit: str, cases: Mapping[str, Callable[[], Case]], out: Path, tell: Tell, *, whole: bool
+) -> KitManifest:
+    """Write cases; `whole`: all of a kit, some of which must tell each likely bug."""
+    from refgi.provenance import program
+
     if out.exists() and any(out.iterdir()) and not (out / KIT).is_file():
         raise InputError(f"{out}: expected a new folder or a kit, got a folder of other files", file=str(out))
     part = out.with_name(f".{out.name}.{secrets.token_hex(4)}.part")
@@ -81,13 +123,13 @@ def export_kit(kit: str, out: Path, tell: Tell = lambda _, __: None, only: str |
         part.mkdir(parents=True)
         entries, told = [], _Told()
         for number, (name, make) in enumerate(cases.items()):
-            tell(name, number / len(cases))
-            manifest = write_case(make(), part, told)
+            share = number / len(cases)
+            manifest = write_case(make(), part, told, partial(_tell_within, tell, name, share, len(cases)))
             text = text_of(manifest)
             (part / "cases" / name / CASE).write_text(text, encoding="utf-8", newline="\n")
             entries.append(KitEntry(id=name, method=manifest.method, what=manifest.what,
                                     manifest=f"cases/{name}/{CASE}", sha256=_sha256(text.encode())))
-        if only is None:
+        if whole:
             told.expect_none_blind()
         made = KitManifest(kit=kit, vectors=VERSION, refgi=" ".join(program().values()), cases=tuple(entries))
         _write_frame(part, made)
@@ -100,6 +142,11 @@ def export_kit(kit: str, out: Path, tell: Tell = lambda _, __: None, only: str |
         shutil.rmtree(part, ignore_errors=True)
     tell("done", 1.0)
     return made
+
+
+def _tell_within(tell: Tell, name: str, begun: float, cases: int, stage: str, share: float) -> None:
+    """Tell of a stage of a case."""
+    tell(f"{name}: {stage}" if stage else name, begun + share / cases)
 
 
 class _Told:
@@ -127,16 +174,18 @@ class _Told:
             raise InputError(f"kit: expected a case that tells each likely bug, got none for {'; '.join(blind)}")
 
 
-def write_case(case: Case, folder: Path, told: _Told) -> CaseManifest:
+def write_case(case: Case, folder: Path, told: _Told, tell: Tell) -> CaseManifest:
     """Write the arrays of a case below a kit's folder and return its manifest, which is not written yet."""
     home = folder / "cases" / case.id
     for name in ("in", "out", "bound", "mask"):
         (home / name).mkdir(parents=True, exist_ok=True)
     known = expected_of(case)
     arrays = {name: _entry(case, name, known[name], _save(home, f"in/{name}.npy", known[name])) for name in case.given}
+    tell("", 0.0)
     chained = chained_budgets(case, known, SEED)
     stages, bugs = [], BugWriter()
-    for step in case.stages:
+    for number, step in enumerate(case.stages):
+        tell(step.name, number / len(case.stages))
         bounds = isolated_bounds(case, step, known, SEED)
         halves, in_bytes = (stored_budgets(case, step, known, SEED, in_bytes=bytes_) for bytes_ in (False, True))
         for name in step.writes:
@@ -153,7 +202,7 @@ def write_case(case: Case, folder: Path, told: _Told) -> CaseManifest:
     content = bugs.content()
     (home / BUGS).write_bytes(content)
     scene = None
-    if case.scene is not None:
+    if case.scene is not None and is_plain(case.scene):
         scene = f"scenes/{case.id}"
         size = case.facts.get("camera", {"columns": 1, "rows": 1})
         write_scene(case.scene, (size["columns"], size["rows"]), folder / scene)

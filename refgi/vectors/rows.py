@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from refgi.vectors.edits import PACKAGE, Edits, StaleEditError, edited
-from refgi.vectors.spec import Arrays, Bug, Run
+from refgi.vectors.spec import Array, Arrays, Bug, Run
 
 
 class Row(NamedTuple):
@@ -36,6 +36,7 @@ class Form:
     reads: Mapping[str, str]  # parameter: array
     writes: tuple[str, ...]  # in the order in which the function returns them
     numbers: Mapping[str, Any] = field(default_factory=dict)  # its other arguments
+    adapt: Mapping[str, Callable[[Array], Array]] = field(default_factory=dict)  # what parameters are made of arrays
 
     def __call__(self, arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG002 in the type of the arrays
         """Return what the stage writes."""
@@ -43,7 +44,8 @@ class Form:
 
     def by(self, function: Callable[..., Any], arrays: Arrays) -> Arrays:
         """Return what the stage writes with another function, such as an edited one."""
-        made = function(**{name: arrays[array] for name, array in self.reads.items()}, **self.numbers)
+        read = {name: self.adapt.get(name, _as_it_is)(arrays[array]) for name, array in self.reads.items()}
+        made = function(**read, **self.numbers)
         return dict(zip(self.writes, made if len(self.writes) > 1 else (made,), strict=True))
 
     def run(self) -> Run:
@@ -54,6 +56,10 @@ class Form:
         """Return the likely bugs of some lists, in the order of the file; `of`: a literal module that it calls."""
         module = f"{PACKAGE}.{of}" if of else self.function.__module__
         return tuple(Bug(row.cause, _lazily(self, row), row.paper) for row in rows(module) if row.list in lists)
+
+
+def _as_it_is(array: Array) -> Array:
+    return array
 
 
 def _lazily(form: Form, row: Row) -> Run:

@@ -5,8 +5,16 @@ import math
 from pathlib import Path
 from typing import Any
 
-from refgi.scene import DirectionalLight, PointLight, Scene, SpotLight
+from refgi.scene import DirectionalLight, Material, PointLight, Scene, SpotLight
 from refgi.vectors.spec import Array
+
+
+def is_plain(scene: Scene) -> bool:
+    """Return whether the files can say all of a scene: opaque triangles without textures, colours of vertices, glow."""
+    geometry, bare = scene.geometry, Material()
+    return geometry.cut_outs is None and geometry.colours is None and all(
+        getattr(one, key) == getattr(bare, key) for one in scene.materials
+        for key in ("ior", "emission", "texture", "alpha", "cutoff", "emission_texture", "alpha_texture"))
 
 
 def write_scene(scene: Scene, size: tuple[int, int], folder: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.image import read_exr
-from refgi.testing import assert_image_close, assert_stage_close, kit_folder
+from refgi.testing import assert_image_close, assert_stage_close, kit_folder, stages
 from refgi.vectors.check import Asked
 from refgi.vectors.pictures import judge_picture
 
@@ -91,3 +91,15 @@ def test_the_example_project_passes_and_finds_a_bug(tmp_path):
     done = tested().stdout
     assert "1 failed, 1 passed" in done
     assert "likely: the receiver's cosine is taken as absolute value" in done
+
+
+@pytest.mark.feature("REF-33")
+def test_arrays_of_any_scene_are_given_to_a_suite(tmp_path):
+    data = stages("cornell_box", "sii", folder=tmp_path / "kit", only="pairs.", width=12, height=9, rsm_resolution=8)
+    assert set(data) >= {"pairs.sum", "pairs.sum.lights.flux", "pairs.sum.receivers.position"}
+    assert data["pairs.sum"].shape == (3, 9, 12)
+    data.assert_close(data["pairs.sum"], "pairs.sum")
+    with pytest.raises(AssertionError, match=r"pairs\.sum"):
+        data.assert_close(2 * data["pairs.sum"], "pairs.sum")
+    with pytest.raises(KeyError, match="none"):
+        data["none"]

@@ -171,6 +171,12 @@ class GBuffer:
         names = (*ChannelMask._fields, "triangle_id", "covered")
         return dict(zip(names, self.resolve(*names), strict=True))
 
+    def with_channels(self, channels: Mapping[str, Array], dtype: np.dtype[Any]) -> "GBuffer":
+        """Return the buffer with other channels, by name."""
+        known = {name: channels[name] for name in ChannelMask._fields if name in channels}
+        visibility = self.visibility._replace(triangle_id=channels["triangle_id"])
+        return GBuffer(self._geometry, self._materials, self.projection, visibility, dtype, known)
+
     def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
         """Return channels at some texels alone, computing there those not yet known.
 

@@ -162,6 +162,7 @@ def _add_direct(lights: LightTable, points: GlossyPoints, visible: Array, radian
                 radiance[2, i] = points.specular[2, i] * (reflected * blue)
 
 
+@stage("rsm.spread_over_picture", kept=False)
 def spread_over_picture(points: GlossyPoints, radiance: Array, shape: tuple[int, int]) -> Array:
     """Return radiance of glossy receivers as a picture.
 

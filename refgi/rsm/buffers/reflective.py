@@ -136,6 +136,13 @@ class Rsm:
         names = ("triangle_id", "covered", "depth", "position", "normal", "solid_angle", "flux", *LOBE)
         return {"light": self.light} | {name: getattr(self, name) for name in names}
 
+    def with_channels(self, channels: Mapping[str, Any], dtype: np.dtype[Any]) -> "Rsm":
+        """Return the map with other channels, by name."""
+        view = self._view.with_channels({**self._view.recorded(), **{
+            name: channels[name] for name in (*VIEW_CHANNELS, "triangle_id")}}, dtype)
+        return Rsm(self.light, view, self._materials, {
+            name: channels[name] for name in ("solid_angle", "flux", *LOBE)})
+
     def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
         """Return channels at some texels alone, computing there those not yet known.
 

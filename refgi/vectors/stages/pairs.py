@@ -8,6 +8,7 @@ from refgi.literal import pairs as literal
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
 from refgi.settings import of
+from refgi.vectors.forms import pair_lists
 from refgi.vectors.recipe import Recipe, writing
 from refgi.vectors.rows import Form
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
@@ -91,14 +92,7 @@ def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
                (*RECEIVERS, *names, *area),
                {"sum.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", EQ2)},
                paper=EQ2, exact=("gbuffer.position", "lights.position"), variants=(form.run(),),
-               bugs=form.bugs("pair", "irradiance", *_lists("irradiance", glossy, bool(area), count)))
-
-
-def _lists(entry: str, glossy: bool, disc: bool, count: int) -> tuple[str, ...]:
-    """Return the lists of rows that hold for lights with or without lobes and discs."""
-    kind = "glossy" if glossy else "diffuse"
-    return (*(("pair/disc",) if disc else ("pair/free", f"{entry}/free", f"pair/{kind} free")), f"pair/{kind}",
-            f"{entry}/{kind}", *(("pair/several",) if count > 1 else ()))
+               bugs=form.bugs(*pair_lists("irradiance", glossy, bool(area), count)))
 
 
 def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) -> None:
@@ -125,7 +119,7 @@ def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) ->
     recipe.add("pairs", "irradiance of light k at receiver k", run, (*RECEIVERS, *names), {
         "pairs.irradiance": Spec("rgb, row, pair", "W/m^2", "irradiance; 0 where light and receiver coincide",
                                  "linear RGB", EQ2, alone=True)},
-        paper=EQ2, bugs=form.bugs("pair", *_lists("pairs", glossy, False, count)),
+        paper=EQ2, bugs=form.bugs(*pair_lists("pairs", glossy, False, count)),
         exact=("gbuffer.position", "lights.position"), variants=(form.run(),))
 
 

@@ -1,0 +1,151 @@
+"""Stage data of any scene and settings: own arrays pass, a wrong one fails at its stage."""
+
+import numpy as np
+import pytest
+
+from refgi.diagnostics import diagnosing
+from refgi.errors import InputError
+from refgi.methods import find_method
+from refgi.scene import Camera, Material, Mesh, PointLight, Scene, SpotLight
+from refgi.scene.model import merge
+from refgi.settings import replaced
+from refgi.vectors.check import Asked, check_output
+from refgi.vectors.export import export_case
+from refgi.vectors.kit import Kit
+from refgi.vectors.recorded import leaves, recorded_case
+from refgi.vectors.spec import expected_of
+
+SETTINGS = {"sii": {}, "gather": {}, "hssil": {"sampling.samples": 12}, "vpl": {},
+            "multires": {"lights.count": 32}, "val": {"lights.count": 64}}
+SIZE = {"width": 24, "height": 18, "rsm_resolution": 16}
+
+
+def heap(seed=7):
+    """Return a scene that no other test has: tilted sheets of several materials under two lamps."""
+    random = np.random.default_rng(seed)
+    meshes = []
+    for number in range(5):
+        corners = random.uniform(-0.4, 0.4, (4, 3)) + random.uniform(-0.5, 0.5, 3)
+        glossy = number == 3
+        meshes.append(Mesh(corners, np.array([[0, 1, 2], [1, 3, 2]]), material=Material(
+            diffuse=tuple(random.uniform(0.2, 0.8, 3)), specular=(0.2, 0.1, 0.15) if glossy else (0.0, 0.0, 0.0),
+            exponent=12.0 if glossy else 0.0)))
+    floor = np.array([[-2.0, -1, -2], [2, -1, -2], [-2, -1, 2], [2, -1, 2]])
+    meshes.append(Mesh(floor, np.array([[0, 2, 1], [1, 2, 3]]), material=Material(diffuse=(0.6, 0.5, 0.4))))
+    lamps = (SpotLight((0.3, 2.0, 0.4), (-0.1, -1.0, -0.2), 0.5, 0.7, (5.0, 4.0, 3.0)),
+             PointLight((-1.2, 0.8, 1.1), (1.0, 1.5, 2.0)))
+    return Scene("heap", *merge(meshes), Camera((0.2, 0.9, 2.6), (0.0, -0.2, 0.0), vfov=0.9), lamps)
+
+
+def exported(tmp_path, method, **more):
+    settings = replaced(find_method(method).settings(), SETTINGS[method] | more)
+    case = recorded_case(f"{method}-heap", heap(), method, settings, **SIZE)
+    export_case(case, tmp_path / "kit")
+    kit = Kit(tmp_path / "kit")
+    manifest, = kit.cases(Asked())
+    output = tmp_path / "mine" / case.id
+    output.mkdir(parents=True)
+    for step in manifest.stages:
+        for name in step.writes:
+            np.save(output / f"{name}.npy", kit.array(manifest, name))
+    return kit, manifest, output
+
+
+@pytest.mark.feature("REF-33")
+@pytest.mark.parametrize("method", SETTINGS)
+def test_own_arrays_pass_and_a_flipped_one_fails_at_its_stage(tmp_path, method, evidence):
+    kit, manifest, output = exported(tmp_path, method)
+    right = check_output(kit, output.parent, Asked())
+    assert right.exit_code == 0
+    assert {one.stage for one in right.stages if one.verdict == "not-run"} == set()
+    caught = 0
+    for step in manifest.stages:
+        arrays = {one: kit.array(manifest, one) for one in step.writes}
+        name = next((one for one, array in arrays.items() if array.ndim > 1 and np.isfinite(array).all()
+                     and not np.array_equal(array[..., ::-1], array)), None)
+        if name is None:
+            continue
+        array = arrays[name]
+        np.save(output / f"{name}.npy", array[..., ::-1])
+        result = check_output(kit, output.parent, Asked())
+        assert result.first == (manifest.id, step.name)
+        np.save(output / f"{name}.npy", array)
+        caught += 1
+    evidence(f"{method}: {len(manifest.stages)} stages within, {caught} of {caught} flipped arrays out at their stage")
+    assert caught >= 3
+
+
+def test_the_last_stage_is_the_picture_of_a_render(tmp_path):
+    from refgi.methods import render
+
+    kit, manifest, _ = exported(tmp_path, "sii")
+    with diagnosing(False):
+        picture = render(heap(), "sii", **SIZE).radiance
+    assert manifest.stages[-1].name == "frame.add_lobes" or manifest.stages[-1].name == "frame.compose"
+    assert kit.array(manifest, manifest.stages[-1].writes[0]) == pytest.approx(picture, rel=1e-4, abs=1e-6)
+
+
+def test_arrays_that_stages_made_are_not_given():
+    case = recorded_case("sii-heap", heap(), "sii", **SIZE)
+    assert all(name.startswith(("scene.", "materials.")) for name in case.given)
+    total = next(step for step in case.stages if step.name == "pairs.sum")
+    assert {"rsm.gbuffer.position", "lights.choose.position", "lights.choose.flux", "lights.footprints"} <= set(
+        total.reads)
+
+
+def test_some_stages_alone_are_given_what_they_read():
+    case = recorded_case("sii-heap", heap(), "sii", only="pairs.sum", **SIZE)
+    assert [step.name for step in case.stages] == ["pairs.sum"]
+    assert "pairs.sum.lights.position" in case.given
+    whole = recorded_case("sii-heap", heap(), "sii", **SIZE)
+    assert expected_of(case)["pairs.sum"] == pytest.approx(expected_of(whole)["pairs.sum"], rel=1e-5, abs=1e-6)
+
+
+def test_axes_and_units_are_those_of_docstrings_and_comments():
+    case = recorded_case("sii-heap", heap(), "sii", **SIZE)
+    specs = case.specs
+    assert (specs["pairs.sum"].axes, specs["pairs.sum"].unit) == ("rgb, row, column", "W/m^2")
+    assert (specs["lights.choose.flux"].axes, specs["lights.choose.flux"].unit) == ("rgb, N'", "W")
+    assert specs["rsm.gbuffer.position"].unit == "m"
+    assert specs["lights.choose.texel"].unit == "1"
+
+
+def test_likely_bugs_and_the_search_know_stages_that_have_a_literal_form(tmp_path):
+    kit, manifest, output = exported(tmp_path, "sii")
+    assert check_output(kit, output.parent, Asked()).exit_code == 0
+    total = next(step for step in manifest.stages if step.name == "pairs.sum")
+    read = {name: kit.array(manifest, name).astype(float) for name in total.reads}
+    # each light's flux over the hemisphere, 1/(2 pi) in place of 1/pi: half of the diffuse light is missing
+    diffuse = diffuse_light(read)
+    right = kit.array(manifest, "pairs.sum")
+    np.save(output / "pairs.sum.npy", (right - 0.5 * diffuse).astype(np.float32))
+    result = check_output(kit, output.parent, Asked())
+    assert result.first == (manifest.id, "pairs.sum")
+    assert "over the hemisphere: 1/(2 pi)" in result.findings[0].causes[0].cause
+
+
+def diffuse_light(read):
+    """Return Eq. 2 of a kit's arrays in a loop over lights, discs of their footprints in place of points."""
+    x, n = read["rsm.gbuffer.position"], read["rsm.gbuffer.normal"]
+    total = np.zeros_like(x)
+    for p, m, flux, area in zip(read["lights.choose.position"].T, read["lights.choose.normal"].T,
+                                read["lights.choose.flux"].T, read["lights.footprints"], strict=True):
+        d = x - p[:, None, None]
+        square = (d**2).sum(axis=0)
+        cosines = np.maximum(0, -(n * d).sum(axis=0)) * np.maximum(0, np.einsum("c,cij->ij", m, d))
+        term = np.divide(cosines, np.pi * square * (square + area / np.pi), out=np.zeros_like(square), where=square > 0)
+        total += flux[:, None, None] * term
+    return total
+
+
+def test_more_than_the_room_is_refused_before_anything_is_written(tmp_path):
+    case = recorded_case("sii-heap", heap(), "sii", **SIZE)
+    with pytest.raises(InputError, match=r"expected a kit of at most 0\.01 MB, got .*--size"):
+        export_case(case, tmp_path / "kit", most=1e4)
+    assert not (tmp_path / "kit").exists()
+
+
+def test_leaves_are_named_by_fields_and_indices():
+    light = PointLight((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    value = {"one": [np.zeros(2), (np.ones(1), "text")], "two": light, "three": Scene}
+    assert [name for name, _ in leaves(value)] == ["one.0", "one.1.0"]

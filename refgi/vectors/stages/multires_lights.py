@@ -85,7 +85,7 @@ def _add_samples(recipe: Recipe, pairs: PairSettings, top: int) -> None:
         return made
 
     form = LevelForm(literal.samples, {"position": RECEIVERS[0], "normal": RECEIVERS[1],
-                                       **light_parameters(recipe, bool(area))}, names, {}, {"pixels": places})
+                                       **light_parameters(recipe, bool(area))}, names, levels={"pixels": places})
     bugs = [one for one in pair_bugs(form, recipe, bool(area)) if not any(word in one.cause for word in SINGLE)]
     recipe.add("multires.samples", "irradiance of each light at the representative of every cell", run,
                (*RECEIVERS, *lights, *area, *places), {name: Spec(
@@ -98,7 +98,7 @@ def _add_splits(recipe: Recipe, settings: ByIrradiance, top: int) -> None:
     names = _names("split", top, 1)
     form = LevelForm(literal.splits, {}, names, {"finest": settings.finest, "threshold": settings.threshold,
                                                  "relative": settings.form == "relative"},
-                     {"pixels": _names("representative", top), "sampled": _names("sample", top)})
+                     levels={"pixels": _names("representative", top), "sampled": _names("sample", top)})
     share = "times the largest channel of all samples of the light at the quadrants' level and above" if \
         settings.form == "relative" else "W/m^2"
     recipe.add("multires.splits", f"cells that a light's list comes to and splits: max - min of a channel over the "
@@ -111,7 +111,7 @@ def _add_splits(recipe: Recipe, settings: ByIrradiance, top: int) -> None:
 
 def _add_leaves(recipe: Recipe, top: int) -> None:
     reads = (*_names("representative", top), *_names("sample", top), *_names("split", top, 1))
-    form = LevelForm(literal.lists, {}, (FIRST, *SUBSPLATS[:3], LIGHT), {}, {
+    form = LevelForm(literal.lists, {}, (FIRST, *SUBSPLATS[:3], LIGHT), levels={
         "pixels": _names("representative", top), "sampled": _names("sample", top),
         "split_levels": _names("split", top, 1)})
     recipe.add("multires.lists", "subsplats of each light: cells with a surface that are not split, but whose coarser "

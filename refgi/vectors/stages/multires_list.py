@@ -32,7 +32,8 @@ def add_states(recipe: Recipe, diagonal: Diagonal, top: int) -> None:
     """Add what becomes of the cells of levels 1 to `top`: empty, fine enough or refined."""
     marks, states = of_levels("discontinuous", top), of_levels("state", top)
 
-    form = LevelForm(literal.states, {"triangle_id": IDS}, states, {"diagonal": diagonal}, {"discontinuous": marks})
+    form = LevelForm(literal.states, {"triangle_id": IDS}, states, {"diagonal": diagonal},
+                     levels={"discontinuous": marks})
 
     def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 decisions alone
         covered = covered_of(arrays)
@@ -67,7 +68,7 @@ def add_subsplats(recipe: Recipe, top: int) -> None:
         return named(*depth_first(cells(arrays))[:4])
 
     form = LevelForm(literal.subsplats, {"triangle_id": IDS}, SUBSPLATS,
-                     {"finest": recipe.facts["multires"]["finest_level"]}, {"cell_states": states})
+                     {"finest": recipe.facts["multires"]["finest_level"]}, levels={"cell_states": states})
     what = {"level": "cell of 2^level pixels a side", "row": "in the grid of its level", "column": "in the grid of its "
             "level", "pixel": "row * width + column of the pixel right and below of the cell's centre, or of the "
             "nearest that shows a surface, the first of several"}

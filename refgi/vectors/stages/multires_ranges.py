@@ -129,7 +129,7 @@ def add_discontinuities(
              if getattr(criteria, kind) is not None for key in keys]
 
     form = LevelForm(literal.discontinuities, {}, names, {"top": top, "finest": finest, **_numbers(criteria)},
-                     {key: of_levels(key, top) for key in parts})
+                     levels={key: of_levels(key, top) for key in parts})
 
     def marks(arrays: Arrays, real: Any) -> Array:
         found = np.zeros(count, np.bool_)

@@ -24,6 +24,7 @@ from refgi.cluster.visibility.kernel_size import (
 from refgi.lights.importance import importance
 from refgi.lights.selection import choose_lights
 from refgi.lights.shares import map_shares
+from refgi.literal.multires_upsample import upsample
 from refgi.methods import METHODS
 from refgi.scene import Material
 from refgi.settings import of, replaced
@@ -34,7 +35,6 @@ from refgi.sssil.hssil import hssil
 from refgi.stages import observe
 from tests import lamps
 from tests.naive import gather as literal_gather
-from tests.naive import upsample
 from tests.naive.radiometry import lobe_fraction, solid_angle_of_rectangle
 from tests.wiring.cases import needed
 
@@ -190,19 +190,15 @@ def filtered_again():
 
 
 def corners_always():
-    """Upsampling by the twin of the method's own subsplats, texels across a corner counted as all others."""
+    """Upsampling by the literal text of the method's own subsplats, texels across a corner counted as all others."""
     frame, settings = lamps.corner(), of(MultiresSettings, lights=48, coarsest=4)
     with observe(record=True) as log:
         printed, plain = pair_of(multires, frame, settings, "ams_all_corners")
     assert np.abs(printed - plain).max() > LEAST * plain.max()
     values = next(run.output for run in log.runs if run.name == "multires.evaluate")
     listed, covered = shared_subsplats(frame.gbuffer, settings.subsplats), frame.gbuffer.covered
-    cells = list(zip(*(part.tolist() for part in (listed.level, listed.row, listed.column)), strict=True))
-    expected = np.zeros_like(printed)
-    for c in range(3):
-        leaves = dict(zip(cells, values[c].tolist(), strict=True))
-        for (i, j), value in upsample.tent(leaves, covered.tolist(), listed.top, corner_rule=False).items():
-            expected[c, i, j] = value
+    columns = (part.astype(int) for part in (listed.level, listed.row, listed.column))
+    expected = upsample(np.where(covered, 0, -1), *columns, values, listed.top, "tent", corner_rule=False)
     return printed[:, covered].ravel() / plain.max(), expected[:, covered].ravel() / plain.max()
 
 

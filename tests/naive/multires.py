@@ -1,7 +1,7 @@
 """Slow literal twin of adaptive multiresolution splatting (Nichols and Wyman 2009) as a whole, in float64.
 
-Written from the paper, its errata and the documentation. A cell is (level, i, j); a place is the (position, normal) of
-a receiver. A light is a function of a place: its irradiance there, (3,) W/m^2.
+The literal text of each stage, put together as the documentation says. A cell is (level, i, j); a place is the
+(position, normal) of a receiver. A light is a function of a place: its irradiance there, (3,) W/m^2.
 """
 
 import math
@@ -11,7 +11,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from tests.naive import pair_term, per_light, refinement, upsample
+from refgi.literal import multires as literal
+from refgi.literal.multires_lights import detail
+from refgi.literal.multires_upsample import upsample
+from tests.naive import pair_term, per_light
 from tests.naive.truth import nearest_hit
 
 LIFT = 1e-6  # m: of a shadow ray's ends
@@ -42,77 +45,33 @@ def view_of(gbuffer):
 def coarsest_level(shape, cells):
     """Return the first level whose longer side has no more than so many cells."""
     level = 0
-    while max(refinement.grid(shape, level)) > cells:
+    while max(literal.grid(shape, level)) > cells:
         level += 1
     return level
 
 
-# which cells are refined for all lights (Sec. 3.2 and 3.3)
-
-
 def shared_list(view, criteria, top, finest):
     """Return the subsplats that geometry asks for."""
-    tests = [test for test in (depth_range(view, criteria), depth_slope(view, criteria), normal_range(view, criteria),
-                               curvature(view, criteria)) if test is not None]
-    need = refinement.discontinuities(view.covered.shape, top, finest, lambda *cell: any(test(*cell) for test in tests))
-    return refinement.refine(need, view.covered, criteria.diagonal)
-
-
-def depth_range(view, criteria):
-    """Return the test max - min > t of the depth, t a length or a share of min."""
-    if criteria.depth is None:
-        return None
-
-    def test(*cell):
-        low, high = refinement.span(view.depth, view.covered, *cell, criteria.rim)
-        unit = 1 if criteria.depth.measure == "absolute" else low
-        return high - low > level_threshold(criteria.depth, cell[0]) * unit
-
-    return test
-
-
-def depth_slope(view, criteria):
-    """Return the test of the largest sqrt((dz/dx)^2 + (dz/dy)^2) among a cell's pixels, or of that over z."""
-    if criteria.derivative is None:
-        return None
-    relative = criteria.derivative.measure != "absolute"
-    slopes = everywhere(view, lambda *pixel: refinement.slope(view.depth, view.covered, *pixel, relative))
-    return lambda *cell: (slopes[refinement.pixels_of(slopes.shape, *cell)].max()
-                          > level_threshold(criteria.derivative, cell[0]))
-
-
-def level_threshold(criterion, level):
-    """Return the threshold of a level's cells: the authors' demo has 3 / level of it."""
-    return criterion.threshold * 3 / level if criterion.measure == "demo" else criterion.threshold
-
-
-def normal_range(view, criteria):
-    """Return the test max - min > t of any component that counts."""
-    if criteria.normal is None:
-        return None
-
-    def test(*cell):
-        spans = [refinement.span(view.normal["xyz".index(axis)], view.covered, *cell, criteria.rim)
-                 for axis in criteria.normal.components]
-        return any(high - low > criteria.normal.threshold for low, high in spans)
-
-    return test
-
-
-def curvature(view, criteria):
-    """Return the test of the largest Eq. 1 among a cell's pixels, or of that over the distance."""
-    if criteria.curvature is None:
-        return None
-    rate = criteria.curvature.name() == "rate"
-    bends = everywhere(view, lambda *pixel: refinement.curvature(view.normal, view.position, view.covered, *pixel,
-                                                                 rate=rate))
-    return lambda *cell: bends[refinement.pixels_of(bends.shape, *cell)].max() > criteria.curvature.threshold
-
-
-def everywhere(view, function):
-    """Return a function of a pixel's row and column for all of them."""
-    height, width = view.covered.shape
-    return np.array([[function(i, j) for j in range(width)] for i in range(height)])
+    ids, tests = np.where(view.covered, 0, -1), {}
+    if criteria.depth is not None:
+        both = literal.depth_ranges(view.depth, ids, top, criteria.rim)
+        tests |= {"depth_least": both[:top], "depth_largest": both[top:], "depth_threshold": criteria.depth.threshold,
+                  "depth_measure": criteria.depth.measure}
+    if criteria.derivative is not None:
+        relative = criteria.derivative.measure != "absolute"
+        tests |= {"slope": literal.slopes(view.depth, ids, top, relative), "slope_measure": criteria.derivative.measure,
+                  "slope_threshold": criteria.derivative.threshold}
+    if criteria.normal is not None:
+        both = literal.normal_ranges(view.normal, ids, top, criteria.rim, len(criteria.normal.components))
+        tests |= {"normal_least": both[:top], "normal_largest": both[top:],
+                  "normal_threshold": criteria.normal.threshold}
+    if criteria.curvature is not None:
+        rate = criteria.curvature.name() == "rate"
+        tests |= {"curvature": literal.curvatures(view.normal, view.position, ids, top, rate),
+                  "curvature_threshold": criteria.curvature.threshold}
+    marks = literal.discontinuities(top, finest, **tests)
+    listed = literal.subsplats(ids, literal.states(marks, ids, criteria.diagonal), finest)
+    return list(zip(*(column.tolist() for column in listed[:3]), strict=True))
 
 
 # where a subsplat is evaluated
@@ -120,7 +79,8 @@ def everywhere(view, function):
 
 def surface(view, how, covered, *cell):
     """Return the place of a subsplat: of the pixel right and below of its centre, or the mean of its surface."""
-    inside = refinement.pixels_of(covered.shape, *cell)
+    level, i, j = cell
+    inside = np.s_[i << level : (i + 1) << level, j << level : (j + 1) << level]
     shown = covered[inside]
     if not shown.any():
         return None
@@ -140,7 +100,7 @@ def lists_of_lights(view, lights, at, how, top):
     if how.criteria is not None:
         listed = shared_list(view, how.criteria, top, how.finest)
         start = {(level + up, i >> up, j >> up) for level, i, j in listed for up in range(1, top - level + 1)}
-    places = [at(top, i, j) for i, j in np.ndindex(*refinement.grid(covered.shape, top))]
+    places = [at(top, i, j) for i, j in np.ndindex(*literal.grid(covered.shape, top))]
     brightest = max(float(sum(light(place) for light in lights).max()) for place in places if place is not None)
     threshold = {"relative": lambda largest: how.threshold * largest, "absolute": lambda _: how.threshold,
                  "brightest": lambda _: how.threshold * brightest / len(lights)}[how.form]
@@ -153,19 +113,10 @@ def lists_of_lights(view, lights, at, how, top):
 
 def upsampled(covered, top, how, as_published, values):
     """Return the picture (3, h, w) of {cell: (3,)}; 0 where there is no surface."""
-    filters = {"filter_all": "ams_filter_all" in as_published}
-    if how == "tent":
-        pixels = upsample.tent(values, covered, top, **filters, corner_rule="ams_all_corners" not in as_published)
-    elif how == "demo":
-        pixels = upsample.demo(values, covered, top, **filters)
-    elif how == "nearest":
-        pixels = upsample.nearest(values, covered)
-    else:
-        pixels = upsample.naive_bilinear(values, covered, top)
-    light = np.zeros((3, *covered.shape))
-    for (y, x), value in pixels.items():
-        light[:, y, x] = value
-    return light
+    columns = np.array(list(values), int).reshape(-1, 3).T
+    light = np.array(list(values.values())).reshape(-1, 3).T
+    return upsample(np.where(covered, 0, -1), *columns, light, top, how, "ams_filter_all" in as_published,
+                    "ams_all_corners" not in as_published)
 
 
 def albedo_of_subsplats(view, listed):
@@ -185,26 +136,8 @@ def without_albedo(view, light):
 
 def surface_detail(view, eye, a):
     """Eq. 3: a <V, N> + 1 - a at each pixel."""
-    to_eye = np.asarray(eye)[:, None, None] - view.position
-    to_eye = to_eye / np.linalg.norm(to_eye, axis=0)
-    return a * np.maximum(0, (to_eye * view.normal).sum(axis=0)) + 1 - a
-
-
-def halved(light, covered_large, covered):
-    """Return a picture at half the size: the mean of those of four pixels that show a surface (Sec. 4).
-
-    Where none of the four does, the mean of such means of the pixels around.
-    """
-    means = {}
-    for i, j in np.ndindex(*covered.shape):
-        four = np.s_[2 * i:2 * i + 2, 2 * j:2 * j + 2]
-        if covered_large[four].any():
-            means[i, j] = light[:, *four][:, covered_large[four]].mean(axis=1)
-    small = np.zeros((3, *covered.shape))
-    for i, j in zip(*np.nonzero(covered), strict=True):
-        around = [means[i + a, j + b] for a in (-1, 0, 1) for b in (-1, 0, 1) if (i + a, j + b) in means]
-        small[:, i, j] = means[i, j] if (i, j) in means else np.mean(around, axis=0)
-    return small
+    ids = np.where(view.covered, 0, -1)
+    return detail(np.ones_like(view.position), view.position, view.normal, ids, np.asarray(eye)[None], a)
 
 
 # how one light lights one place (Eq. 2)

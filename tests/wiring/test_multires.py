@@ -12,6 +12,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.errors import InputError
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import LightSettings
+from refgi.literal.multires_lights import halved
 from refgi.pairs.settings import DistanceClamp
 from refgi.splat import MultiresSettings, multires
 from refgi.splat.multires import ByGeometry
@@ -194,7 +195,7 @@ def twin(name, settings):
     large = frame_of(name, scale)
     lights = [under_shadows(frame, settings)] if visibility_of(settings) == "val" else visible_lights(frame, settings)
     light = naive.picture(naive.view_of(large.gbuffer), frame.scene.camera.eye, lights, settings)
-    return naive.halved(light, large.gbuffer.covered, frame.gbuffer.covered) if settings.supersampled else light
+    return halved(light, large.gbuffer.triangle_id, frame.gbuffer.covered) if settings.supersampled else light
 
 
 def visible_lights(frame, settings):

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from refgi.literal import multires_lights as literal
 from refgi.scene import Scene
 from refgi.splat.multires.multires import halved
 from refgi.vectors.recipe import Recipe
+from refgi.vectors.rows import Form
 from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec, Stage
 from refgi.vectors.stages import vpl
 from refgi.vectors.stages.multires_light import POINTS
@@ -67,41 +69,12 @@ def add_halved(recipe: Recipe, covered: Array, source: str) -> None:
     shown = "picture.covered"
     recipe.give(shown, covered, Spec("row, column", "1", "pixels of the picture itself that show a surface", tier="T0"))
 
-    def fine_of(arrays: Arrays) -> Array:
-        return np.asarray(arrays[RECEIVERS[2]]) >= 0
-
     def run(arrays: Arrays, real: Any) -> Arrays:
         light = np.ascontiguousarray(arrays[source], real)
-        return {"multires.halved": halved(light, fine_of(arrays), np.asarray(arrays[shown]))}
+        return {"multires.halved": halved(light, np.asarray(arrays[RECEIVERS[2]]) >= 0, np.asarray(arrays[shown]))}
 
-    def four(arrays: Arrays) -> tuple[Array, Array]:
-        light, fine = np.asarray(arrays[source]), fine_of(arrays)
-        places = [np.s_[..., i::2, j::2] for i in (0, 1) for j in (0, 1)]
-        return np.stack([light[one] for one in places]), np.stack([fine[one] for one in places])
-
-    def by(join: Any, holes: bool = True) -> Run:
-        def altered(arrays: Arrays, real: Any) -> Arrays:
-            light, fine = four(arrays)
-            made, right = join(light, fine), run(arrays, real)["multires.halved"]
-            some = fine.any(axis=0)
-            return {"multires.halved": np.where(np.asarray(arrays[shown]), np.where(some, made, right if holes else 0),
-                                                0)}
-
-        return altered
-
-    def mean(light: Array, fine: Array) -> Array:
-        return np.asarray(light.sum(axis=0) / np.maximum(fine.sum(axis=0), 1))
-
+    form = Form(literal.halved, {"light": source, "triangle_id": RECEIVERS[2], "covered": shown}, ("multires.halved",))
     recipe.add("multires.halved", "mean over those of four finer pixels that show a surface; where none does but the "
                "pixel itself, the mean of the pixels around it", run, (source, RECEIVERS[2], shown), {
                    "multires.halved": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB")},
-               paper="AMS Sec. 4", bugs=(
-                   Bug("pixels without surface count as dark: divided by four", by(lambda light, _: light.mean(axis=0)),
-                       "those that show a surface"),
-                   Bug("a sum of four, not a mean", by(lambda light, _: light.sum(axis=0)), "AMS Sec. 4"),
-                   Bug("one of four: the upper left", by(lambda light, _: light[0]), "AMS Sec. 4"),
-                   Bug("two of four: rows are not averaged", by(lambda light, fine: mean(light[:2], fine[:2])),
-                       "AMS Sec. 4"),
-                   Bug("two of four: columns are not averaged", by(lambda light, fine: mean(light[::2], fine[::2])),
-                       "AMS Sec. 4"),
-                   Bug("the brightest of four", by(lambda light, _: light.max(axis=0)), "AMS Sec. 4")))
+               paper="AMS Sec. 4", variants=(form.run(),), bugs=form.bugs("halved"))

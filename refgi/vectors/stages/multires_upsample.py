@@ -3,11 +3,11 @@
 A level is the irradiance of its cells and a mask of those that hold any, evaluated there or at a coarser level.
 """
 
-from functools import partial
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
+from refgi.literal import multires_upsample as literal
 from refgi.splat.multires.settings import Upsampling
 from refgi.splat.multires.subsplats.upsample import (
     black_level,
@@ -17,13 +17,14 @@ from refgi.splat.multires.subsplats.upsample import (
     tent_level,
     upsample,
 )
-from refgi.vectors.bugs.upsample import nearest_bugs, tent, tent_bugs
 from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Array, Arrays, Bug, Run, Spec
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import Array, Arrays, Spec
 from refgi.vectors.stages.multires_list import SUBSPLATS, subsplats_of
 from refgi.vectors.stages.multires_ranges import IDS, covered_of
 
 LIGHT = "multires.irradiance"
+LIST = {"triangle_id": IDS, "level": SUBSPLATS[0], "row": SUBSPLATS[1], "column": SUBSPLATS[2], "irradiance": LIGHT}
 
 
 def add_upsampling(recipe: Recipe, mode: Upsampling, top: int, filter_all: bool, corner_rule: bool) -> None:
@@ -45,45 +46,22 @@ def _add_level(recipe: Recipe, mode: Upsampling, level: int, top: int, filter_al
             return black_level(filled, np.dtype(real))
         return np.ascontiguousarray(arrays[above[0]], real), np.ascontiguousarray(arrays[above[1]], np.bool_)
 
-    def run(arrays: Arrays, real: Any, how: str = mode, every: bool = filter_all, corner: bool = corner_rule) -> Arrays:
+    def run(arrays: Arrays, real: Any) -> Arrays:
         subsplats, values = subsplats_of(arrays, top), np.ascontiguousarray(arrays[LIGHT], real)
         filled = filled_cells(covered_of(arrays), top)[level]
-        if how == "demo":
-            made = demo_level(values, subsplats, level, coarse(arrays, real, filled), filled, every)
+        if mode == "demo":
+            made = demo_level(values, subsplats, level, coarse(arrays, real, filled), filled, filter_all)
         else:
             made = tent_level(values, subsplats.column, sorted_by_row(subsplats), level, coarse(arrays, real, filled),
-                              filled, every, corner)
+                              filled, filter_all, corner_rule)
         return dict(zip((light, mask), made, strict=True))
 
-    def literal(**bugs: Any) -> Run:
-        def altered(arrays: Arrays, real: Any) -> Arrays:
-            subsplats, filled = subsplats_of(arrays, top), filled_cells(covered_of(arrays), top)[level]
-            layer, here = np.zeros((3, *filled.shape)), subsplats.level == level
-            layer[:, subsplats.row[here], subsplats.column[here]] = np.asarray(arrays[LIGHT])[:, here]
-            options = {"every": filter_all, "corner": corner_rule} | bugs
-            return dict(zip((light, mask), tent(layer, subsplats.leaf[level], coarse(arrays, real, filled), filled,
-                                                **options), strict=True))
-
-        return altered
-
-    turned = (1, 0)
-    bugs = [Bug("cells evaluated at this level are copied" if filter_all else "cells evaluated at this level are "
-                "filtered as well", lambda a, r: run(a, r, every=not filter_all), "E-AMS-09"),
-            Bug("rows and columns of subsplats are exchanged", _with_list(run, turned, 0), "row, column"),
-            Bug("subsplats one level finer are taken", _with_list(run, (0, 1), -1), "level of the layer")]
+    form = Form(literal.upsample_level, {**LIST, **dict(zip(("coarse", "coarse_known"), above, strict=False))},
+                (light, mask), {"at": level, "mode": mode, "filter_all": filter_all, "corner_rule": corner_rule})
+    lists = ["filter all" if filter_all else "copy"]
     if mode == "tent":
-        bugs += [Bug("cells across a corner count only beside a cell that counts" if not corner_rule else
-                     "cells across a corner always count", lambda a, r: run(a, r, corner=not corner_rule),
-                     "E-AMS-09"), *tent_bugs(literal, corner_rule, not above)]
-    if above and mode == "tent":
-        bugs.append(Bug("the filter of the authors' demo", lambda a, r: run(a, r, how="demo"), "E-AMS-09"))
-    if above and mode == "demo":
-        bugs += [Bug("the coarser light is doubled but not filtered", literal(weights=(0, 1, 0)), "E-AMS-09"),
-                 Bug("light does not come down from the coarser level (level above): own cells alone are known",
-                     literal(coarse_light=False), "E-AMS-09"),
-                 Bug("a tent at this level", lambda a, r: run(a, r, how="tent"), "E-AMS-09"),
-                 Bug("a tent that counts cells without light as black",
-                     literal(masked=False), "E-AMS-09")]
+        lists += ["tent", *(("corner rule", "tent corner rule") if corner_rule else ("all corners",))]
+    lists += [f"{mode} below"] if above else []
     rule = {"tent": "weights (1, 2, 1) x (1, 2, 1)", "demo": "weights (1 - f, 1, f) / 2 on the coarser level"}[mode]
     recipe.add(f"multires.upsample.{level}", f"light of level {level} from that of the level above and subsplats, "
                + rule if above else f"light of level {level}, the coarsest", run,
@@ -92,37 +70,20 @@ def _add_level(recipe: Recipe, mode: Upsampling, level: int, top: int, filter_al
                                "linear RGB"),
                    mask: Spec("row, column", "1", "cells with light: evaluated here or coarser, with surface",
                               tier="T0")},
-               paper="AMS Sec. 3.5; E-AMS-09", bugs=tuple(bugs))
-
-
-def _with_list(run: Run, order: tuple[int, int], up: int) -> Run:
-    """Return a stage that takes row and column in another order or the subsplats of another level, where they fit."""
-    def altered(arrays: Arrays, real: Any) -> Arrays:
-        level = np.asarray(arrays[SUBSPLATS[0]])
-        other = np.maximum(level + up, 0)
-        places = [np.asarray(arrays[SUBSPLATS[1 + axis]]) for axis in order]
-        height, width = covered_of(arrays).shape
-        row, column = (np.minimum(place, (size - 1) >> other)
-                       for place, size in zip(places, (height, width), strict=True))
-        return run({**arrays, SUBSPLATS[0]: other, SUBSPLATS[1]: row, SUBSPLATS[2]: column}, real)
-
-    return altered
+               paper="AMS Sec. 3.5; E-AMS-09", variants=(form.run(),),
+               bugs=form.bugs("upsample_level", *(f"upsample_level/{one}" for one in lists)))
 
 
 def _add_at_once(recipe: Recipe, mode: Upsampling, top: int) -> None:
-    def run(arrays: Arrays, real: Any, how: Upsampling = mode) -> Arrays:
+    def run(arrays: Arrays, real: Any) -> Arrays:
         values = np.ascontiguousarray(arrays[LIGHT], real)
-        return {"multires.upsampled.0": upsample(values, subsplats_of(arrays, top), covered_of(arrays), how)}
+        return {"multires.upsampled.0": upsample(values, subsplats_of(arrays, top), covered_of(arrays), mode)}
 
-    others: dict[Upsampling, str] = {"nearest": "each pixel takes the light of its subsplat", "tent": "a masked tent",
-                                     "naive_bilinear": "the levels are interpolated with black where they hold nothing"}
+    form = Form(literal.upsample, LIST, ("multires.upsampled.0",), {"top": top, "mode": mode})
     recipe.add("multires.upsample", {"nearest": "each pixel has the light of its subsplat", "naive_bilinear":
                "sum of all levels, each interpolated as if it were black where it holds nothing"}[mode], run,
                (IDS, *SUBSPLATS[:3], LIGHT), {"multires.upsampled.0": Spec(
                    "rgb, row, column", "W/m^2", "indirect irradiance; 0 without surface", "linear RGB")},
-               paper="AMS Sec. 3.5, Fig. 7", bugs=(
-                   *(Bug(cause, partial(run, how=how), "AMS Fig. 7") for how, cause in others.items()
-                     if how != mode),
-                   *(nearest_bugs(run) if mode == "nearest" else ()),
-                   Bug("rows and columns of subsplats are exchanged", _with_list(run, (1, 0), 0), "row, column"),
-                   Bug("subsplats one level finer are taken", _with_list(run, (0, 1), -1), "level of the layer")))
+               paper="AMS Sec. 3.5, Fig. 7", variants=(form.run(),),
+               bugs=form.bugs("upsample", f"upsample/{mode}", *(f"upsample/not {one}" for one in get_args(Upsampling)
+                                                                if one != mode)))

@@ -22,7 +22,7 @@ from refgi.splat.multires.subsplats.evaluate import evaluate, representative_poi
 from refgi.splat.multires.subsplats.upsample import upsample
 from tests.naive import eq2
 from tests.naive import per_light as naive
-from tests.naive import upsample as naive_upsample
+from tests.naive.multires import upsampled
 from tests.pairs import sets
 from tests.splat.multires.choices import by_irradiance, unclamped
 
@@ -109,8 +109,7 @@ def by_hand(buffer, lights, settings, threshold, shared=None):
         cells = naive.subsplats(covered, irradiance_at, top, settings.subsplats.finest, threshold, shared)
         for level, _, _ in cells:
             counts[level] += 1
-        for pixel, value in naive_upsample.tent(cells, covered.tolist(), top).items():
-            total[:, *pixel] += value
+        total += upsampled(covered, top, "tent", frozenset(), cells)
     return total, counts
 
 
@@ -243,9 +242,9 @@ def test_levels_of_two_lights_cannot_be_added_before_upsampling():
         cells, values = next(lists)
         for c, value in zip(cells, values[0], strict=True):
             place = int(tree.level[c]), int(tree.row[c]), int(tree.column[c])
-            merged[place] = merged.get(place, 0.0) + value
+            merged[place] = merged.get(place, 0.0) + np.full(3, value)
     np.testing.assert_allclose(together, sum(summed(buffer, alone(both, k), settings) for k in range(2)), rtol=TWIN)
-    added_before = sum(naive_upsample.tent(merged, buffer.covered.tolist(), 3).values())
+    added_before = upsampled(buffer.covered, 3, "tent", frozenset(), merged)[0].sum()
     assert added_before < 0.95 * together[0].sum()
 
 

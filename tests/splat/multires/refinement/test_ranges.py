@@ -9,19 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from refgi.jit import threads
+from refgi.literal import multires as literal
 from refgi.settings import of
 from refgi.splat.multires.refinement.criteria import depth_ranges, discontinuities, normal_ranges
 from refgi.splat.multires.refinement.derivatives import curvatures, depth_slopes
 from refgi.splat.multires.refinement.grid import level_shape, top_level
 from refgi.splat.multires.settings import MultiresSettings
-from tests.naive import refinement as naive
 from tests.pairs.sets import random_directions, unit
 from tests.splat.multires.choices import only
 
 SIZES = ((1, 1), (1, 9), (7, 1), (16, 16), (37, 53))
 TOP = 3
 ROUNDING = 1e-12  # of float64 sums of three squares, roots and quotients, relative to 1
-ARC_COSINE = 3e-8  # Eq. 1 as printed: the arc cosine of 1 - u/2 is sqrt(u), so float64 leaves it 1.5e-8 and twice that
 THRESHOLDS = (0.2, 0.25, 1.4, 1.5)  # Fig. 11 and 12
 
 
@@ -36,6 +35,11 @@ class FakeBuffer:
 
     def resolve(self, *names):
         return tuple(getattr(self, name) for name in names)
+
+
+def ids(buffer):
+    """Return triangles of a picture: one, where there is any."""
+    return np.where(buffer.covered, 0, -1)
 
 
 def facing(shape, real=np.float64):
@@ -69,15 +73,12 @@ def test_ranges_are_those_of_the_pixels_with_a_surface(evidence, real):
         for rim in (0, 1):
             depth = depth_ranges(buffer.depth, buffer.covered, TOP, rim)
             normal = normal_ranges(buffer.normal, buffer.covered, TOP, rim)
-            for level in range(1, TOP + 1):
-                assert depth.low[level].shape == level_shape(*shape, level)
-                for i, j in np.ndindex(depth.low[level].shape):
-                    found = depth.low[level][i, j], depth.high[level][i, j]
-                    assert found == naive.span(buffer.depth, buffer.covered, level, i, j, rim)
-                    for c in range(3):
-                        found = normal.low[level][c, i, j], normal.high[level][c, i, j]
-                        assert found == naive.span(buffer.normal[c], buffer.covered, level, i, j, rim)
-                    cells += 1
+            assert depth.low[TOP].shape == level_shape(*shape, TOP)
+            for mip, expected in ((depth, literal.depth_ranges(buffer.depth, ids(buffer), TOP, rim)),
+                                  (normal, literal.normal_ranges(buffer.normal, ids(buffer), TOP, rim, 3))):
+                for found, level in zip((*mip.low[1:], *mip.high[1:]), expected, strict=True):
+                    np.testing.assert_array_equal(found, level)
+            cells += sum(level.size for level in depth.low[1:])
     evidence(f"{cells} cells of pictures of {len(SIZES)} sizes: depth and normal ranges equal those of their pixels")
 
 
@@ -127,17 +128,13 @@ def test_mips_are_the_same_for_any_number_of_threads():
 @pytest.mark.parametrize("shape", SIZES)
 def test_slopes_and_curvatures_are_the_largest_of_their_pixels(shape):
     buffer = scattered(shape)
-    slopes = depth_slopes(buffer.depth, buffer.covered, TOP)
-    for rate in (False, True):
-        bends = curvatures(buffer.normal, buffer.position, buffer.covered, TOP, rate)
-        for i, j in np.ndindex(shape):
-            expected = naive.curvature(buffer.normal, buffer.position, buffer.covered, i, j, rate)
-            assert bends.high[0][i, j] == pytest.approx(expected, abs=ARC_COSINE, rel=ROUNDING)
-            assert slopes.high[0][i, j] == pytest.approx(naive.slope(buffer.depth, buffer.covered, i, j), rel=ROUNDING)
-        for mip in (slopes, bends):
-            for level in range(1, TOP + 1):
-                for i, j in np.ndindex(mip.high[level].shape):
-                    assert mip.high[level][i, j] == mip.high[0][naive.pixels_of(shape, level, i, j)].max()
+    pairs = [(depth_slopes(buffer.depth, buffer.covered, TOP), literal.slopes(buffer.depth, ids(buffer), TOP, True))]
+    pairs += [(curvatures(buffer.normal, buffer.position, buffer.covered, TOP, rate),
+               literal.curvatures(buffer.normal, buffer.position, ids(buffer), TOP, rate)) for rate in (False, True)]
+    for mip, levels in pairs:
+        assert mip.high[0].shape == shape
+        for found, expected in zip(mip.high[1:], levels, strict=True):
+            np.testing.assert_allclose(found, expected, rtol=ROUNDING)
 
 
 def found_by(buffer, top, finest=0, **settings):
@@ -285,11 +282,17 @@ def test_needs_are_those_of_the_printed_tests(rim):
     buffer.normal[:, :, 12:] = facing((19, 11)) * buffer.covered[:, 12:]
     settings = of(MultiresSettings, rim=rim, normal_threshold=0.7, depth_threshold=0.4)
 
-    def test(level, i, j):
-        low, high = naive.span(buffer.depth, buffer.covered, level, i, j, rim)
-        spans = [naive.span(buffer.normal[c], buffer.covered, level, i, j, rim) for c in range(3)]
-        return high - low > np.float32(0.4) * low or any(b - a > np.float32(0.7) for a, b in spans)
+    least, largest = ranges_of(literal.depth_ranges(buffer.depth, ids(buffer), 4, rim))
+    lows, highs = ranges_of(literal.normal_ranges(buffer.normal, ids(buffer), 4, rim, 3))
+    expected = literal.discontinuities(
+        4, 0, least, largest, None, lows, highs, depth_threshold=np.float32(0.4), depth_measure="relative",
+        normal_threshold=np.float32(0.7))
+    found = discontinuities(buffer, settings.subsplats.criteria, 4)
+    assert not found[0].any()
+    for one, other in zip(found[1:], expected, strict=True):
+        np.testing.assert_array_equal(one, other)
 
-    twin = naive.discontinuities((19, 23), 4, 0, test)
-    for found, expected in zip(discontinuities(buffer, settings.subsplats.criteria, 4), twin, strict=True):
-        np.testing.assert_array_equal(found, expected)
+
+def ranges_of(levels):
+    """Return least and largest, apart."""
+    return levels[: len(levels) // 2], levels[len(levels) // 2 :]

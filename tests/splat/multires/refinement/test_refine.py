@@ -8,12 +8,12 @@ import pytest
 
 from refgi import Frame, load_scene
 from refgi.jit import threads
+from refgi.literal import multires as literal
 from refgi.settings import of
-from refgi.splat.multires.refinement.criteria import discontinuities
-from refgi.splat.multires.refinement.grid import level_picture, representative, top_level
+from refgi.splat.multires.refinement.criteria import depth_ranges, discontinuities
+from refgi.splat.multires.refinement.grid import level_picture, level_shape, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.settings import Criteria, MultiresSettings
-from tests.naive import refinement as naive
 from tests.splat.multires.choices import only
 
 RULES = ("off", "corner", "literal", "full8")
@@ -67,6 +67,26 @@ def listed(subsplats):
     return list(zip(*(part.tolist() for part in subsplats[:3]), strict=True))
 
 
+def ids(buffer):
+    """Return triangles of a picture: one, where there is any."""
+    return np.where(buffer.covered, 0, -1)
+
+
+def times_covered(cells, shape):
+    """Return how many subsplats cover each pixel."""
+    times = np.zeros(shape, int)
+    for level, i, j in cells:
+        times[i << level : (i + 1) << level, j << level : (j + 1) << level] += 1
+    return times
+
+
+def by_levels(need, buffer, rule):
+    """Return subsplats of each level by itself, as the demo: cells not refined where the cell around them is."""
+    states = [np.where(buffer.covered, literal.KEPT, literal.EMPTY), *literal.states(need[1:], ids(buffer), rule)]
+    return [(level, i, j) for level, cells in enumerate(states) for i, j in np.argwhere(cells == literal.KEPT).tolist()
+            if level == len(states) - 1 or states[level + 1][i // 2, j // 2] == literal.REFINED]
+
+
 def refined(buffer, top=None, **settings):
     chosen = of(MultiresSettings, **settings).subsplats
     top = top_level(*buffer.covered.shape, chosen.coarsest) if top is None else top
@@ -83,14 +103,13 @@ def test_subsplats_are_the_published_list(shape, rule):
         top = top_level(*shape, 4)
         need = discontinuities(buffer, Criteria(), top, finest)
         subsplats = refine(need, buffer.covered, rule)
-        expected = naive.refine(need, buffer.covered, rule)
-        assert listed(subsplats) == naive.in_order(expected, top, need[top].shape[1])
+        expected = literal.subsplats(ids(buffer), literal.states(need[1:], ids(buffer), rule), finest)
+        for one, other in zip(subsplats[:4], expected, strict=True):
+            np.testing.assert_array_equal(one, other)
         by_list = refine(need, buffer.covered, rule, "list")
         for one, other in zip((*subsplats[:4], *subsplats.leaf), (*by_list[:4], *by_list.leaf), strict=True):
             np.testing.assert_array_equal(one, other)
             assert one.dtype == other.dtype
-        for pixel, one in zip(subsplats.pixel, listed(subsplats), strict=True):
-            assert pixel == representative(buffer.covered, *one)
 
 
 @pytest.mark.feature("AMS-06")
@@ -98,11 +117,11 @@ def test_subsplats_are_the_published_list(shape, rule):
 def test_subsplats_tile_the_surfaces(rule):
     buffer = busy((37, 53), share=0.3)
     subsplats = refined(buffer, diagonal=rule, coarsest=4)
-    times = naive.times_covered(listed(subsplats), buffer.covered.shape)
+    times = times_covered(listed(subsplats), buffer.covered.shape)
     assert (times[buffer.covered] == 1).all()
     assert times.max() == 1
     for level, leaf in enumerate(subsplats.leaf):
-        assert leaf.shape == naive.grid(buffer.covered.shape, level)
+        assert leaf.shape == level_shape(*buffer.covered.shape, level)
         assert set(map(tuple, np.argwhere(leaf))) == {(i, j) for one, i, j in listed(subsplats) if one == level}
     assert subsplats.counts.sum() == len(subsplats.level)
 
@@ -150,8 +169,8 @@ def test_a_level_by_itself_gives_the_list_only_where_criteria_are_monotone(evide
     shares = {}
     for rule in RULES:
         need = discontinuities(buffer, Criteria(), 4)
-        alone = naive.by_levels(need, buffer.covered, rule)
-        times = naive.times_covered(alone, buffer.covered.shape)
+        alone = by_levels(need, buffer, rule)
+        times = times_covered(alone, buffer.covered.shape)
         shares[rule] = (times[buffer.covered] > 1).mean()
         if rule in ("off", "full8"):
             assert sorted(alone) == sorted(listed(refine(need, buffer.covered, rule)))
@@ -166,15 +185,14 @@ def test_thresholds_that_rise_with_the_level_break_a_level_by_itself(evidence):
     rng = np.random.default_rng(2)
     buffer, top = flat(1 + rng.random((64, 64)) * np.linspace(0, 0.5, 64)), 4
 
-    def test(level, i, j):
-        low, high = naive.span(buffer.depth, buffer.covered, level, i, j)
-        return high - low > 0.13 * level * low
-
-    need = tuple(naive.discontinuities((64, 64), top, 0, test))
-    times = naive.times_covered(naive.by_levels(need, buffer.covered, "off"), (64, 64))
+    mip = depth_ranges(buffer.depth, buffer.covered, top)
+    need = tuple(high - low > 0.13 * level * low
+                 for level, (low, high) in enumerate(zip(mip.low, mip.high, strict=True)))
+    times = times_covered(by_levels(need, buffer, "off"), (64, 64))
     subsplats = refine(need, buffer.covered, "off")
-    assert (naive.times_covered(listed(subsplats), (64, 64)) == 1).all()
-    assert sorted(listed(subsplats)) == sorted(naive.refine(need, buffer.covered, "off"))
+    assert (times_covered(listed(subsplats), (64, 64)) == 1).all()
+    by_list = literal.subsplats(ids(buffer), literal.states(need[1:], ids(buffer), "off"), 0)
+    assert listed(subsplats) == list(zip(*by_list[:3], strict=True))
     share = (times > 1).mean()
     assert share > 0.5
     evidence(f"threshold 0.13 times the level, noise that grows from left to right: {share:.0%} of the pixels covered "
@@ -238,7 +256,7 @@ def test_background_is_never_lit_and_thin_silhouettes_are():
     assert thin.counts.tolist() == [0, 0, 0, len(thin.level)]  # a silhouette against nothing is no discontinuity
     assert line.flat[thin.pixel].all()
     slanted = refined(flat(np.add.outer(np.arange(100), np.ones(100)), line))
-    assert (naive.times_covered(listed(slanted), line.shape)[line] == 1).all()
+    assert (times_covered(listed(slanted), line.shape)[line] == 1).all()
 
 
 def test_the_list_is_the_same_for_any_number_of_threads():
@@ -261,7 +279,7 @@ def test_real_scenes_are_tiled(data_dir, evidence):
     for name in ("teapot", "quake_e1m1"):
         buffer = Frame(load_scene(data_dir / f"{name}.json"), width=150, height=101).gbuffer
         subsplats = refined(buffer)
-        assert (naive.times_covered(listed(subsplats), buffer.covered.shape)[buffer.covered] == 1).all()
+        assert (times_covered(listed(subsplats), buffer.covered.shape)[buffer.covered] == 1).all()
         evidence(f"{name} at 150 x 101: {len(subsplats.level) / buffer.covered.sum():.1%} of the pixels")
 
 

@@ -1,14 +1,14 @@
-"""Upsampling of subsplats: the literal twin, constants, bilinear interpolation, what bleeds and what rings."""
+"""Upsampling of subsplats: the literal text, constants, bilinear interpolation, what bleeds and what rings."""
 
 import numpy as np
 import pytest
 
 from refgi.errors import InputError
 from refgi.jit import threads
+from refgi.literal import multires_upsample as literal
 from refgi.splat.multires.refinement.grid import level_shape, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.subsplats.upsample import upsample
-from tests.naive import upsample as naive
 
 ROUNDING = 1e-15  # values up to 1: up to five passes, each the mean of 9, or the sum of as many levels
 ONE_PASS = 1e-15  # of values up to 1: the bound asked for of one doubling in float64
@@ -72,20 +72,15 @@ def rmse(got, truth):
     ((1, 1), 1.0, 0), ((1, 7), 0.7, 0), ((9, 1), 1.0, 0), ((21, 34), 0.7, 0), ((37, 19), 1.0, 2), ((16, 16), 0.0, 0),
     ((24, 20), 0.1, 0)])
 @pytest.mark.feature("AMS-11")
-def test_every_mode_is_the_literal_twin(size, share, finest, evidence):
+def test_every_mode_is_the_literal_text(size, share, finest, evidence):
     """Oracle: sizes odd and even, with holes, with nothing, with leaves that stop short of pixels."""
     subsplats, covered = ragged(*size, share, finest)
     values = np.random.default_rng(1).random((3, len(subsplats.level)))
     worst = 0.0
     for mode, options in MODES:
         got = upsample(values, subsplats, covered, mode, **options)
-        expected = np.zeros((3, *size))
-        for c in range(3):
-            places = zip(subsplats.level, subsplats.row, subsplats.column, strict=True)
-            lights = {tuple(map(int, place)): value for place, value in zip(places, values[c], strict=True)}
-            top = () if mode == "nearest" else (subsplats.top,)
-            for place, value in getattr(naive, mode)(lights, covered.tolist(), *top, **options).items():
-                expected[(c, *place)] = value
+        columns = (one.astype(int) for one in subsplats[:3])
+        expected = literal.upsample(np.where(covered, 0, -1), *columns, values, subsplats.top, mode, **options)
         worst = max(worst, float(np.abs(got - expected).max()))
         assert not got[:, ~covered].any()
     assert worst < ROUNDING

@@ -111,11 +111,21 @@ def every_texel(low: float, high: float) -> tuple[Any, Any]:
 
 
 def gather(position: Any, normal: Any, radiance: Any, area: Any, offsets: Any, weight: Any) -> Any:
-    """Return E (3, h, w) of the texels of a level by their samples (HSS Eq. 1).
+    """Return E (3, h, w) of the texels of a level by their samples (HSS Eq. 1); places are relative to one point."""
+    i, j, texels = samples_at(area.shape, offsets, weight)
+    light = radiance[:, i, j]
+    ds = area[i, j] * texels  # E-HSS-06
+    form = disc_form_factor(position[..., None], normal[..., None], position[:, i, j], normal[:, i, j], ds)
+    # Eq. (1)
+    return (form * light).sum(axis=-1)
 
-    E-HSS-08: samples outside the picture or on the texel itself give nothing, the others keep their weight.
+
+def samples_at(shape: tuple[int, int], offsets: Any, weight: Any) -> tuple[Any, Any, Any]:
+    """Return row, column and number of texels (h, w, n) of the samples of each texel, by its place in its tile.
+
+    E-HSS-08: those outside the picture or on the texel itself stand for none, the others for as many as before.
     """
-    (h, w), (rows, columns) = area.shape, offsets.shape[:2]
+    (h, w), (rows, columns) = shape, offsets.shape[:2]
     row, column = np.arange(h)[:, None], np.arange(w)
     tile_row, tile_column = row % rows, column % columns
     own = offsets[tile_row, tile_column]
@@ -124,12 +134,7 @@ def gather(position: Any, normal: Any, radiance: Any, area: Any, offsets: Any, w
     i, j = row + own[..., 1], column + own[..., 0]
     inside = (i >= 0) & (i < h) & (j >= 0) & (j < w)
     i, j = np.clip(i, 0, h - 1), np.clip(j, 0, w - 1)
-    texels = texels * (inside & ((i != row) | (j != column)))
-    light = radiance[:, i, j]
-    ds = area[i, j] * texels  # E-HSS-06
-    form = disc_form_factor(position[..., None], normal[..., None], position[:, i, j], normal[:, i, j], ds)
-    # Eq. (1)
-    return (form * light).sum(axis=-1)
+    return i, j, texels * (inside & ((i != row) | (j != column)))
 
 
 def disc_form_factor(x: Any, n: Any, y: Any, m: Any, ds: Any) -> Any:
@@ -151,3 +156,13 @@ def point_form_factor(x: Any, n: Any, y: Any, m: Any, ds: Any) -> Any:
     cos_i, cos_j = np.maximum(0, (n * d).sum(axis=0)), np.maximum(0, -(m * d).sum(axis=0))
     # Eq. (3)
     return cos_i * cos_j * ds / np.maximum(square, LEAST) ** 2
+
+
+def shared_disc_form_factor(x: Any, n: Any, y: Any, m: Any, area: Any, texels: Any, share: float) -> Any:
+    """Return the form factor of samples whose discs cover a share of their texels, one at least, as often as needed.
+
+    The disc of all that a sample stands for is too dark where it is near (E-HSS-05).
+    """
+    covered = np.maximum(share * texels, np.minimum(texels, 1))
+    times = np.divide(texels, covered, out=np.zeros_like(covered), where=covered > 0)
+    return times * disc_form_factor(x, n, y, m, area * covered)

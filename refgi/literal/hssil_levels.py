@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-GRAZING = 1e-12  # least cosine that an area is divided by
+GRAZING = 1e-6  # least ratio of the cosines that an area is divided by
 
 
 def first_level(depth: Any, normal: Any, albedo: Any, irradiance: Any, frame: Any, half: Any, number: int) -> Any:
@@ -73,10 +73,12 @@ def sample_area(z: Any, n: Any, d: Any, half: Any, pixels: Any, size: tuple[int,
     """Return ds (h, w), m^2, of a number of pixels at depth z on a surface of normal n (HSS Eq. 2)."""
     length = np.sqrt((d**2).sum(axis=0))
     cos_alpha = 1 / length  # between ray and view direction
-    cos_beta = np.maximum(np.abs((n * d).sum(axis=0)), GRAZING) / length  # E-HSS-02: at the surface that is seen
+    facing = -(n * d).sum(axis=0)
+    cos_beta = np.maximum(facing, GRAZING) / length  # E-HSS-02: at the surface that is seen
     tangents = half[0] * half[1]  # E-HSS-03: of half the angles
     # Eq. (2)
-    return pixels * z**2 * 4 * tangents / (size[0] * size[1]) * cos_alpha / cos_beta
+    area = pixels * z**2 * 4 * tangents / (size[0] * size[1]) * cos_alpha / cos_beta
+    return np.where(facing > 0, area, 0)  # seen from behind it sends nothing
 
 
 def covered(row: Any, column: Any, number: int, size: tuple[int, int]) -> Any:
@@ -100,10 +102,11 @@ def first_mean(depth: Any, normal: Any, albedo: Any, irradiance: Any, frame: Any
 
 def level_of_means(place: Any, depth: Any, normal: Any, radiance: Any, area: Any, side: int = 2) -> Any:
     """Return the means by area of side x side finer texels and the sum of their areas: what these send, it sends."""
-    ds = parts(area, side)
-    weight, there = ds, ds > 0
+    ds, there = parts(area, side), parts(np.isfinite(depth), side)
+    z, x = parts(np.where(np.isfinite(depth), depth, 0), side), parts(place, side)
+    near = np.arange(ds.shape[-1]) == np.where(there, z, np.inf).argmin(axis=-1)[..., None]
+    weight = np.where(ds.any(axis=-1)[..., None], ds, there & near)  # where none has an area the closest alone
     void, total = ~there.any(axis=-1), weight.sum(axis=-1)
-    z, x = parts(np.where(area > 0, depth, 0), side), parts(place, side)
     up, light = parts(normal, side), parts(radiance, side)
     all_of = np.where(void, 1, total)
     mean_place = (weight * x).sum(axis=-1) / all_of
@@ -148,3 +151,22 @@ def parts(plane: Any, side: int) -> Any:
     beyond = [(0, 0)] * (plane.ndim - 2) + [(0, rows * side - plane.shape[-2]), (0, columns * side - plane.shape[-1])]
     blocks = np.pad(plane, beyond).reshape(*plane.shape[:-2], rows, side, columns, side)
     return np.swapaxes(blocks, -3, -2).reshape(*plane.shape[:-2], rows, columns, side * side)
+
+
+def resampled_level(closest_planes: Any, finer: Any, u: Any, side: int) -> Any:
+    """Return a level as senders: each stands where one of its parts does, drawn by flux, and sends the flux of all.
+
+    The part is the last that sends before which less than a share u (h, w), random, of all is sent; where none sends
+    the closest. `closest_planes` (six planes) are of this level, `finer` of the senders of the finer one, or of pixels.
+    """
+    ds, light = parts(finer[4], side), parts(finer[3], side)
+    flux = ds * light.sum(axis=0)
+    total, before = flux.sum(axis=-1), np.cumsum(flux, axis=-1) - flux
+    last = (flux > 0) & (before <= (u * total)[..., None])
+    k = side**2 - 1 - last[..., ::-1].argmax(axis=-1)[..., None]
+    place, depth, normal, pixel = (
+        np.where(total > 0, np.take_along_axis(parts(plane, side), k if plane.ndim == 2 else k[None], -1)[..., 0], own)
+        for plane, own in ((finer[n], closest_planes[n]) for n in (0, 1, 2, 5)))
+    area = ds.sum(axis=-1)
+    radiance = (ds * light).sum(axis=-1) / np.where(area > 0, area, 1)
+    return with_void(closest_planes[5] < 0, place, depth, normal, radiance, area, pixel)

@@ -63,6 +63,46 @@ def upsample(
     return np.where(seen[..., 0], np.where(total > LEAST_WEIGHT, mean, in_depth), 0)
 
 
+def bilinear(coarse: Any, below_depth: Any, depth: Any, factor: int) -> Any:
+    """Carry light of texels to pixels: bilinear means of the four texels around, of those that have a surface."""
+    (h, w), (rows, columns) = depth.shape, below_depth.shape
+    y, x = (np.arange(h)[:, None] + 0.5) / factor - 0.5, (np.arange(w) + 0.5) / factor - 0.5
+    total, weight = np.zeros((3, h, w)), np.zeros((h, w))
+    for down, right in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        i, j = np.floor(y).astype(int) + down, np.floor(x).astype(int) + right
+        share = (1 - np.abs(y - i)) * (1 - np.abs(x - j)) * ((i >= 0) & (i < rows) & (j >= 0) & (j < columns))
+        i, j = np.clip(i, 0, rows - 1), np.clip(j, 0, columns - 1)
+        share = share * np.isfinite(below_depth[i, j])
+        total, weight = total + share * coarse[:, i, j], weight + share
+    return np.where(np.isfinite(depth), total / np.where(weight > 0, weight, 1), 0)
+
+
+def joint_bilateral(position: Any, normal: Any, covered: Any, light: Any, least_weight: float = 0.05) -> Any:
+    """Return light (3, h, w) as it is made from one pixel of each 2 x 2, the first with a surface (SII Table 3).
+
+    Bilinear weights of the four blocks around times max(0, n . n_k)^8 (1 - sine to the plane)^2.
+    """
+    h, w = covered.shape
+    index = np.pad(np.arange(h * w).reshape(h, w), ((0, h % 2), (0, w % 2)), constant_values=-1)
+    blocks = np.swapaxes(index.reshape(index.shape[0] // 2, 2, -1, 2), 1, 2).reshape(-1, index.shape[1] // 2, 4)
+    there = (blocks >= 0) & covered.reshape(-1)[blocks]
+    chosen = np.take_along_axis(blocks, there.argmax(axis=-1)[..., None], -1)[..., 0]
+    chosen = np.pad(np.where(there.any(axis=-1), chosen, -1), ((0, 1), (0, 1)), constant_values=-1)
+    i, j = np.arange(h)[:, None], np.arange(w)
+    total, weights = np.zeros_like(light), np.zeros((h, w))
+    for below, right in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        down, across = np.abs(1 - below - i % 2 / 2), np.abs(1 - right - j % 2 / 2)
+        at = chosen[i // 2 + below, j // 2 + right]
+        step = position.reshape(3, -1)[:, at] - position
+        away = np.sqrt((step**2).sum(axis=0))
+        sine = np.minimum(1, np.abs((normal * step).sum(axis=0)) / np.where(away > 0, away, 1))
+        cosine = np.maximum(0, (normal * normal.reshape(3, -1)[:, at]).sum(axis=0))
+        weight = np.where(at >= 0, down * across * cosine**8 * (1 - sine) ** 2, 0)
+        total, weights = total + weight * light.reshape(3, -1)[:, at], weights + weight
+    own = (chosen[i // 2, j // 2] == i * w + j) | (weights < least_weight)
+    return np.where(covered, np.where(own, light, total / np.where(weights > 0, weights, 1)), 0)
+
+
 def tent(step: Any, t: Any) -> Any:
     """Return the weight of the texel `step` places on, -1 to 1, for a place t: (1 - 2|t|)/6, (2 - |t|)/3, ..."""
     half = np.where(np.abs(t) < 0.5, (4 + np.abs(t)) / 3, 1)

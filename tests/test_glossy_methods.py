@@ -13,6 +13,7 @@ from refgi.cluster.val import cluster_lights
 from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
+from refgi.literal.hssil_crown import every_texel
 from refgi.literal.pairs import pair
 from refgi.method import _WARNED
 from refgi.methods import METHODS, render
@@ -342,13 +343,13 @@ def test_hssil_sums_every_texel_of_all_levels(room, changes):
             continue
         for n, pixel in enumerate(points.pixel):
             row, column = (int(k) >> level.number for k in divmod(int(pixel), room.width))
-            for ox, oy, weight in crown_points.every_texel(radius, index, level.shape):
+            for ox, oy in every_texel(radius if index else 0.0, 2 * radius)[0][0, 0]:
                 i, j = row + oy, column + ox
                 if not (0 <= i < level.shape[0] and 0 <= j < level.shape[1]) or level.pixel[i, j] < 0:
                     continue
                 place = (points.position[:, n] - eye)[:, None, None]
                 here = {"position": place, "normal": points.normal[:, n, None, None]}
-                worth = transfer_of(here, (0, 0), (0, 0), weight, form, texel(level, i, j), share)
+                worth = transfer_of(here, (0, 0), (0, 0), 1.0, form, texel(level, i, j), share)
                 d = level.position[:, i, j] + eye - points.position[:, n]
                 if worth > 0:
                     f = float(receiver_lobes.brdf(points.exponent[n], points.normal[:, n], d / np.linalg.norm(d),

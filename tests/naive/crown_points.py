@@ -1,10 +1,13 @@
-"""Slow literal twin of where `hssil` samples: docs/conventions, "Random numbers", in whole numbers and floats."""
+"""Where `hssil` samples: random shifts by docs/conventions, "Random numbers", and slices past a bitmask."""
 
 import math
 
+import numpy as np
+
+from refgi.literal import hssil_crown
+from refgi.literal.hssil_crown import FIRST_STEP, SECOND_STEP, distance, texels_of
 from tests.naive.draws import mix32
 
-G = 1.324717957244746  # g^3 = g + 1
 GOLDEN = 0.6180339887498949
 
 
@@ -39,82 +42,27 @@ def counts(sampling, index):
     return math.ceil(sampling.samples / 2), max(1, math.floor(sampling.samples / 2))
 
 
-def place(sampling, number, row, column, stretch):
-    """Return what is added to (u_j, v_j) at a receiver of a level: stretches of so many points follow each other."""
+def samples(sampling, radius, index, number, shape):
+    """Return offsets and weights of the samples of a level of so many rows and columns, by the place in their tile."""
+    (inner, crown), density = counts(sampling, index), sampling.density
     level = level_key(sampling.seed, number)
+    if sampling.pattern == "all":
+        return hssil_crown.every_texel(0.0 if index == 0 else radius, 2 * radius)
+    if sampling.pattern == "fixed":
+        return hssil_crown.mirrored_samples(shifts(level), inner, crown, radius, density)
     if sampling.pattern == "pixel":
-        return shifts(pixel_key(row_key(level, row), column))
-    s, t = shifts(level)
-    n = 2 * row + column % 2
-    if sampling.pattern == "interleaved":
-        n = sampling.tile * (row % sampling.tile) + column % sampling.tile
-    return s + n * stretch / G, t + n * stretch / G**2
-
-
-def distance(radius, low, square, u, density):
-    """Return how far from the receiver a point lies; low is 0 in the disc and 1 in the crown, square 1 and 3."""
-    return radius * math.sqrt(low + square * u) if density == "uniform" else radius * (low + u)
-
-
-def stands_for(radius, far, square, count, density):
-    """Return the texels of a point: the area of the ring of its share, d(pi far^2) / du, over the number of points."""
-    if density == "uniform":
-        return square * math.pi * radius**2 / max(count, 1)
-    return 2 * math.pi * far * radius / max(count, 1)
+        points = hssil_crown.sample_points(inner, crown)
+        added = np.array([[shifts(pixel_key(row_key(level, row), column)) for column in range(shape[1])]
+                          for row in range(shape[0])])
+    else:
+        tile = (shape[0], 2) if sampling.pattern == "row" else (sampling.tile, sampling.tile)
+        points, added = hssil_crown.points_and_shifts(shifts(level), inner, crown, *tile)
+    return hssil_crown.crown_samples(points, added, inner, radius, density)
 
 
 def nearest(x, y):
     """Return the texel whose centre is nearest; halves round up."""
     return math.floor(x + 0.5), math.floor(y + 0.5)
-
-
-def samples(sampling, radius, index, number, row, column):
-    """Return (ox, oy, texels it stands for) of the samples around a receiver: the disc's, then the crown's."""
-    inner, crown = counts(sampling, index)
-    found = []
-    for count, low, square in ((inner, 0.0, 1.0), (crown, 1.0, 3.0)):
-        found += [(*offset, stands_for(radius, far, square, count, sampling.density))
-                  for *offset, far in ring(sampling, radius, low, square, count, number, row, column, crown)]
-    return found
-
-
-def ring(sampling, radius, low, square, count, number, row, column, stretch):
-    """Return the texels of `count` points and how far these lie from the receiver."""
-    if sampling.pattern == "fixed":
-        return mirrored(radius, low, square, count, shifts(level_key(sampling.seed, number)), sampling.density)
-    s, t = place(sampling, number, row, column, stretch)
-    found = []
-    for j in range(count):
-        far = distance(radius, low, square, (0.5 + j / G + s) % 1, sampling.density)
-        found.append((*nearest(*polar(far, 2 * math.pi * ((0.5 + j / G**2 + t) % 1))), far))
-    return found
-
-
-def mirrored(radius, low, square, count, shift, density):
-    """Return half of the points on the right, and their mirror images; an odd last one above or below."""
-    found = []
-    for j in range((count + 1) // 2):
-        u, v = (0.5 + j / G + shift[0]) % 1, (0.5 + j / G**2 + shift[1]) % 1
-        far = distance(radius, low, square, u, density)
-        x, y = polar(far, math.pi * (v - 0.5))
-        if 2 * j + 1 < count:
-            ox, oy = nearest(x, y)
-            found += [(ox, oy, far), (-ox, oy, far)]
-        else:
-            found.append((*nearest(0.0, math.copysign(far, y)), far))
-    return found
-
-
-def polar(far, angle):
-    """Return columns and rows."""
-    return far * math.cos(angle), far * math.sin(angle)
-
-
-def every_texel(radius, index, shape):
-    """Return each texel once: the disc below 2 r at the first level, the crown from r on at others."""
-    rows, columns = shape
-    return [(ox, oy, 1.0) for oy in range(1 - rows, rows) for ox in range(1 - columns, columns)
-            if (ox, oy) != (0, 0) and math.hypot(ox, oy) < 2 * radius and (index == 0 or math.hypot(ox, oy) >= radius)]
 
 
 def slices(sampling, bitmask, radius, index, number, row, column):
@@ -131,7 +79,7 @@ def slices(sampling, bitmask, radius, index, number, row, column):
     turn, shift = shifts(pixel_key(key, column) if sampling.pattern == "pixel" else key)
     if sampling.pattern == "interleaved":
         n = sampling.tile * (row % sampling.tile) + column % sampling.tile
-        turn, shift = ((a + n * by) % 1 for a, by in zip(shifts(level), (1 / G**2, 1 / G), strict=True))
+        turn, shift = ((a + n * by) % 1 for a, by in zip(shifts(level), (SECOND_STEP, FIRST_STEP), strict=True))
     found = []
     for k in range(count):
         part = (shift + (k // 2 if fixed else k) * GOLDEN) % 1
@@ -154,8 +102,8 @@ def symmetric(k, count):
 def along(radius, count, disc, crown, occluders, part, density):
     """Return (distance, texels it stands for) along a slice, nearest first."""
     placed = [(radius * (j + part) / occluders, 0.0) for j in range(occluders)]
-    for points, low, square in ((disc, 0.0, 1.0), (crown, 1.0, 3.0)):
+    for points, near in ((disc, 0.0), (crown, 1.0)):
         for j in range(points):
-            far = distance(radius, low, square, (j + part) / points, density)
-            placed.append((far, stands_for(radius, far, square, points, density) / count))
+            far = distance((j + part) / points, near, radius, density)
+            placed.append((far, texels_of(far, near, points, radius, density) / count))
     return sorted(placed, key=lambda sample: sample[0])

@@ -1,7 +1,6 @@
-"""The picture of hierarchical screen-space illumination for every setting, by loops over texels and samples.
+"""The picture of hierarchical screen-space illumination for every setting, put together from refgi.literal.
 
-Of each frame it takes depths, normals, albedo and direct light; all else is made here and in `hssil`, `bitmask`,
-`crown_points` and `reprojection`.
+Of each frame it takes depths, normals, albedo and direct light; all else is made here, in `bitmask` and `crown_points`.
 """
 
 import math
@@ -9,10 +8,15 @@ import math
 import numpy as np
 
 from refgi.frame import Frame
+from refgi.literal import hssil_crown, hssil_levels
+from refgi.literal.temporal import reproject
+from refgi.literal.upsampling import bilinear, blur, upsample
 from refgi.sssil.settings import Bitmask, Rays
-from tests.naive import bitmask, crown_points, hssil, level_blur, reprojection
+from tests.naive import bitmask, crown_points
 from tests.naive.crossings import LIFT, corners_of, face_normals, free
-from tests.naive.val import dot
+from tests.naive.draws import mix32
+
+PLANES = ("position", "depth", "normal", "radiance", "area", "pixel")
 
 
 def picture(frame, settings, placed=()):
@@ -26,88 +30,112 @@ def picture(frame, settings, placed=()):
         other = Frame(frame.scene.with_camera(eye=camera.eye, target=camera.target, up=camera.up, vfov=camera.vfov),
                       width=frame.width, height=frame.height, dtype=frame.dtype, shadows=frame.shadows,
                       rsm_resolution=frame.rsm_resolution)
-        found, _ = fetched(one_view(other, settings), other, *surfaces(frame), frame.gbuffer.covered,
-                           cameras.depth_tolerance, cameras.normal_cosine)
+        position, normal = frame.gbuffer.resolve("position", "normal")
+        view, (depth, other_normal) = other.gbuffer.projection, other.gbuffer.resolve("depth", "normal")
+        found, _ = reproject(one_view(other, settings), position, normal, frame.gbuffer.covered, view.origin,
+                             view.frame, view.half, depth, other_normal, cameras.depth_tolerance,
+                             cameras.normal_cosine, "bilinear")
         light = np.maximum(light, found)
     return light
-
-
-def surfaces(frame):
-    """Return positions and normals of the pixels."""
-    return frame.gbuffer.resolve("position", "normal")
-
-
-def fetched(light, source, position, normal, covered, depth_tolerance, normal_cosine, fetch="bilinear"):
-    """Return what another view's picture holds of surface points, and the share of its texels that show them."""
-    view, (depth, normal_there) = source.gbuffer.projection, source.gbuffer.resolve("depth", "normal")
-    axes = (view.origin[0], *view.frame[0], view.half[1])
-    found, weight = np.zeros(light.shape), np.zeros(covered.shape)
-    for pixel in np.argwhere(covered):
-        at = tuple(pixel)
-        found[:, *at], weight[at] = reprojection.reproject(light, depth, normal_there, position[:, *at],
-                                                           normal[:, *at], axes, depth_tolerance, normal_cosine,
-                                                           fetch)
-    return found, weight
 
 
 def one_view(frame, settings):
     """Return the irradiance by what one camera sees."""
     buffer, printed, sampling = frame.gbuffer, settings.as_published, settings.sampling
-    depth, normal, albedo = buffer.resolve("depth", "normal", "albedo")
-    view = buffer.projection
-    texels = hssil.first_texels(depth, normal, albedo * frame.direct / math.pi, view.frame[0], view.half,
-                                "hss_tan_f" in printed)
-    levels = [hssil.level(texels, sampling.first_level + i, settings.senders.downsample)
-              for i in range(sampling.levels)]
-    senders = levels
-    if settings.senders.downsample == "resampled":
-        senders = hssil.drawn(texels, levels, sampling.first_level, sampling.seed)
-    shape = len(levels[0]), len(levels[0][0])
+    seen, view = buffer.resolve("depth", "normal", "albedo"), buffer.projection
+    levels, senders = levels_of((*seen, frame.direct, view.frame, view.half), settings)
+    shape = levels[0]["depth"].shape
     # Sec. 3.2: the smallest r with which the crowns cover the picture, its diagonal over 2^K
     radius = max(1.0, math.hypot(*shape) / 2**sampling.levels) if sampling.radius is None else sampling.radius
     light = None
     for index in reversed(range(sampling.levels)):
         here = levels[index]
-        added = np.zeros((3, len(here), len(here[0])))
+        added = np.zeros_like(here["position"])
         if settings.senders.only_level in (None, index):
             added = gathered(frame, here, index, settings, radius, senders[index])
             # receivers that all have the same samples have nothing to gain from each other's
             if settings.blur is not None and sampling.pattern not in ("fixed", "all"):
-                added = level_blur.blurred(added, here, settings.blur.size, settings.blur.plane_tolerance,
-                                            settings.blur.cosine)
+                added = blur(added, here["position"], here["normal"], here["depth"], settings.blur.size,
+                             settings.blur.plane_tolerance, settings.blur.cosine)
             added *= 4.0**index if "hss_level_factor" in printed else 1.0
-        light = added if light is None else added + upsampled(light, levels[index + 1], here, 2, settings)
-    first = sampling.first_level
-    return upsampled(light, levels[0], texels, 2**first, settings) if first else light
+        light = added if light is None else added + carried(light, levels[index + 1], here["depth"], here["normal"],
+                                                            settings)
+    return light if sampling.first_level == 0 else carried(light, levels[0], *seen[:2], settings)
 
 
-def upsampled(light, below, here, factor, settings):
+def levels_of(seen, settings):
+    """Return levels as dicts of planes, of the settings' kind, and the same as senders."""
+    sampling, mode, (shape, half) = settings.sampling, settings.senders.downsample, (seen[0].shape, seen[-1])
+    first, numbers = sampling.first_level, range(sampling.first_level, sampling.first_level + sampling.levels)
+    closest = [hssil_levels.first_level(*seen, first)]
+    for number in numbers[1:]:
+        closest.append(hssil_levels.coarser_level(*closest[-1], number, shape))
+    made, senders = closest, closest
+    if mode == "average":
+        made = senders = [hssil_levels.first_mean(*seen, first)]
+        for _ in numbers[1:]:
+            made.append(hssil_levels.level_of_means(*made[-1]))
+        made = senders = [(*means, nearest[5]) for means, nearest in zip(made, closest, strict=True)]
+    elif mode == "closest_average":
+        made = [hssil_levels.first_mean_radiance(*seen, first)]
+        for number in numbers[1:]:
+            made.append(hssil_levels.coarser_mean_radiance(*made[-1], number, shape))
+        made = senders = [planes[:6] for planes in made]
+    elif mode == "resampled":
+        senders, side = [hssil_levels.first_level(*seen, 0)], 1 << first
+        for number, planes in zip(numbers, closest, strict=True):
+            u = random_shares(sampling.seed, number, planes[1].shape)
+            senders.append(hssil_levels.resampled_level(planes, senders[-1], u, side))
+            side = 2
+        senders = senders[1:]
+    # Eq. 3 prints tan f for tan(f / 2): tan f = 2 t / (1 - t^2)
+    wide = 4 / np.prod(1 - half**2) if "hss_tan_f" in settings.as_published else 1.0
+    return tuple([dict(zip(PLANES, (*planes[:4], wide * planes[4], planes[5]), strict=True)) for planes in some]
+                 for some in (made, senders))
+
+
+def random_shares(seed, number, shape):
+    """Return the random number of each texel of a level that picks the place it sends from."""
+    level = crown_points.level_key(seed, number)
+    return np.array([[mix32(crown_points.pixel_key(crown_points.row_key(level, row), column) ^ 0x165667B1) / 2**32
+                      for column in range(shape[1])] for row in range(shape[0])])
+
+
+def carried(light, below, depth, normal, settings):
     """Carry light to a finer level."""
     weights = settings.upsampling
-    sigma, power = (weights.depth_sigma, weights.normal_power) if weights.name() == "bilateral" else (1.0, 1.0)
-    return hssil.upsampled(light, below, here, factor, weights.name(), settings.senders.downsample != "average",
-                           sigma, power)
+    factor = next(n for n in (2, 4, 8, 16, 32) if below["depth"].shape == tuple(-(-size // n) for size in depth.shape))
+    if weights.name() == "bilateral":
+        return upsample(light, below["depth"], below["normal"], depth, normal, factor, weights.depth_sigma,
+                        weights.normal_power, settings.senders.downsample != "average")
+    if weights.name() == "bilinear":
+        return bilinear(light, below["depth"], depth, factor)
+    row, column = np.indices(depth.shape) // factor
+    return np.where(np.isfinite(depth), light[:, row, column], 0)
 
 
 def gathered(frame, texels, index, settings, radius, senders):
     """Return the light that the texels of a level receive from samples of it, `senders`."""
-    sampling, kind = settings.sampling, settings.visibility
-    number, shape = sampling.first_level + index, (len(texels), len(texels[0]))
-    form, disc_pi = settings.senders.form_factor, "hss_disc_pi" in settings.as_published
-    share = settings.senders.disc_share
+    sampling, kind, form = settings.sampling, settings.visibility, settings.senders.form_factor
+    number, shape = sampling.first_level + index, texels["depth"].shape
+    less = math.pi if "hss_disc_pi" in settings.as_published and form != "point" else 1.0
     if isinstance(kind, Bitmask):
-        light = bitmask.masked_light(
-            as_arrays(texels), lambda *at: crown_points.slices(sampling, kind, radius, index, number, *at),
-            kind.thickness * diagonal(frame), form, as_arrays(senders), share)
-        return light / math.pi if disc_pi and form != "point" else light
-
-    def around(row, column):
-        if sampling.pattern == "all":
-            return crown_points.every_texel(radius, index, shape)
-        return crown_points.samples(sampling, radius, index, number, row, column)
-
-    see = sight(frame, texels, senders) if isinstance(kind, Rays) else None
-    return hssil.gathered(texels, around, form, disc_pi, see, senders, share)
+        return bitmask.masked_light(
+            texels, lambda *at: crown_points.slices(sampling, kind, radius, index, number, *at),
+            kind.thickness * diagonal(frame), form, senders, settings.senders.disc_share) / less
+    i, j, weight = hssil_crown.samples_at(shape, *crown_points.samples(sampling, radius, index, number, shape))
+    terms = (texels["position"][..., None], texels["normal"][..., None], senders["position"][:, i, j],
+             senders["normal"][:, i, j])
+    area = senders["area"][i, j]
+    if form == "disc":
+        share = hssil_crown.shared_disc_form_factor(*terms, area, weight, settings.senders.disc_share)
+    elif form == "texel":
+        share = weight * hssil_crown.disc_form_factor(*terms, area)
+    else:
+        share = hssil_crown.point_form_factor(*terms, area * weight)
+    if isinstance(kind, Rays):
+        share = share * sight(frame, (texels, senders), (i, j), share * senders["radiance"][:, i, j].any(axis=0) > 0)
+    return (share * senders["radiance"][:, i, j]).sum(axis=-1) / less
 
 
 def diagonal(frame):
@@ -116,29 +144,17 @@ def diagonal(frame):
     return float(np.linalg.norm(np.ptp(position, axis=1)))
 
 
-def as_arrays(texels):
-    """Return a level as arrays."""
-    def plane(key, none):
-        return np.array([[none if texel is None else texel[key] for texel in row] for row in texels])
-
-    return {"area": plane("area", 0.0),
-            **{name: np.moveaxis(plane(key, np.zeros(3)), 2, 0)
-               for name, key in (("position", "place"), ("normal", "normal"), ("radiance", "radiance"))}}
-
-
-def sight(frame, *levels):
-    """Return V of two texels of a level: a ray between the pixels whose surfaces they hold, off their triangles."""
-    buffer, corners, ends = frame.gbuffer, corners_of(frame.scene.geometry), {}
-    for texel in (texel for level in levels for row in level for texel in row if texel is not None):
-        at = texel["pixel"]
-        up = face_normals(frame.scene.geometry, buffer.triangle_id[at][None], buffer.normal[:, *at][None])[0]
-        ends[at] = up, buffer.position[:, *at] + LIFT * up
-
-    def see(receiver, sender):
-        (up, start), (other_up, end) = ends[receiver["pixel"]], ends[sender["pixel"]]
-        toward = sender["place"] - receiver["place"]
-        if dot(up, toward) <= 0 or dot(other_up, toward) >= 0:
-            return 0.0
-        return float(free(corners, start[None], end[None])[0])
-
-    return see
+def sight(frame, levels, at, asked):
+    """Return V of receivers and samples: rays between the pixels whose surfaces they hold, off their triangles."""
+    buffer, corners = frame.gbuffer, corners_of(frame.scene.geometry)
+    receiver, sender = (level["pixel"] for level in levels)
+    pixels = np.broadcast_to(receiver[..., None], asked.shape)[asked], sender[at][asked]
+    triangles, normals, points = (array.reshape(*array.shape[:-2], -1) for array in (
+        buffer.triangle_id, buffer.normal, buffer.position))
+    up, other_up = (face_normals(frame.scene.geometry, triangles[one], normals[:, one].T) for one in pixels)
+    toward = (levels[1]["position"][:, *at] - levels[0]["position"][..., None])[:, asked].T
+    visible = np.zeros(asked.shape)
+    faces = ((up * toward).sum(axis=1) > 0) & ((other_up * toward).sum(axis=1) < 0)
+    start, end = (points[:, one].T + LIFT * normal for one, normal in zip(pixels, (up, other_up), strict=True))
+    visible[asked] = faces * free(corners, start, end)
+    return visible

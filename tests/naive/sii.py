@@ -8,10 +8,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from refgi.literal.upsampling import joint_bilateral
 from refgi.settings import replaced
 from tests.naive import raster
 from tests.naive.draws import draw
-from tests.naive.joint_bilateral import joint_bilateral
 from tests.naive.pair_term import Part, diffuse_peak, intensity, lobe_norms, parts, received, towards
 
 
@@ -19,7 +19,8 @@ def sii(frame, settings, lights, footprint=None):
     """Return the irradiance (3, h, w) of a frame by its pixel lights; `footprint` is the area (N,) of each."""
     picture = np.zeros((3, *frame.gbuffer.covered.shape))
     picture[:, frame.gbuffer.covered] = irradiance(frame, settings, lights, footprint)
-    return joint_bilateral(frame.gbuffer, picture) if settings.half_resolution else picture
+    surfaces = frame.gbuffer.position, frame.gbuffer.normal, frame.gbuffer.covered
+    return joint_bilateral(*surfaces, picture) if settings.half_resolution else picture
 
 
 def cut_irradiance(frame, settings, lights, footprint=None):

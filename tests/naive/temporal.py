@@ -1,11 +1,8 @@
-"""Slow literal twin of a sequence with temporal coherence (Soler et al. 2009, Sec. 3.3), pixel by pixel."""
-
-import math
+"""A sequence with temporal coherence (Soler et al. 2009, Sec. 3.3), put together from refgi.literal."""
 
 import numpy as np
 
-from tests.naive.reprojection import place
-from tests.naive.screen_space import fetched
+from refgi.literal.temporal import blend, clamp, entering, motion, reprojection
 
 
 def filtered(frames, lights, settings):
@@ -20,79 +17,25 @@ def filtered(frames, lights, settings):
 
 def blended(frame, light, last, before, count, settings):
     """Blend the light of a frame with that of the frame before; return it and in how many frames points were found."""
-    covered = frame.gbuffer.covered
+    triangle_id, view = frame.gbuffer.triangle_id, last.gbuffer.projection
     position, normal, speed = moved_back(frame, last.scene.geometry)
-    where = position, normal, covered, settings.depth_tolerance, settings.normal_cosine, settings.fetch
-    found, weight = fetched(before, last, *where)
-    seen = fetched(np.stack([count] * 3), last, *where)[0][0]
-    result = light.copy()
-    for pixel in np.argwhere(covered):
-        at = tuple(pixel)
-        a, earlier = settings.weight, found[:, *at]
-        if weight[at] == 0:
-            entered = at_edge(last, before, position[:, *at], at)
-            if entered is None or settings.entering_speed is None:
-                continue
-            earlier, moved = entered
-            a *= math.exp(-moved / settings.entering_speed)
-        elif settings.warm_up and settings.form == "recursive":
-            a = min(a, seen[at] / (seen[at] + 1))
-        if settings.clamp is not None:
-            earlier = clamped(earlier, light, covered, at, settings.clamp, settings.clamp_radius)
-        a *= math.exp(-speed[at] / settings.speed)
-        result[:, *at] = a * earlier + (1 - a) * light[:, *at]
-    return result, np.where(weight > 0, seen + 1, 1)
-
-
-def at_edge(last, before, point, pixel):
-    """Return the light at the edge next to a point outside the earlier picture, and how far it moved, in pixels."""
-    view, (height, width) = last.gbuffer.projection, last.gbuffer.covered.shape
-    seen = place(point, view.origin[0], *view.frame[0], view.half[1], height, width)
-    if seen is None or (-0.5 <= seen[0] <= width - 0.5 and -0.5 <= seen[1] <= height - 0.5):
-        return None
-    i, j = (round(min(max(c, 0), most - 1)) for c, most in ((seen[1], height), (seen[0], width)))
-    if not last.gbuffer.covered[i, j]:
-        return None
-    return before[:, i, j], math.hypot(seen[0] - pixel[1], seen[1] - pixel[0])
-
-
-def clamped(earlier, light, covered, pixel, deviations, radius):
-    """Bound light by mean and standard deviation of the new light in a square of pixels with a surface."""
-    square = tuple(slice(max(0, c - radius), c + radius + 1) for c in pixel)
-    around = light[:, *square][:, covered[square]]
-    middle, spread = around.mean(axis=1), deviations * around.std(axis=1)
-    return np.clip(earlier, middle - spread, middle + spread)
+    camera, (depth, last_normal) = (view.origin, view.frame, view.half), last.gbuffer.resolve("depth", "normal")
+    earlier, weight, seen = reprojection(position, normal, triangle_id, *camera, depth, last_normal, before,
+                                         settings.depth_tolerance, settings.normal_cosine, settings.fetch, count)
+    share = None
+    if settings.entering_speed is not None:
+        earlier, share = entering(earlier, weight, position, triangle_id, *camera, depth, before,
+                                  settings.entering_speed)
+    if settings.clamp is not None:
+        earlier = clamp(earlier, light, triangle_id, settings.clamp, settings.clamp_radius)
+    counted = seen if settings.warm_up and settings.form == "recursive" else None
+    result = blend(light, earlier, weight, settings.weight, settings.speed, counted, share, speed)[0]
+    return np.where(triangle_id >= 0, result, light), np.where(weight > 0, seen + 1, 1)
 
 
 def moved_back(frame, before):
     """Return where each pixel's surface point was, its normal there, and how far it moved in pixels of this camera."""
-    buffer, geometry = frame.gbuffer, frame.scene.geometry
+    buffer, geometry, view = frame.gbuffer, frame.scene.geometry, frame.gbuffer.projection
     position, normal = (plane.astype(float) for plane in buffer.resolve("position", "normal"))
-    speed = np.zeros(buffer.covered.shape)
-    for pixel in np.argwhere(buffer.covered):
-        at = tuple(pixel)
-        corners = geometry.faces[buffer.triangle_id[at]]
-        now, then = geometry.vertices[corners], before.vertices[corners]
-        weights = barycentric(now, position[:, *at])
-        back = position[:, *at] + weights @ (then - now)
-        speed[at] = pixels_between(buffer.projection, position[:, *at], back)
-        if geometry.vertex_normals is not None:
-            turned_now, turned_then = (weights @ g.vertex_normals[corners] for g in (geometry, before))
-        else:
-            turned_now, turned_then = (np.cross(t[1] - t[0], t[2] - t[0]) for t in (now, then))
-        side = math.copysign(1.0, turned_now @ normal[:, *at])
-        position[:, *at], normal[:, *at] = back, side * turned_then / np.linalg.norm(turned_then)
-    return position, normal, speed
-
-
-def barycentric(corners, point):
-    """Return the weights of a triangle's corners at a point of its plane."""
-    (b, c), *_ = np.linalg.lstsq((corners[1:] - corners[0]).T, point - corners[0], rcond=None)
-    return np.array([1 - b - c, b, c])
-
-
-def pixels_between(view, one, other):
-    """Return how far apart a picture shows two points."""
-    axes = (view.origin[0], *view.frame[0], view.half[1], view.height, view.width)
-    (x, y, _), (u, v, _) = place(one, *axes), place(other, *axes)
-    return math.hypot(x - u, y - v)
+    return motion(position, normal, buffer.triangle_id, geometry.faces, geometry.vertices, before.vertices,
+                  view.origin, view.frame, view.half, geometry.vertex_normals, before.vertex_normals)

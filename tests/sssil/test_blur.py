@@ -1,13 +1,13 @@
-"""Geometry-aware blur of a level: against loops, and what it must keep."""
+"""Geometry-aware blur of a level: against the literal text, and what it must keep."""
 
 import numpy as np
 import pytest
 
 from refgi.jit import threads
+from refgi.literal import upsampling as literal
 from refgi.sssil.blur import TALL, WIDE, blur
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import GeometryBlur
-from tests.naive import level_blur
 
 # of the largest value: means of up to 17 terms
 ROUNDING = {np.float64: 1e-14, np.float32: 3e-6}
@@ -38,27 +38,19 @@ def plain(shape, dtype=np.float64):
                     np.ones(shape, bool), dtype)
 
 
-def texels_of(level):
-    """Return the level as the twins have it."""
-    position, normal, depth = (array.astype(float) for array in (level.position, level.normal, level.depth))
-    return [[None if np.isinf(depth[at]) else
-             {"place": position[:, *at], "normal": normal[:, *at], "depth": depth[at]}
-             for at in ((row, column) for column in range(level.shape[1]))] for row in range(level.shape[0])]
-
-
 @pytest.mark.parametrize("settings", [GeometryBlur(), GeometryBlur(1), GeometryBlur(3, 0.05, 0.5),
                                       GeometryBlur(8, 0.02, -1.0), GeometryBlur(16, 1e6, 0.8)], ids=str)
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_equals_the_mean_written_as_loops(dtype, settings, evidence):
+def test_equals_the_literal_text(dtype, settings, evidence):
     """Oracle: more texels than a tile of work along both axes, and pictures smaller than the window."""
     for shape in ((TALL + 5, WIDE + 9), (3, 5), (1, 1)):
         level, light = steps(shape, dtype)
-        expected = level_blur.blurred(light.astype(float), texels_of(level), settings.size, settings.plane_tolerance,
-                                      settings.cosine)
+        planes = (plane.astype(float) for plane in (light, level.position, level.normal, level.depth))
+        expected = literal.blur(*planes, settings.size, settings.plane_tolerance, settings.cosine)
         found = blur(light, level, settings)
         assert found.dtype == dtype
         np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING[dtype] * expected.max())
-    evidence(f"{settings}: within {ROUNDING[dtype]:.0e} of the loops, {np.dtype(dtype).name}")
+    evidence(f"{settings}: within {ROUNDING[dtype]:.0e} of the literal text, {np.dtype(dtype).name}")
 
 
 @pytest.mark.parametrize("size", [2, 4, 8])

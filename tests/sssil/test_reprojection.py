@@ -1,4 +1,4 @@
-"""`look_up`: against its literal twin and closed forms, what it refuses, and that it depends on nothing else."""
+"""`look_up`: against the literal text and closed forms, what it refuses, and that it depends on nothing else."""
 
 import math
 
@@ -8,10 +8,10 @@ import pytest
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.literal import temporal as literal
 from refgi.rsm.raster.projection import camera_projection, cube_projection
 from refgi.scene import Camera, load_scene
 from refgi.sssil.reprojection import SourceView, reproject
-from tests.naive import reprojection as naive
 
 TESTS = {"depth_tolerance": 0.02, "normal_cosine": 0.95}
 # float32 places are right to 1e-6 of a room a metre deep: 1e-4 texels at 40 rows, and as much of a value's step
@@ -57,23 +57,19 @@ def views():
 
 
 @pytest.mark.parametrize("single", [True, False])
-def test_equals_the_naive_twin(views, single):
+def test_equals_the_literal_text(views, single):
     there, here = views[0 if single else 1]
     values = np.random.default_rng(3).random((3, 30, 40)).astype(here.dtype)
     seen, buffer = source_of(there), here.gbuffer
     found, weight = reprojected(values, seen, here)
-    frame = seen.projection.frame[0]
-    view = (seen.projection.origin[0], *frame, math.tan(there.scene.camera.vfov / 2))
-    worst, differing = 0.0, 0
-    for i, j in np.argwhere(buffer.covered):
-        mean, share = naive.reproject(values, seen.depth, seen.normal, buffer.position[:, i, j], buffer.normal[:, i, j],
-                                    view, TESTS["depth_tolerance"], TESTS["normal_cosine"])
-        if abs(share - weight[i, j]) > TWIN_32:
-            differing += 1  # a test that rounding decides
-        else:
-            worst = max(worst, float(np.abs(mean - found[:, i, j]).max()))
-    assert worst < (TWIN_32 if single else TWIN_64)
-    assert differing <= (2 if single else 0)
+    half_v = math.tan(there.scene.camera.vfov / 2)
+    camera = seen.projection.origin, seen.projection.frame, np.array([half_v * 40 / 30, half_v])
+    mean, share = literal.reproject(*(plane.astype(float) for plane in (values, buffer.position, buffer.normal)),
+                                    buffer.covered, *camera, seen.depth.astype(float), seen.normal.astype(float),
+                                    *TESTS.values(), "bilinear")
+    alike = np.abs(share - weight) <= TWIN_32  # others are tests that rounding decides
+    assert np.abs(mean - found)[:, alike].max() < (TWIN_32 if single else TWIN_64)
+    assert (~alike).sum() <= (2 if single else 0)
     assert 0.5 < weight[buffer.covered].mean() < 1
 
 

@@ -8,20 +8,22 @@ from typing import Any
 
 import numpy as np
 
+from refgi.literal import hssil_crown as literal
 from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.settings import replaced
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.crown.pattern import PHASES, tile_offsets
 from refgi.sssil.crown.points import key_shift, level_key, pixel_key, row_key, sample_points, tile_shifts
 from refgi.sssil.settings import HssilSettings, SamplingSettings
-from refgi.vectors.bugs.crown_gather import EQ4, SENDER, gather_bugs
-from refgi.vectors.bugs.crown_points import point_bugs, sequence_bugs
-from refgi.vectors.bugs.crown_sample import CROWN, sample_bugs
-from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Array, Arrays, Spec
-from refgi.vectors.stages.crown_sets import add_every_texel, add_mirrored
+from refgi.vectors.recipe import Recipe, reading, writing
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import Array, Arrays, Bug, Spec
+from refgi.vectors.stages.crown_sets import CROWN, add_every_texel, add_mirrored
 from refgi.vectors.stages.levels import level_names, level_of
 
+EQ4 = "HSS Eq. 4 with its pi (E-HSS-04): pi cos R^2 / (r^2 + R^2), R^2 = cos' ds / pi"
+AREA = "E-HSS-06"
+SENDER = ("position", "normal", "radiance", "area")
 BELOW_1 = 1.0 - 2.0**-24
 POINTS = Spec("sample, (u, cos 2 pi v, sin 2 pi v)", "1", "points that all texels share")
 
@@ -61,9 +63,12 @@ def add_samples(
                                        np.ascontiguousarray(arrays[shifts], real), radius, sampling.density)
         return {f"{name}.offsets": offsets, f"{name}.weight": weight}
 
+    form = Form(literal.crown_samples, {"points": points, "shifts": shifts}, (*_specs(name),),
+                {"inner": inner, "radius": radius, "density": sampling.density})
+    kinds = ("", f"/{sampling.density}", *(("/disc", f"/{sampling.density} disc") if inner else ()))
     recipe.add(name, "texels around a receiver that are its samples, and how many texels each stands for", run,
-               (points, shifts), _specs(name), paper=CROWN,
-               bugs=tuple(sample_bugs(name, inner, radius, sampling.density)))
+               (points, shifts), _specs(name), paper=CROWN, bugs=form.bugs(*(f"crown_samples{one}" for one in kinds)),
+               variants=(form.run(),))
 
 
 def _specs(name: str) -> dict[str, Spec]:
@@ -84,12 +89,36 @@ def add_gather(recipe: Recipe, settings: HssilSettings, index: int) -> None:
         chosen = _in_phases(np.asarray(arrays[samples[0]], np.int32), np.asarray(arrays[samples[1]], real))
         return {name: gather(level_of(arrays, index, number, real), index, plain, samples=chosen)}
 
-    bugs = gather_bugs(index, *settings.sampling.counts(index))
+    form = Form(literal.gather, {**{key: f"level{index}.{key}" for key in SENDER}, "offsets": samples[0],
+                                 "weight": samples[1]}, (name,))
     recipe.facts[name.split(".")[0]] = {"form_factor": settings.senders.form_factor}
     recipe.add(name.split(".")[0], "irradiance of a level's texels by their samples, those outside the picture, on "
                "nothing or on the texel itself left out", run, (*planes, *samples), {
                    name: Spec("rgb, row, column", "W/m^2", "irradiance by this level; 0 without surface", "linear RGB",
-                              EQ4)}, paper=f"HSS Eq. 1; {EQ4}", exact=(planes[0],), bugs=tuple(bugs))
+                              EQ4)}, paper=f"HSS Eq. 1; {EQ4}", exact=(planes[0],), variants=(form.run(),), bugs=(
+                       *form.bugs("gather"), *_parts_left_out(form, settings.sampling.counts(index)[0]),
+                       *_scaled_again(form, index)))
+
+
+def _parts_left_out(form: Form, inner: int) -> tuple[Bug, ...]:
+    """Return bugs of disc and crown as a whole; the first `inner` samples are those of the disc."""
+    def only(part: slice) -> Bug:
+        """Return a sum over a part of the samples."""
+        names = (form.reads[key].replace(".", "__") for key in ("offsets", "weight"))
+        cut = dict(zip(names, (lambda a: a[..., part, :], lambda a: a[..., part]), strict=True))
+        left = "disc are left out: the crown" if part.start else "crown are left out: the disc"
+        return Bug(f"the samples of the {left} alone", reading(form.run(), **cut), "HSS Sec. 3.2")
+
+    return (only(slice(inner, None)), only(slice(inner))) if inner else ()
+
+
+def _scaled_again(form: Form, index: int) -> tuple[Bug, ...]:
+    """Return bugs of 4^k, which areas of level k have already."""
+    area, light = (name.replace(".", "__") for name in (form.reads["area"], form.writes[0]))
+    return (Bug("areas are scaled by 4^k a second time", writing(form.run(), **{light: lambda a: a * 4.0**index}),
+                AREA),
+            Bug("areas are divided by 4^k: a coarse texel counts as one of the first level",
+                reading(form.run(), **{area: lambda a: a / 4.0**index}), AREA)) if index else ()
 
 
 def _in_phases(offsets: Array, weight: Array) -> tuple[Array, Array]:
@@ -101,9 +130,12 @@ def _in_phases(offsets: Array, weight: Array) -> tuple[Array, Array]:
 
 
 def _add_points(recipe: Recipe, name: str, inner: int, crown: int) -> None:
+    form = Form(literal.sample_points, {}, (f"{name}.points",), {"inner": inner, "crown": crown})
+    kinds = ("", "/alone", *(("/disc",) if inner else ()))
     recipe.add(f"points of {name}", "points of the sequence, j steps from 1/2, the disc's then the crown's; modulo 1, "
                "in double precision", lambda arrays, real: {f"{name}.points": sample_points(inner, crown)},  # noqa: ARG005
-               (), {f"{name}.points": POINTS}, paper=CROWN, bugs=tuple(point_bugs(name, inner, crown)))
+               (), {f"{name}.points": POINTS}, paper=CROWN,
+               bugs=form.bugs(*(f"sample_points{one}" for one in kinds)), variants=(form.run(),))
 
 
 def _add_shifts(recipe: Recipe, name: str, counts: tuple[int, int], tile: tuple[int, int]) -> None:
@@ -114,10 +146,15 @@ def _add_shifts(recipe: Recipe, name: str, counts: tuple[int, int], tile: tuple[
         return {f"{name}.points": sample_points(inner, crown),
                 f"{name}.shifts": np.minimum(tile_shifts(start, tile, crown), BELOW_1)}
 
+    form = Form(literal.points_and_shifts, {"start": f"{name}.shift"}, (f"{name}.points", f"{name}.shifts"),
+                {"inner": inner, "crown": crown, "rows": tile[0], "columns": tile[1]})
+    lists = ("sample_points", "tile_shifts", "points_and_shifts",
+             *(("sample_points/disc", "tile_shifts/disc") if inner else ()),
+             *(("tile_shifts/oblong",) if tile[0] != tile[1] else ()))
     recipe.add(f"shifts of {name}", "points of the sequence, j steps from 1/2, the disc's then the crown's; texel n of "
                "the tile, row by row, is shifted by n times the crown's number of steps more; all modulo 1, in double "
                "precision", run, (f"{name}.shift",), {
                    f"{name}.points": POINTS,
                    f"{name}.shifts": Spec("row of the tile, column of the tile, uv", "1",
                                           "what each texel of a tile adds to u and v, modulo 1"),
-               }, paper=CROWN, exact=(f"{name}.shift",), bugs=tuple(sequence_bugs(name, inner, crown, tile)))
+               }, paper=CROWN, exact=(f"{name}.shift",), bugs=form.bugs(*lists), variants=(form.run(),))

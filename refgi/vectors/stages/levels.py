@@ -7,15 +7,20 @@ from typing import Any
 
 import numpy as np
 
+from refgi.literal import hssil_levels as literal
 from refgi.rsm.raster.projection import Projection
 from refgi.sssil.pyramid.levels import levels, next_level
 from refgi.sssil.pyramid.view import Level
-from refgi.vectors.bugs.level import CLOSEST, EQ2, coarser_level_bugs, first_level_bugs
-from refgi.vectors.bugs.nearest_texels import PLANES, VECTORS
 from refgi.vectors.recipe import Recipe
+from refgi.vectors.rows import Form
 from refgi.vectors.spec import Array, Arrays, Bug, Spec
 from refgi.vectors.stages.buffers import VECTOR
 
+EQ2 = "HSS Eq. 2 with tan(f / 2) (E-HSS-03), dP = 4^k pixels (E-HSS-06)"
+CLOSEST = "HSS Sec. 4: the closest of four, with its own position, normal and colour (E-HSS-09)"
+EYE = "positions are relative to the eye, z times the ray of depth 1 through the pixel's centre (E-HSS-10)"
+PLANES = ("position", "depth", "normal", "radiance", "area", "pixel")
+VECTORS = ("position", "normal", "radiance")
 PICTURE = ("gbuffer.depth", "gbuffer.normal", "gbuffer.albedo", "direct.irradiance", "camera.frame", "camera.half")
 
 
@@ -48,31 +53,64 @@ def level_names(index: int, *keys: str) -> tuple[str, ...]:
     return tuple(f"level{index}.{key}" for key in keys)
 
 
-def _add_first(recipe: Recipe, view: Projection, first: int) -> None:
-    def run(arrays: Arrays, real: Any, downsample: str = "closest") -> Arrays:
-        return _named(0, first_level_of(arrays, view, first, real, downsample))
+def picture_reads() -> dict[str, str]:
+    """Return what the literal form of a first level reads."""
+    return dict(zip(("depth", "normal", "albedo", "irradiance", "frame", "half"), PICTURE, strict=True))
 
-    several = (
-        Bug("positions, normals and radiance are means", lambda a, r: run(a, r, "average"), CLOSEST),
-        Bug("radiance is the mean over the texel", lambda a, r: run(a, r, "closest_average"), CLOSEST),
-    ) if first else ()
-    cut = any(size % (1 << first) for size in (view.height, view.width))
+
+def level_reads(index: int, *keys: str) -> dict[str, str]:
+    """Return what a literal form reads of a level."""
+    return {{"position": "place"}.get(key, key): f"level{index}.{key}" for key in keys}
+
+
+def _add_first(recipe: Recipe, view: Projection, first: int) -> None:
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        return _named(0, first_level_of(arrays, view, first, real, "closest"))
+
+    form = Form(literal.first_level, picture_reads(), level_names(0, *PLANES), {"number": first})
+    cut = first > 0 and any(size % (1 << first) for size in (view.height, view.width))
+    lists = ("first_level", "first_level/places", *(("first_level/several", "first_level/several/places") if first else
+                                                    ()), *(("first_level/cut",) if cut else ()))
     recipe.add("level0", f"nearest surface to each texel of {1 << first} x {1 << first} pixels, what it reflects and "
                "the surface that the texel stands for", run, PICTURE, level_specs(0, view), paper=f"{CLOSEST}; {EQ2}",
-               exact=(PICTURE[0],), bugs=(*several, *first_level_bugs(view, first, cut)))
+               exact=(PICTURE[0],), bugs=(*form.bugs(*lists), *_in_world(form, view)), variants=(form.run(),))
+
+
+def _in_world(form: Form, view: Projection) -> tuple[Bug, ...]:
+    """Return bugs of places in the world, with areas of them or of the right places; the stage reads no eye."""
+    cause = "positions lie in the world, not relative to the eye: the camera's origin is added"
+
+    def run(arrays: Arrays, real: Any) -> dict[str, Array]:
+        made = dict(form.run()(arrays, real))
+        seen = made["level0.pixel"] >= 0
+        return {**made, "level0.position": made["level0.position"] + seen * view.origin[0][:, None, None]}
+
+    def with_area(arrays: Arrays, real: Any) -> Arrays:
+        made = run(arrays, real)
+        seen, n = made["level0.pixel"] >= 0, made["level0.normal"]
+        z = np.where(seen, made["level0.depth"], 1)
+        rays = (made["level0.position"] - seen * view.origin[0][:, None, None]) / z, made["level0.position"] / z
+        right, wrong = (np.abs((n * d).sum(axis=0)) for d in rays)
+        return {**made, "level0.area": made["level0.area"] * np.where(seen, right, 1) / np.where(seen, wrong, 1)}
+
+    return Bug(cause, with_area, EYE), Bug(cause, run, EYE)
 
 
 def _add_coarser(recipe: Recipe, view: Projection, first: int, index: int) -> None:
-    number, shape = first + index, (view.height, view.width)
+    number, size = first + index, (view.height, view.width)
 
     def run(arrays: Arrays, real: Any) -> Arrays:
-        return _named(index, next_level(level_of(arrays, index - 1, number - 1, real), shape))
+        return _named(index, next_level(level_of(arrays, index - 1, number - 1, real), size))
 
+    form = Form(literal.coarser_level, level_reads(index - 1, *PLANES), level_names(index, *PLANES),
+                {"number": number, "size": size})
+    cut = size[0] % (1 << number) > 0, size[1] % (1 << number) > 0
+    lists = ("coarser_level", *(("coarser_level/cut",) if any(cut) else ()),
+             *(f"coarser_level/cut {name}" for name, one in zip(("rows", "columns"), cut, strict=True) if one))
     fine = level_names(index - 1, *PLANES)
-    cut = shape[0] % (1 << number) > 0, shape[1] % (1 << number) > 0
-    bugs = coarser_level_bugs(index, number, shape, cut)
     recipe.add(f"level{index}", "the nearest of four texels of the finer level, or of the two or one that there are",
-               run, fine, level_specs(index, view), paper=f"{CLOSEST}; {EQ2}", exact=(fine[1],), bugs=tuple(bugs))
+               run, fine, level_specs(index, view), paper=f"{CLOSEST}; {EQ2}", exact=(fine[1],),
+               bugs=form.bugs(*lists), variants=(form.run(),))
 
 
 def _named(index: int, level: Level) -> dict[str, Array]:

@@ -5,11 +5,11 @@ import pytest
 
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.literal.upsampling import joint_bilateral
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.half_resolution import _block_pixels, half_resolution
-from tests.naive.joint_bilateral import joint_bilateral
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
@@ -53,7 +53,7 @@ def test_it_is_the_filter_of_the_formula(size, evidence):
     evaluate, _ = of_positions(lambda x, y, z: 1 + x + 2 * y * y - z)
     light = evaluate(receivers)
     got = half_resolution(receivers, evaluate)
-    error = np.abs(got - joint_bilateral(receivers, light)).max()
+    error = np.abs(got - joint_bilateral(*receivers[:3], light)).max()
     assert error < 1e-12 * max(1.0, np.abs(light).max())
     assert not got[:, ~receivers.covered].any()
     evidence(f"{size}: {error:.0e} off the literal filter")
@@ -131,7 +131,7 @@ def scene(request):
 def test_the_method_at_half_resolution_is_the_filtered_picture(scene, evidence):
     """Oracle: the literal filter over the pixels of the picture at full resolution."""
     name, full, half, receivers = scene
-    off = np.abs(half - joint_bilateral(receivers, full)).max() / full.max()
+    off = np.abs(half - joint_bilateral(*receivers[:3], full)).max() / full.max()
     assert off < ROUNDING
     evidence(f"{name}: sii(half_resolution=True) is {off:.0e} of the maximum off the literal filter of sii")
 
@@ -147,7 +147,7 @@ def test_the_error_on_scenes_is_less_than_that_of_any_wrong_filter(scene, eviden
     flat = full.reshape(3, -1)
     blocks = flat[:, _block_pixels(receivers.covered)].repeat(2, axis=1).repeat(2, axis=2)
     wrong = {"none": blocks * receivers.covered,
-             "plain": joint_bilateral(wall(*receivers.covered.shape)._replace(covered=receivers.covered), full),
+             "plain": joint_bilateral(*wall(*receivers.covered.shape)[:2], receivers.covered, full),
              "a pixel right": np.roll(half, 1, axis=2) * receivers.covered,
              "a pixel down": np.roll(half, 1, axis=1) * receivers.covered}
     off = error(half)

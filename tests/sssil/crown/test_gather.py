@@ -1,4 +1,4 @@
-"""Sums over samples: against loops written from the paper, and what they must keep whatever the numbers."""
+"""Sums over samples: against the literal text, and what they must keep whatever the numbers."""
 
 import math
 
@@ -8,6 +8,7 @@ import pytest
 
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.literal import hssil_crown as literal
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.sssil.crown.add import DISC
@@ -15,8 +16,8 @@ from refgi.sssil.crown.gather import _list_emitting, gather
 from refgi.sssil.crown.pattern import samples_at
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import PRESETS, HssilSettings
-from tests.naive import crown as naive
 from tests.sssil.crown.counting import COUNTED, reads_of_levels
+from tests.sssil.crown.shares import share_inside
 
 SETTINGS = of(HssilSettings, radius=3.3, samples=9, levels=2)
 # of the largest value: terms of a sum of up to 200, each with a dozen roundings
@@ -34,18 +35,32 @@ def random_level(shape, dtype=np.float64, seed=0, background=0.2, number=1):
     return Level(number, *(np.ascontiguousarray(plane, dtype) for plane in planes), pixel)
 
 
+def summed(level, sampling, index, form, share):
+    """Return the sum of the literal text over the samples that the package draws for each texel."""
+    each = [[samples_at(sampling, index, 1, row, column) for column in range(level.shape[1])]
+            for row in range(level.shape[0])]
+    offsets, weight = (np.array([[one[k] for one in row] for row in each]) for k in (0, 1))
+    position, normal, radiance, area = (np.asarray(plane, float) for plane in (
+        level.position, level.normal, level.radiance, level.area))
+    if (form, share) == ("disc", 1.0):
+        return literal.gather(position, normal, radiance, area, offsets, weight)
+    i, j, texels = literal.samples_at(level.shape, offsets, weight)
+    pairs = position[..., None], normal[..., None], position[:, i, j], normal[:, i, j]
+    factor = (literal.shared_disc_form_factor(*pairs, area[i, j], texels, share) if form == "disc" else
+              literal.point_form_factor(*pairs, area[i, j] * texels))
+    return (factor * radiance[:, i, j]).sum(axis=-1)
+
+
 @pytest.mark.parametrize(("form", "share"), [("disc", 1.0), ("disc", 0.25), ("disc", 0.0), ("point", 0.25)])
 @pytest.mark.parametrize("density", ["inverse_distance", "uniform"])
 @pytest.mark.parametrize("pattern", ["interleaved", "row", "fixed", "all", "pixel"])
-def test_equals_the_sum_written_as_loops(pattern, density, form, share):
+def test_equals_the_literal_text(pattern, density, form, share):
     """Oracle: every pattern and form, float64, first level and a later one, odd sizes."""
     for shape, index in (((7, 11), 0), ((9, 6), 1)):
         level = random_level(shape, seed=index)
         settings = replaced(SETTINGS, {"pattern": pattern, "density": density, "form_factor": form,
                                        "disc_share": share})
-        expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
-                                  lambda row, column, s=settings, i=index: samples_at(s.sampling, i, 1, row, column),
-                                  form, share)
+        expected = summed(level, settings.sampling, index, form, share)
         assert expected.max() > 0
         np.testing.assert_allclose(gather(level, index, settings), expected, rtol=0,
                                    atol=ROUNDING[np.float64] * expected.max())
@@ -59,8 +74,7 @@ def test_a_sample_of_less_than_a_texel_has_no_larger_disc(pattern):
     weight = samples_at(settings.sampling, 0, 1, 3, 5)[1]
     assert (weight < 1).sum() > 50
     assert (weight > 1).any()
-    expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
-                              lambda row, column: samples_at(settings.sampling, 0, 1, row, column), "disc", 0.25)
+    expected = summed(level, settings.sampling, 0, "disc", 0.25)
     np.testing.assert_allclose(gather(level, 0, settings), expected, rtol=0,
                                atol=ROUNDING[np.float64] * expected.max())
 
@@ -80,12 +94,11 @@ def test_a_sample_is_summed_for_the_lanes_that_it_emits_for(trims, lanes):
 
 
 def test_single_precision_rounds_and_no_more():
-    """Oracle: float32 against the loops on the same numbers; several strips of lanes, some of them dark."""
+    """Oracle: float32 against the literal text on the same numbers; several strips of lanes, some of them dark."""
     level = random_level((5, 700), np.float32)
     level.radiance[:, :, 100:500] = 0
     settings = replaced(SETTINGS, {"samples": 4})
-    expected = naive.gathered((level.position, level.normal, level.radiance, level.area),
-                              lambda row, column: samples_at(settings.sampling, 0, 1, row, column), "disc", 0.25)
+    expected = summed(level, settings.sampling, 0, "disc", 0.25)
     found = gather(level, 0, settings)
     assert found.dtype == np.float32
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING[np.float32] * expected.max())
@@ -233,7 +246,7 @@ def _of_shares(level, radius):
     """Sum every texel by the share of it that lies in the crown: what the mean of all patterns must be."""
     reach = math.ceil(2 * radius) + 1
     offsets = [(x, y) for x in range(-reach, reach + 1) for y in range(-reach, reach + 1)]
-    share = [naive.share_inside(x, y, radius, 2 * radius) for x, y in offsets]
+    share = [share_inside(x, y, radius, 2 * radius) for x, y in offsets]
     kept = [(offset, s) for offset, s in zip(offsets, share, strict=True) if s > 0]
     position, normal, area = level.position, level.normal, level.area
     total = np.zeros(level.shape)

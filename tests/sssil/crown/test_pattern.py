@@ -10,7 +10,7 @@ from refgi.settings import of, replaced
 from refgi.sssil.crown.pattern import row_offsets, samples_at
 from refgi.sssil.crown.reach import coverage, texel_weights
 from refgi.sssil.settings import HssilSettings
-from tests.naive import crown as naive
+from tests.sssil.crown.shares import share_inside
 
 SETTINGS = of(HssilSettings, radius=4.0, samples=12, inner_samples=5, levels=3)
 ROWS = 6000
@@ -26,7 +26,7 @@ def test_texels_get_their_share_of_the_crown(density, index, evidence):
     found = texel_weights(replaced(SETTINGS, {"pattern": "row", "density": density}).sampling, index, 1 + index, ROWS)
     reach = found.shape[0] // 2
     low = 0.0 if index == 0 else SETTINGS.sampling.radius
-    share = np.array([[naive.share_inside(ox, oy, low, 2 * SETTINGS.sampling.radius) for ox in range(-reach, reach + 1)]
+    share = np.array([[share_inside(ox, oy, low, 2 * SETTINGS.sampling.radius) for ox in range(-reach, reach + 1)]
                       for oy in range(-reach, reach + 1)])
     most = 3 * math.pi * 16 / 12
     error = np.abs(found - share) / np.sqrt(most * np.maximum(share, 1e-9) / ROWS + 1e-5)

@@ -1,4 +1,4 @@
-"""Levels of what a camera sees: against the literal twin, the buffers they are made of, and mirrored pictures."""
+"""Levels of what a camera sees: against the literal text, the buffers they are made of, and mirrored pictures."""
 
 import math
 
@@ -8,13 +8,13 @@ import pytest
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.literal import hssil_levels as literal
 from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.sssil.pyramid.levels import pyramid, useful_levels
 from refgi.sssil.settings import HssilSettings
 from refgi.stages import Memory, observe
-from tests.naive import view_pyramid as naive
 from tests.naive.crossings import LIFT, corners_of, free
 from tests.sssil.pyramid.pictures import FLOAT32, FLOAT64, camera, made, random_picture, same
 from tests.wiring.cases import LAMPS, room
@@ -23,61 +23,63 @@ DIRECT = 1e-9  # of the brightest: float64 in another order
 MODES = ("closest", "average", "closest_average")
 
 
-def literal(picture, view, first, count, mode, tangents="half"):
-    """The same levels by the twin."""
-    half_v = math.tan(view.vfov / 2)
-    depth, *vectors = picture
-    return naive.levels({
-        "depth": depth, "normal": np.moveaxis(vectors[0], 0, -1), "albedo": np.moveaxis(vectors[1], 0, -1),
-        "direct": np.moveaxis(vectors[2], 0, -1), "f_v": view.vfov,
-        "f_h": 2 * math.atan(half_v * view.width / view.height), "axes": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
-    }, first, count, mode, tangents)
+def levels_by_text(picture, view, first, count, mode, tangents="half"):
+    """Return the same levels by the literal text, as tuples of planes: of means with the pixels of the closest."""
+    camera_, shape = camera_projection(view), picture[0].shape
+    seen = *picture, camera_.frame, camera_.half
+    closest = [literal.first_level(*seen, first)]
+    for number in range(first + 1, first + count):
+        closest.append(literal.coarser_level(*closest[-1], number, shape))
+    made = closest
+    if mode == "average":
+        made = [literal.first_mean(*seen, first)]
+        for _ in range(count - 1):
+            made.append(literal.level_of_means(*made[-1]))
+        made = [(*means, nearest[5]) for means, nearest in zip(made, closest, strict=True)]
+    if mode == "closest_average":
+        made = [literal.first_mean_radiance(*seen, first)]
+        for number in range(first + 1, first + count):
+            made.append(literal.coarser_mean_radiance(*made[-1], number, shape))
+    wide = 1.0 if tangents == "half" else 4 / np.prod(1 - camera_.half**2)  # tan f = 2 t / (1 - t^2)
+    return [(*planes[:4], wide * planes[4], planes[5]) for planes in made]
 
 
-def assert_equal_to(expected, level, width, rtol):
-    assert level.shape == (len(expected), len(expected[0]))
-    for i, j in np.ndindex(level.shape):
-        texel = expected[i][j]
-        if texel is None:
-            assert level.pixel[i, j] == -1
-            assert level.depth[i, j] == np.inf
-            for plane in (level.position, level.normal, level.radiance, level.area[None]):
-                assert (plane[:, i, j] == 0).all()
-            continue
-        assert level.pixel[i, j] == texel["pixel"][0] * width + texel["pixel"][1]
-        for key, plane in (("z", level.depth), ("A", level.area)):
-            np.testing.assert_allclose(plane[i, j], texel[key], rtol=rtol)
-        for key, plane in (("p", level.position), ("n", level.normal), ("L", level.radiance)):
-            np.testing.assert_allclose(plane[:, i, j], texel[key], rtol=rtol, atol=rtol)
+def assert_equal_to(expected, level, rtol):
+    assert np.array_equal(level.pixel, expected[5])
+    for key, plane in zip(("position", "depth", "normal", "radiance", "area"), expected[:5], strict=True):
+        np.testing.assert_allclose(getattr(level, key), plane, rtol=rtol,
+                                   atol=rtol if plane.ndim == 3 else 0, err_msg=key)
+    for plane in (level.position, level.normal, level.radiance, level.area[None]):
+        assert not plane[:, level.pixel < 0].any()
 
 
 @pytest.mark.feature("HSS-01", "HSS-09")
 @pytest.mark.parametrize("mode", MODES)
-def test_levels_are_those_of_the_literal_twin(mode, evidence):
+def test_levels_are_those_of_the_literal_text(mode, evidence):
     """Odd sizes, ties, background, normals that look away; all three starts."""
     for seed, (width, height) in enumerate([(1, 1), (2, 3), (1, 9), (14, 1), (21, 13), (24, 10)]):
         picture, view = random_picture(width, height, seed), camera(width, height)
         for first in range(3):
-            for level, expected in zip(made(picture, view, first, 3, mode), literal(picture, view, first, 3, mode),
-                                       strict=True):
-                assert_equal_to(expected, level, width, FLOAT64)
+            right = levels_by_text(picture, view, first, 3, mode)
+            for level, expected in zip(made(picture, view, first, 3, mode), right, strict=True):
+                assert_equal_to(expected, level, FLOAT64)
     evidence(f"{mode}: pixels chosen equal, the rest to {FLOAT64:g}")
 
 
 def test_areas_of_levels_may_have_the_printed_tangents():
     picture, view = random_picture(14, 9), camera(14, 9, 50.0)
     for level, expected in zip(made(picture, view, 1, 2, as_published=frozenset({"hss_tan_f"})),
-                               literal(picture, view, 1, 2, "closest", "whole"), strict=True):
-        assert_equal_to(expected, level, 14, FLOAT64)
+                               levels_by_text(picture, view, 1, 2, "closest", "whole"), strict=True):
+        assert_equal_to(expected, level, FLOAT64)
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_float32_is_float64_to_its_rounding(mode):
     picture, view = random_picture(37, 22), camera(37, 22)
     picture = tuple(plane.astype(np.float32).astype(np.float64) for plane in picture)
-    for level, expected in zip(made(picture, view, 1, 4, mode, np.float32), literal(picture, view, 1, 4, mode),
+    for level, expected in zip(made(picture, view, 1, 4, mode, np.float32), levels_by_text(picture, view, 1, 4, mode),
                                strict=True):
-        assert_equal_to(expected, level, 37, 4 * FLOAT32)  # normals that graze magnify the rounding of their own
+        assert_equal_to(expected, level, 4 * FLOAT32)  # normals that graze magnify the rounding of their own
 
 
 @pytest.mark.feature("HSS-01")

@@ -5,10 +5,10 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.jit import threads
+from refgi.literal import upsampling as literal
 from refgi.settings import of
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.upsampling.upsample import Guide, upsample
-from tests.naive import upsampling as naive
 
 # a share of the result; float32: some 30 roundings of half a unit, and off, whose rounding the 16th power multiplies
 TWIN = {np.float64: 1e-11, np.float32: 3e-4}
@@ -78,9 +78,9 @@ def test_equals_its_twin(case, evidence):
     rng = np.random.default_rng(2)
     light, added = (rng.random((3, *size)).astype(dtype) for size in (below.depth.shape, shape))
     got = upsample(light, below, here, settings, added)
-    twin = naive.bilateral(light, *map(np.float64, below), *map(np.float64, here), factor,
-                           settings.upsampling.depth_sigma, settings.upsampling.normal_power,
-                           settings.senders.downsample != "average")
+    twin = literal.upsample(light, *map(np.float64, below), *map(np.float64, here), factor,
+                            settings.upsampling.depth_sigma, settings.upsampling.normal_power,
+                            settings.senders.downsample != "average")
     twin += added * np.isfinite(here.depth)
     error = float(np.max(np.abs(got - twin)))
     assert got.dtype == dtype
@@ -95,7 +95,7 @@ def test_plain_modes(mode):
     got = upsample(light, below, here, of(HssilSettings, upsampling=mode))
     seen = np.isfinite(here.depth)
     own = light.repeat(4, 1).repeat(4, 2)[:, :13, :18] * seen
-    np.testing.assert_allclose(got, naive.bilinear(light, below.depth, here.depth, 4) if mode == "bilinear" else own,
+    np.testing.assert_allclose(got, literal.bilinear(light, below.depth, here.depth, 4) if mode == "bilinear" else own,
                                rtol=0, atol=TWIN[np.float64])
 
 

@@ -1,0 +1,103 @@
+"""Crown samples as the paper states them: closed forms of discs, areas of crowns, sets by brute force."""
+
+import math
+
+import numpy as np
+import pytest
+
+from refgi.literal import hssil_crown as literal
+
+
+def test_steps_are_powers_of_the_plastic_number():
+    g = 1 / literal.FIRST_STEP
+    assert g**3 == pytest.approx(g + 1, rel=1e-15)
+    assert abs(literal.SECOND_STEP * g**2 - 1) < 1e-15
+
+
+@pytest.mark.feature("HSS-04")
+@pytest.mark.parametrize("radius", [0.01, 0.5, 3.0])
+def test_a_disc_that_faces_the_receiver_has_its_closed_form(radius):
+    """Analytic: E = pi L sin^2 of the angle that a disc on the axis is seen under; Eq. 3 is its limit afar."""
+    x, n, y = np.zeros((3, 1)), np.array([[0.0], [0], [1]]), np.array([[0.0], [0], [2.0]])
+    ds = np.array([math.pi * radius**2])
+    exact = math.pi * math.sin(math.atan2(radius, 2.0)) ** 2
+    assert literal.disc_form_factor(x, n, y, -n, ds)[0] == pytest.approx(exact, rel=1e-14)
+    point = literal.point_form_factor(x, n, y, -n, ds)[0]
+    assert point == pytest.approx(ds[0] / 4, rel=1e-14)
+    assert point == pytest.approx(exact, rel=1.01 * radius**2 / 4)
+
+
+def test_slanted_samples_have_both_cosines_by_hand():
+    """45 degrees at the receiver, 60 at the sender, sqrt 2 m apart."""
+    x, n = np.zeros((3, 1)), np.array([[0.0], [0], [1]])
+    y = np.array([[1.0], [0], [1]])
+    away = -y / math.sqrt(2)
+    m = 0.5 * away + math.sqrt(0.75) * np.array([[0.0], [1], [0]])
+    ds = np.array([1e-9])
+    for form in (literal.disc_form_factor, literal.point_form_factor):
+        assert form(x, n, y, m, ds)[0] == pytest.approx(1e-9 * math.sqrt(0.5) * 0.5 / 2, rel=1e-8)
+
+
+def test_discs_of_a_share_lie_between_disc_and_points():
+    """Analytic: with k discs of 1/k of the surface each the closed form of the small disc, k times."""
+    x, n, y = np.zeros((3, 1)), np.array([[0.0], [0], [1]]), np.array([[0.0], [0], [1.0]])
+    area, texels = np.array([0.3]), np.array([8.0])
+    found = literal.shared_disc_form_factor(x, n, y, -n, area, texels, 0.25)[0]
+    square = 2 * 0.3 / math.pi  # R^2 of two texels
+    assert found == pytest.approx(4 * math.pi * square / (1 + square))
+    assert literal.shared_disc_form_factor(x, n, y, -n, area, np.array([0.5]), 0.25)[0] == pytest.approx(
+        literal.disc_form_factor(x, n, y, -n, 0.5 * area)[0])
+
+
+@pytest.mark.feature("HSS-05")
+@pytest.mark.parametrize("density", ["uniform", "inverse_distance"])
+def test_weights_are_the_areas_of_disc_and_crown(density):
+    """Analytic, of a disc's pi r^2 and a crown's 3 pi r^2: exact, or as the mean of many points."""
+    radius, inner, crown = 40.0, 4000, 8000
+    points = literal.sample_points(inner, crown)
+    offsets, weight = literal.crown_samples(points, np.array([[[0.3, 0.6]]]), inner, radius, density)
+    far, weight = np.hypot(*offsets[0, 0].T), weight[0, 0]
+    assert weight[:inner].sum() == pytest.approx(math.pi * radius**2, rel=2e-3)
+    assert weight[inner:].sum() == pytest.approx(3 * math.pi * radius**2, rel=2e-3)
+    assert far[:inner].max() < radius + 1
+    assert far[inner:].min() > radius - 1
+    assert far[inner:].max() < 2 * radius + 1
+    # a quarter of the turn has a quarter of the crown
+    right, down = offsets[0, 0, inner:].T
+    assert weight[inner:][(right > 0) & (down > 0)].sum() == pytest.approx(0.75 * math.pi * radius**2, rel=0.03)
+
+
+def test_texels_of_a_tile_share_out_one_sequence():
+    """Property: the shifted points of all texels of a tile are consecutive points of the sequence, each once."""
+    crown, start = 5, (0.1, 0.2)
+    points, shifts = literal.points_and_shifts(start, 0, crown, 3, 3)
+    u = np.sort(((points[:, 0] + shifts[..., :1]) % 1).reshape(-1))
+    np.testing.assert_allclose(u, np.sort((0.6 + np.arange(9 * crown) / 1.324717957244746) % 1), atol=1e-12)
+
+
+def test_all_texels_by_brute_force():
+    offsets, weight = literal.every_texel(3.0, 6.0)
+    square = [(x, y) for x in range(-9, 10) for y in range(-9, 10) if 9 <= x * x + y * y < 36]
+    assert sorted(map(tuple, offsets[0, 0].tolist())) == sorted(square)
+    assert (weight == 1).all()
+    assert len(literal.every_texel(0.0, 5.0)[0][0, 0]) == 68  # 69 points of the lattice at less than 5, one the middle
+
+
+@pytest.mark.feature("HSS-10")
+@pytest.mark.parametrize(("inner", "crown"), [(4, 6), (3, 7), (0, 1)])
+def test_fixed_sets_are_their_own_mirror_image(inner, crown):
+    offsets, weight = literal.mirrored_samples((0.4, 0.7), inner, crown, 5.0, "uniform")
+    here = sorted((x, y, w) for (x, y), w in zip(offsets[0, 0].tolist(), weight[0, 0].tolist(), strict=True))
+    assert here == sorted((-x, y, w) for x, y, w in here)
+    assert weight.sum() == pytest.approx(math.pi * 25 * ((inner > 0) + 3))
+
+
+@pytest.mark.feature("HSS-03")
+def test_two_texels_light_each_other_by_hand():
+    """Two walls 2 m apart that face each other; what is outside or the texel itself gives nothing."""
+    position = np.array([[[-1.0, 1.0]], [[0, 0]], [[0, 0]]])
+    normal, radiance = -position, np.array([[[3.0, 5.0]]] * 3)
+    offsets = np.array([[1, 0], [-1, 0], [0, 0], [0, 1]]).reshape(1, 1, 4, 2)
+    found = literal.gather(position, normal, radiance, np.full((1, 2), 0.25), offsets, np.full((1, 1, 4), 2.0))
+    disc = 0.5 / math.pi
+    np.testing.assert_allclose(found[0, 0], np.array([5.0, 3.0]) * math.pi * disc / (4 + disc))

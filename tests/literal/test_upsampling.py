@@ -1,0 +1,105 @@
+"""Upsampling and blurs: what planes and linear functions must become, numbers by hand."""
+
+import numpy as np
+import pytest
+
+from refgi.literal import upsampling as literal
+
+
+def plane(shape, across=0.3, down=1.0):
+    """Return depths of a plane, whose nearness is linear in the picture, and its constant normal."""
+    y, x = ((np.arange(size) + 0.5) / size for size in shape)
+    return 1 / (0.2 + down * y[:, None] + across * x), np.array([0.0, 1, 0])[:, None, None] * np.ones((3, *shape))
+
+
+def wall(shape):
+    """Return places, normals and depths of a wall seen head-on, a texel 1/8 m wide."""
+    y, x = np.mgrid[: shape[0], : shape[1]] / 8
+    return np.stack([x, y, np.full(shape, -3.0)]), np.array([0.0, 0, 1])[:, None, None] * np.ones((3, *shape)), \
+        np.full(shape, 3.0)
+
+
+def test_tents_leave_linear_functions_as_they_are():
+    """Analytic: their sum is 1, the mean place is t; the weights that docs/methods/hssil prints."""
+    t = np.linspace(-0.5, 0.5, 41)
+    weights = [literal.tent(step, t) for step in (-1, 0, 1)]
+    np.testing.assert_allclose(sum(weights), 1)
+    np.testing.assert_allclose(weights[2] - weights[0], t, atol=1e-15)
+    far = np.where(t > 0, weights[0], weights[2])
+    np.testing.assert_allclose(far, (1 - 2 * np.abs(t)) / 6, atol=1e-15)
+    np.testing.assert_allclose(weights[1], (2 - np.abs(t)) / 3)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_slopes_of_planes_and_of_silhouettes(axis):
+    nearness = 1 / plane((6, 9))[0]
+    step = (1.0 / 6, 0.3 / 9)[axis]
+    np.testing.assert_allclose(literal.slope(nearness, axis), step)
+    nearness[2:4, 3:5] = 0  # nothing is seen: neighbours have no slope there
+    g = literal.slope(nearness, axis)
+    assert not g[2:4, 3:5].any()
+    assert g[0, 0] == pytest.approx(step)
+    assert g[(1, 2)[axis], (3, 2)[axis]] == 0  # beside them
+
+
+@pytest.mark.feature("HSS-11")
+@pytest.mark.parametrize("factor", [2, 4])
+@pytest.mark.parametrize("nearest", [True, False])
+def test_linear_light_stays_linear_on_a_plane(factor, nearest):
+    """Analytic: away from the rim of the picture, whether texels have the depth of a corner or of their middle."""
+    depth, normal = plane((32, 48), down=4.0)
+    ramp = 3 * np.arange(48) + 5 * np.arange(32)[:, None] + 1.0
+    tiles = (32 // factor, factor, 48 // factor, factor)
+    light, below = ramp.reshape(tiles).mean((1, 3)), 1 / (1 / depth).reshape(tiles).mean((1, 3))
+    if nearest:
+        light, below = (array[factor - 1 :: factor, factor - 1 :: factor] for array in (ramp, depth))
+    found = literal.upsample(np.stack([light] * 3), below, normal[:, ::factor, ::factor], depth, normal, factor, 0.02,
+                             8.0, nearest)
+    np.testing.assert_allclose(found[:, factor:-factor, factor:-factor], [ramp[factor:-factor, factor:-factor]] * 3)
+    summed = literal.level_sum(np.stack([light] * 3), below, normal[:, ::factor, ::factor], depth, normal, found,
+                               factor, 0.02, 8.0, nearest)
+    np.testing.assert_allclose(summed, 2 * found)
+
+
+@pytest.mark.feature("HSS-11")
+def test_no_light_crosses_a_step_or_an_edge():
+    depth, normal = np.full((8, 12), 2.0), np.array([0.0, 0, 1])[:, None, None] * np.ones((3, 8, 12))
+    light = (np.arange(6) < 3) * np.ones((3, 4, 1))
+    for other in ((np.where(np.arange(12) < 6, 2.0, 3.0) + 0 * depth, normal),
+                  (depth, np.where(np.arange(12) < 6, normal, normal[[2, 0, 1]]))):
+        found = literal.upsample(light, other[0][::2, ::2], other[1][:, ::2, ::2], *other, 2, 0.02, 8.0, True)
+        np.testing.assert_allclose(found, (np.arange(12) < 6) * np.ones((3, 8, 1)), atol=1e-15)
+    plain = literal.bilinear(light, depth[::2, ::2], depth, 2)
+    np.testing.assert_allclose(plain[0, 3], [1] * 5 + [0.75, 0.25] + [0] * 5)  # a quarter from beyond
+
+
+@pytest.mark.parametrize("size", [3, 4, 8])
+def test_a_blur_is_the_mean_of_a_tile(size):
+    """Analytic: light that repeats in tiles becomes its mean over one."""
+    tile = np.random.default_rng(3).random((3, size, size))
+    count = 32 // size
+    found = literal.blur(np.tile(tile, (1, count, count)), *wall((count * size, count * size)), size, 0.01, 0.9)
+    inner = found[:, size:-size, size:-size]
+    np.testing.assert_allclose(inner, tile.mean(axis=(1, 2))[:, None, None] * np.ones_like(inner))
+
+
+def test_a_blur_stays_on_its_surface():
+    position, normal, depth = wall((6, 10))
+    light = (np.arange(10) >= 5) * np.ones((3, 6, 1))
+    lower = position - (np.arange(10) >= 5) * np.array([0, 0, 0.1])[:, None, None]
+    for place, up in ((lower, normal), (position, np.where(np.arange(10) >= 5, normal[[2, 0, 1]], normal))):
+        np.testing.assert_array_equal(literal.blur(light, place, up, depth, 3, 0.01, 0.9), light)
+    assert (literal.blur(light, position, normal, depth, 3, 0.01, 0.9) != light).any()
+
+
+def test_blocks_of_two_keep_a_ramp_on_a_wall():
+    """Analytic: bilinear weights leave linear light as it is; the chosen pixels keep theirs (SII Table 3)."""
+    position, normal, depth = wall((9, 12))
+    covered = np.isfinite(depth)
+    ramp = (2 * np.arange(12) + 3 * np.arange(9)[:, None]) * np.ones((3, 1, 1))
+    found = literal.joint_bilateral(position, normal, covered, ramp)
+    np.testing.assert_allclose(found[:, :, :-1], ramp[:, :, :-1])
+    covered[0, 0] = False
+    found = literal.joint_bilateral(position, normal, covered, ramp)
+    assert not found[:, 0, 0].any()
+    np.testing.assert_array_equal(found[:, 0, 1], ramp[:, 0, 1])  # the first with a surface of its block

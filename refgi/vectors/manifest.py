@@ -8,7 +8,7 @@ import pydantic
 
 from refgi.errors import InputError
 
-VERSION = "1.0.2"  # of the vectors, apart from the program's: a patch adds cases, a minor adds arrays to a case,
+VERSION = "1.0.3"  # of the vectors, apart from the program's: a patch adds cases, a minor adds arrays to a case,
 # a major changes what an array means
 KIT, CASE, RESULT = "kit.json", "manifest.json", "result.json"
 

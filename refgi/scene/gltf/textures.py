@@ -118,9 +118,11 @@ def _filter(document: Document, sampler: dict[str, Any], where: str, say: Say) -
     """Return the one filter that stands for a sampler's two; `say` is told where it is not as both."""
     larger, smaller = sampler.get("magFilter"), sampler.get("minFilter")
     larger = larger if larger in (NEAREST, LINEAR) else None  # any other is not of the format
-    chosen = FILTERS[_code(document, sampler, "minFilter", where, FILTERS, NEAREST if larger == NEAREST else TRILINEAR)]
+    default = NEAREST if larger == NEAREST else TRILINEAR
+    chosen = FILTERS[_code(document, sampler, "minFilter", where, FILTERS, default)]
     if (larger, smaller) not in ALIKE:
-        told = ", ".join(f"{key} {NAMES[code]}" for key, code in (("magFilter", larger), ("minFilter", smaller)) if code)
+        both = (("magFilter", larger), ("minFilter", smaller))
+        told = ", ".join(f"{key} {NAMES[code]}" for key, code in both if code)
         say(f"material texture(s) of {told} filtered {chosen}")
     return chosen
 

@@ -138,7 +138,8 @@ def _in_rec_709(planes: Array, header: dict[str, Any], path: Path) -> Array:
     except (np.linalg.LinAlgError, ZeroDivisionError, ValueError) as error:
         raise InputError(f"{path}: chromaticities {text}: expected primaries that span a space of colours") from error
     warnings.warn(RefgiWarning(f"{path}: chromaticities {text}: colours are converted to Rec. 709"), stacklevel=3)
-    return np.asarray(np.einsum("ij,jhw->ihw", change, planes.astype(np.float64)).astype(np.float32))
+    with np.errstate(over="ignore", invalid="ignore"):  # pixels that are not finite, or no longer
+        return np.asarray(np.einsum("ij,jhw->ihw", change, planes.astype(np.float64)).astype(np.float32))
 
 
 def xyz_of(chromaticities: Sequence[float]) -> Array:

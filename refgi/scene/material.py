@@ -27,8 +27,8 @@ class Material:
     opaque), `emission` the radiance the surface emits by itself (W/m^2/sr; seen by the camera, not a light source).
     `texture` multiplies `diffuse`, `emission_texture` the emission, where a surface has texture coordinates. With a
     `cutoff` the surface has holes: it is there only where `alpha` times the texture's alpha is at least the cutoff
-    (None: it is there everywhere); `alpha_texture` is one whose alpha counts in place of the texture's. `one_sided`: the
-    file leaves out its back, which is there as the front is; of no meaning but for a warning.
+    (None: it is there everywhere); `alpha_texture` is one whose alpha counts in place of the texture's. `one_sided`:
+    the file leaves out its back, which is there as the front is; of no meaning but for a warning.
     """
 
     name: str = "default"

@@ -88,6 +88,15 @@ def test_primaries_without_a_space_are_refused(tmp_path, chromaticities):
         read_colour(save(tmp_path / "a.exr", chromaticities=chromaticities))
 
 
+def test_an_attribute_of_another_type_is_refused(tmp_path):
+    file = save(tmp_path / "a.exr", chromaticities=P3)
+    content, known = file.read_bytes(), b"chromaticities\0chromaticities\0"
+    assert content.count(known) == 1
+    file.write_bytes(content.replace(known, known[:-2] + b"x\0"))
+    with pytest.raises(InputError, match=r"a\.exr: chromaticities: expected an attribute of 8 number"):
+        read_colour(file)
+
+
 def test_layers_are_chosen_by_name(tmp_path):
     file = save(tmp_path / "a.exr", prefix="ViewLayer.Combined.")
     for name in ("ViewLayer.Combined", "ViewLayer.Combined."):

@@ -267,6 +267,12 @@ def test_obj_faces_without_coordinates_and_options_that_are_not_read(tmp_path: P
     assert [len(mesh.faces) for mesh in (painted, plain)] == [1, 1]
 
 
+@pytest.mark.parametrize("option", ["-s 1 1e12", "-o 1e30", "-s 1e308 1e308", "-s 1 1e308 -o 0 -1e308"])
+def test_an_obj_texture_that_lies_too_far_away_names_its_line(tmp_path: Path, option: str) -> None:
+    with pytest.raises(InputError, match=r"m\.mtl: line 2: uv of face 0: expected finite texture coordinates"):
+        load_scene(obj(tmp_path, f"newmtl a\nmap_Kd {option} wood.png\n"))
+
+
 def test_an_obj_texture_that_is_missing_names_line_and_image(tmp_path: Path) -> None:
     path = obj(tmp_path, "newmtl a\nmap_Kd woad.png\nnewmtl unused\nmap_Kd never.png\n")
     said = r"m\.mtl: line 2: map_Kd: .*woad\.png: no such file; did you mean 'wood"

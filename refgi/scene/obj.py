@@ -251,7 +251,7 @@ class _Reader:
         found, bottom = self.maps[name].place, np.array((0.0, 1.0))
         with np.errstate(over="ignore", invalid="ignore"):
             laid = np.asarray((coordinates - bottom) * found.scale + bottom + np.array(found.offset) * (1.0, -1.0))
-        expect_coordinates(laid, len(laid), found.where)
+        expect_coordinates(laid, len(laid), f"{self.path}: material {shortened(repr(name))}")
         return laid
 
 

@@ -27,9 +27,9 @@ FILTERS: dict[int, Filter] = {NEAREST: "nearest", LINEAR: "bilinear", 9984: "tri
                               9986: "trilinear", TRILINEAR: "trilinear"}
 NAMES = {NEAREST: "NEAREST", LINEAR: "LINEAR", 9984: "NEAREST_MIPMAP_NEAREST", 9985: "LINEAR_MIPMAP_NEAREST",
          9986: "NEAREST_MIPMAP_LINEAR", TRILINEAR: "LINEAR_MIPMAP_LINEAR"}
-# of magFilter and minFilter, what one filter here is; None: the file leaves it open
+# of magFilter and minFilter, what one filter here is; None: the file leaves it open. Mip levels are blended in any case
 ALIKE = {(NEAREST, NEAREST), (NEAREST, None), (None, NEAREST),
-         *itertools.product((LINEAR, None), (LINEAR, TRILINEAR, None))}
+         *itertools.product((LINEAR, None), (LINEAR, 9985, TRILINEAR, None))}
 LARGEST_SET = 15  # of texture coordinates
 
 _judged: "weakref.WeakSet[Document]" = weakref.WeakSet()  # documents whose images fit in memory

@@ -3,6 +3,7 @@
 A method declares itself by a `Method` in its package; here stands only where it is. It is imported when it is used.
 """
 
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
@@ -10,10 +11,11 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
 import numpy.typing as npt
 
-from refgi.diagnostics import SamplingError, diagnosing
-from refgi.errors import InputError
+from refgi.diagnostics import SamplingError, diagnosing, is_due
+from refgi.errors import InputError, RefgiWarning
 from refgi.method import Method
 from refgi.skips import left_out
 
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 GROUP = "refgi.methods"  # of entry points
+FEW_BACKS = 0.01  # of what a picture shows; silhouettes of closed meshes have some by rounding
 BUILT_IN = {
     "sii": "refgi.splat.sii:METHOD",
     "multires": "refgi.splat.multires:METHOD",
@@ -217,9 +220,23 @@ def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = Non
         frame_options["shadows"] = usual_shadows(settings)
     frame = Frame(load_scene(scene) if isinstance(scene, str | Path) else scene, **frame_options)
     light = known.light(frame, settings)
+    _warn_of_backs(frame)
     picture = Picture(frame, light.irradiance, frame.radiance(light.irradiance, light.lobes), light.estimate,
                       lobes=light.lobes, lobe_estimate=light.lobe_estimate, sampling_error=light.sampling_error)
     if not left_out("frame.buffers", lambda: (len(frame.unused), len(BUFFERS))):
         for name in frame.unused:
             getattr(frame, name)
     return picture
+
+
+def _warn_of_backs(frame: "Frame") -> None:
+    one_sided = [material.one_sided for material in frame.scene.materials]
+    if not any(one_sided) or not is_due("rsm.backs"):
+        return
+    from refgi.rsm.buffers.facing import share_of_backs
+
+    scene = frame.scene
+    share = share_of_backs(scene.geometry, np.array(one_sided), scene.camera.eye, frame.gbuffer.triangle_id)
+    if share > FEW_BACKS:
+        text = f"{100 * share:.0f} % of what the picture shows are backs that the file leaves out (glTF's doubleSided)"
+        warnings.warn(RefgiWarning(f"{scene.name}: {text}: drawn and lit as fronts"), stacklevel=3)

@@ -77,7 +77,7 @@ def read_colour(
     _warn_of_change(chosen, path)
     planes = np.stack([chosen.channels[name] for name in names])
     planes = _in_rec_709(planes.astype(np.float32, copy=False), chosen.header, path)
-    ratio = float(chosen.header.get("pixelAspectRatio", 1.0))
+    (ratio,) = _numbers(chosen.header, "pixelAspectRatio", 1, path) or (1.0,)
     if abs(ratio - 1) > SAME:
         warnings.warn(RefgiWarning(f"{path}: pixelAspectRatio {ratio:g}: pixels are taken as square"), stacklevel=2)
     return _cut(planes, names, chosen.header, path)
@@ -129,8 +129,8 @@ def _warn_of_change(part: Part, path: Path) -> None:
 
 
 def _in_rec_709(planes: Array, header: dict[str, Any], path: Path) -> Array:
-    given = header.get("chromaticities")
-    if given is None or np.allclose(given, REC_709, rtol=0, atol=SAME):
+    given = _numbers(header, "chromaticities", 8, path)
+    if not given or np.allclose(given, REC_709, rtol=0, atol=SAME):
         return planes
     text = ", ".join(f"{value:.4g}" for value in given)
     try:
@@ -138,7 +138,20 @@ def _in_rec_709(planes: Array, header: dict[str, Any], path: Path) -> Array:
     except (np.linalg.LinAlgError, ZeroDivisionError, ValueError) as error:
         raise InputError(f"{path}: chromaticities {text}: expected primaries that span a space of colours") from error
     warnings.warn(RefgiWarning(f"{path}: chromaticities {text}: colours are converted to Rec. 709"), stacklevel=3)
-    return np.asarray(np.einsum("ij,jhw->ihw", change, planes.astype(np.float64)).astype(np.float32))
+    with np.errstate(over="ignore", invalid="ignore"):  # pixels that are not finite, or no longer
+        return np.asarray(np.einsum("ij,jhw->ihw", change, planes.astype(np.float64)).astype(np.float32))
+
+
+def _numbers(header: dict[str, Any], key: str, count: int, path: Path) -> tuple[float, ...]:
+    """Return the numbers of an attribute, none where it is absent; raises `InputError` if it is another type's."""
+    if key not in header:
+        return ()
+    try:
+        found: tuple[float, ...] = tuple(np.asarray(header[key], np.float64).ravel().tolist())
+    except (TypeError, ValueError):
+        found = ()
+    expect(len(found) == count, f"{path}: {key}", f"an attribute of {count} number(s)", type(header[key]).__name__)
+    return found
 
 
 def xyz_of(chromaticities: Sequence[float]) -> Array:

@@ -96,6 +96,7 @@ def _material_json(material: Material) -> dict[str, Any]:
     """Return a material as JSON values; textures, alpha and cutoff only where it has some, images by their digests."""
     without: dict[str, Any] = dict.fromkeys(TEXTURES)
     fields: dict[str, Any] = plain(dataclasses.replace(material, **without))
+    del fields["one_sided"]
     for key in TEXTURES:
         del fields[key]
         texture = getattr(material, key)

@@ -114,6 +114,8 @@ def _from_mesh_file(path: Path, camera: Camera | None, lights: Sequence[Light] |
         if camera is None:
             camera = found.cameras[0] if found.cameras else default_camera(geometry)
             lacking += [] if found.cameras else ["camera"]
+            if (others := len(found.cameras) - 1) > 0:
+                warnings.warn(RefgiWarning(f"{path}: {others} camera(s) beside the first passed over"), stacklevel=5)
         if lights is None:
             lights = found.lights or (() if lamps else (default_light(geometry, camera),))
             lacking += [] if found.lights or lamps else ["light"]

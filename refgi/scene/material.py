@@ -27,7 +27,8 @@ class Material:
     opaque), `emission` the radiance the surface emits by itself (W/m^2/sr; seen by the camera, not a light source).
     `texture` multiplies `diffuse`, `emission_texture` the emission, where a surface has texture coordinates. With a
     `cutoff` the surface has holes: it is there only where `alpha` times the texture's alpha is at least the cutoff
-    (None: it is there everywhere); `alpha_texture` is one whose alpha counts in place of the texture's.
+    (None: it is there everywhere); `alpha_texture` is one whose alpha counts in place of the texture's. `one_sided`:
+    the file leaves out its back, which is there as the front is; of no meaning but for a warning.
     """
 
     name: str = "default"
@@ -41,6 +42,7 @@ class Material:
     cutoff: float | None = None
     emission_texture: Texture | None = None
     alpha_texture: Texture | None = None
+    one_sided: bool = dataclasses.field(default=False, compare=False)
 
     def __post_init__(self) -> None:
         for key in ("diffuse", "specular"):

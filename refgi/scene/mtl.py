@@ -25,6 +25,7 @@ from refgi.scene.texture.texture import Texture
 
 CUTOFF = 0.5
 WHITE = (1.0, 1.0, 1.0)
+SAME = 1e-3  # of a colour in CIE XYZ, which files round
 # arguments that an option of map_Kd and map_d has at most
 OPTIONS = {"-s": 3, "-o": 3, "-t": 3, "-clamp": 1, "-mm": 2, "-bm": 1, "-boost": 1, "-blendu": 1, "-blendv": 1,
            "-cc": 1, "-texres": 1, "-imfchan": 1, "-type": 1}
@@ -103,6 +104,7 @@ def read_library(path: Path) -> tuple[dict[str, Material], dict[str, Maps]]:
     maps: dict[str, Maps] = {}
     opacities: dict[str, TextureMap] = {}
     options: set[str] = set()
+    spectral, cut = 0, 0
     name = ""
     values: dict[str, dict[str, tuple[float, ...]]] = {}
     current: dict[str, tuple[float, ...]] = {}
@@ -110,6 +112,11 @@ def read_library(path: Path) -> tuple[dict[str, Material], dict[str, Maps]]:
         if words[0] == "newmtl":
             name = " ".join(words[1:])
             current = values.setdefault(name, {})
+        elif words[0] in ("Kd", "Ks", "Ke") and words[1:2] == ["spectral"]:
+            spectral += 1
+        elif words[0] in ("Kd", "Ks", "Ke") and words[1:2] == ["xyz"]:
+            current[words[0]], outside = _in_rec_709(colour_of(words[2:5], f"{path}: line {number}"), words[0])
+            cut += outside
         elif words[0] in ("Kd", "Ks", "Ke"):
             current[words[0]] = colour_of(words[1:4], f"{path}: line {number}")
         elif words[0] == "Ns":
@@ -127,9 +134,11 @@ def read_library(path: Path) -> tuple[dict[str, Material], dict[str, Maps]]:
         elif words[0].lower().startswith("map_") or words[0].lower() in TEXTURES:
             textures.append(tuple(words))
     _warn_of_textures(textures, path)
-    if options:
-        text = f"{path}: options {', '.join(sorted(options))} of map_Kd passed over"
-        warnings.warn(RefgiWarning(text), stacklevel=5)
+    for count, text in ((spectral, f"{spectral:,} spectral colour(s) (.rfl) passed over: no spectra here"),
+                        (cut, f"{cut:,} colour(s) of CIE XYZ outside of Rec. 709 cut"),
+                        (len(options), f"options {', '.join(sorted(options))} of map_Kd passed over")):
+        if count:
+            warnings.warn(RefgiWarning(f"{path}: {text}"), stacklevel=5)
     for name in maps.keys() & values.keys():
         if "Kd" not in values[name]:
             values[name]["Kd"] = WHITE
@@ -181,6 +190,15 @@ def _texture_map(words: list[str], path: Path, where: str) -> tuple[TextureMap, 
         words = words[1 + len(values) :]
     name = " ".join(words).replace("\\", "/")
     return TextureMap(path.parent / name, (scale[0], scale[1]), (offset[0], offset[1]), clamp, where), unread
+
+
+def _in_rec_709(xyz: tuple[float, ...], key: str) -> tuple[tuple[float, ...], bool]:
+    """Return a colour of CIE XYZ as linear Rec. 709, and whether it had to be cut: reflectances lie from 0 to 1."""
+    from refgi.image.picture import REC_709, xyz_of  # few files ask for it
+
+    rgb = np.linalg.solve(xyz_of(REC_709), xyz)
+    found = np.clip(rgb, 0, None if key == "Ke" else 1)
+    return tuple(found.tolist()), bool((np.abs(found - rgb) > SAME).any())
 
 
 def _is_number(word: str) -> bool:

@@ -16,7 +16,7 @@ from refgi.errors import InputError, RefgiWarning, expect, first_faults, shorten
 from refgi.scene.files import Contents, is_there
 from refgi.scene.lines import lines_of, numbers_of
 from refgi.scene.material import UNPAINTED
-from refgi.scene.mesh import expect_all_sound
+from refgi.scene.mesh import expect_all_sound, expect_coordinates
 from refgi.scene.model import Array, Material, Mesh
 from refgi.scene.mtl import Maps, read_library
 from refgi.scene.polygons import triangles_of
@@ -249,7 +249,10 @@ class _Reader:
         if name not in self.maps:
             return coordinates
         found, bottom = self.maps[name].place, np.array((0.0, 1.0))
-        return np.asarray((coordinates - bottom) * found.scale + bottom + np.array(found.offset) * (1.0, -1.0))
+        with np.errstate(over="ignore", invalid="ignore"):
+            laid = np.asarray((coordinates - bottom) * found.scale + bottom + np.array(found.offset) * (1.0, -1.0))
+        expect_coordinates(laid, len(laid), f"{self.path}: material {shortened(repr(name))}")
+        return laid
 
 
 def _index(text: str, count: int, where: str) -> int:

@@ -24,6 +24,7 @@ MUCH_MORE = 1.2  # of the mesh that another view must show to be taken
 ENOUGH_LIT, LEAST_LIT = 0.33, 0.1  # of what the camera sees: to take a place at once, and at all
 POINTS, CELLS = 2048, 24  # on the mesh; a side of the coarse picture
 MOST_FACES = 1 << 14  # that points are put on
+EDGE_ON = 1e-3  # cosine; what is seen at less shows nothing
 IN_FRONT = 0.02  # radii; what is further in front of a point's plane, on its way to the eye, hides it
 # of a sequence that fills a cube evenly, whatever period the order of the faces has
 STEP = np.array((0.8191725133961645, 0.6710436067037893, 0.5497004779019703))
@@ -141,7 +142,8 @@ def _seen(points: Points, eye: Array) -> Array:
     nearest_in[key[far_first]] = far_first  # the last one assigned stays
     to_eye = -np.einsum("ij,ij->i", points.normal, offset)
     to_nearest = np.einsum("ij,ij->i", points.normal, points.position[nearest_in[key]] - points.position)
-    return np.asarray(np.sign(to_eye) * to_nearest <= IN_FRONT * points.radius)
+    shows = np.abs(to_eye) > EDGE_ON * np.linalg.norm(offset, axis=1)
+    return np.asarray(shows & (np.sign(to_eye) * to_nearest <= IN_FRONT * points.radius))
 
 
 def _lit(points: Points, seen: Array, eye: Array, lamp: Array) -> float:

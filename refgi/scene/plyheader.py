@@ -37,7 +37,7 @@ class Element(NamedTuple):
 
 def read_header(content: bytes, path: Path) -> tuple[dict[str, Element], str, list[str], int]:
     """Return the elements by name, the encoding, comments, and where the entries start."""
-    expect(content[:3] == b"ply", f"{path}", "a PLY file (first line 'ply')", content[:8])
+    expect(content[:3].lower() == b"ply", f"{path}", "a PLY file (first line 'ply')", content[:8])
     end = content.find(b"end_header", 0, LONGEST_HEADER)
     after = content[end + 10 : end + 12]
     good = end > 0 and after[:1] in (b"\n", b"\r")

@@ -9,7 +9,7 @@ from typing import Any
 
 from numba import types
 
-from refgi.jit import by_type
+from refgi.jit import by_type, kernel
 from refgi.scene.texture.lookup import colour_at, coordinates_at, point_sample
 from refgi.truth.paths import row
 
@@ -31,33 +31,32 @@ def _plain(textures: Any, surfaces: Any, triangle: Any, y: Any) -> Any:  # noqa:
 
 
 def _painted(textures: Any, surfaces: Any, triangle: Any, y: Any) -> Any:
-    material = surfaces.material_of_face[triangle]
-    r, g, b = row(surfaces.diffuse, material)
-    texture = textures.of_material[material]
-    if texture >= 0:
-        u, v = coordinates_at(surfaces.vertices, surfaces.faces, surfaces.uv, triangle, y[0], y[1], y[2])
-        p, q, s = point_sample(textures, texture, u, v)
-        r, g, b = r * p, g * q, b * s
-    return r, g, b
+    return _times_texture(textures, surfaces, triangle, y, row(surfaces.diffuse, surfaces.material_of_face[triangle]))
 
 
 def _tinted(textures: Any, surfaces: Any, triangle: Any, y: Any) -> Any:  # noqa: ARG001
-    r, g, b = row(surfaces.diffuse, surfaces.material_of_face[triangle])
-    p, q, s = colour_at(surfaces.vertices, surfaces.faces, surfaces.colours, triangle, y[0], y[1], y[2])
-    return r * p, g * q, b * s
+    return _times_colours(surfaces, triangle, y, row(surfaces.diffuse, surfaces.material_of_face[triangle]))
 
 
 def _painted_and_tinted(textures: Any, surfaces: Any, triangle: Any, y: Any) -> Any:
-    material = surfaces.material_of_face[triangle]
-    r, g, b = row(surfaces.diffuse, material)
-    p, q, s = colour_at(surfaces.vertices, surfaces.faces, surfaces.colours, triangle, y[0], y[1], y[2])
-    r, g, b = r * p, g * q, b * s
-    texture = textures.of_material[material]
-    if texture >= 0:
-        u, v = coordinates_at(surfaces.vertices, surfaces.faces, surfaces.uv, triangle, y[0], y[1], y[2])
-        p, q, s = point_sample(textures, texture, u, v)
-        r, g, b = r * p, g * q, b * s
-    return r, g, b
+    diffuse = row(surfaces.diffuse, surfaces.material_of_face[triangle])
+    return _times_texture(textures, surfaces, triangle, y, _times_colours(surfaces, triangle, y, diffuse))
+
+
+@kernel
+def _times_texture(textures: Any, surfaces: Any, triangle: int, y: Any, diffuse: Any) -> Any:
+    texture = textures.of_material[surfaces.material_of_face[triangle]]
+    if texture < 0:
+        return diffuse
+    u, v = coordinates_at(surfaces.vertices, surfaces.faces, surfaces.uv, triangle, y[0], y[1], y[2])
+    r, g, b = point_sample(textures, texture, u, v)
+    return diffuse[0] * r, diffuse[1] * g, diffuse[2] * b
+
+
+@kernel
+def _times_colours(surfaces: Any, triangle: int, y: Any, diffuse: Any) -> Any:
+    r, g, b = colour_at(surfaces.vertices, surfaces.faces, surfaces.colours, triangle, y[0], y[1], y[2])
+    return diffuse[0] * r, diffuse[1] * g, diffuse[2] * b
 
 
 @by_type(diffuse_at)

@@ -65,6 +65,8 @@ def check_output(kit: Kit, output: Path, asked: Asked) -> Result:
             if asked.chained and (dirty or verdict.verdict in ("out", "invalid")):
                 wrong.update(step.writes)
             verdicts.append(verdict)
+    if not verdicts:
+        raise DamagedError(f"{kit.folder}: expected cases with stages, got none", file=str(kit.folder))
     return _summed(kit, asked, cases, verdicts, output, _unknown(kit, cases, output))
 
 

@@ -16,6 +16,7 @@ from refgi.vectors.manifest import KIT, CaseManifest, KitManifest, read_model
 from refgi.vectors.spec import Array
 
 MAGIC = b"\x93NUMPY"
+LONGEST_NAME = 250  # bytes; .npy follows it
 
 
 class DamagedError(InputError):
@@ -130,7 +131,7 @@ def inside(folder: Path, *names: str) -> Path:
     """
     file = folder.joinpath(*names)
     try:
-        if file.resolve().is_relative_to(folder.resolve()):
+        if all(map(str.isprintable, names)) and file.resolve().is_relative_to(folder.resolve()):
             return file
     except (OSError, RuntimeError, ValueError) as error:  # a name with a null, or links in a circle
         raise DamagedError(f"{shortened(repr(str(file)))}: cannot be read: {error}", file=str(folder)) from error
@@ -139,7 +140,8 @@ def inside(folder: Path, *names: str) -> Path:
 
 
 def _is_name(name: str) -> bool:
-    return name not in ("", ".", "..") and not set(name) & set("/\\\0:")
+    fits_a_folder = 0 < len(name.encode(errors="replace")) <= LONGEST_NAME
+    return fits_a_folder and name not in (".", "..") and name.isprintable() and not set(name) & set("/\\:")
 
 
 def read_array(file: Path) -> Array:

@@ -6,9 +6,9 @@ from typing import Any, Literal, TypeVar
 
 import pydantic
 
-from refgi.errors import InputError
+from refgi.errors import InputError, shortened
 
-VERSION = "1.0.2"  # of the vectors, apart from the program's: a patch adds cases, a minor adds arrays to a case,
+VERSION = "1.0.3"  # of the vectors, apart from the program's: a patch adds cases, a minor adds arrays to a case,
 # a major changes what an array means
 KIT, CASE, RESULT = "kit.json", "manifest.json", "result.json"
 
@@ -193,5 +193,6 @@ def read_model(model: type[M], file: Path) -> M:
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
     except pydantic.ValidationError as error:
-        faults = [f"{file}: {'.'.join(map(str, one['loc'])) or 'file'}: {one['msg']}" for one in error.errors()[:20]]
+        faults = [f"{file}: {shortened('.'.join(map(str, one['loc']))) or 'file'}: {shortened(one['msg'], 200)}"
+                  for one in error.errors()[:20]]
         raise InputError("\n".join(faults), file=str(file)) from error

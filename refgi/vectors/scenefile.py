@@ -5,14 +5,16 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from refgi.scene import DirectionalLight, Material, PointLight, Scene, SpotLight
 from refgi.vectors.spec import Array
 
 
 def is_plain(scene: Scene) -> bool:
-    """Return whether the files can say all of a scene: opaque triangles without textures, colours of vertices, glow."""
+    """Return whether the files can say all of a scene: opaque triangles without textures and glow."""
     geometry, bare = scene.geometry, Material()
-    return geometry.cut_outs is None and geometry.colours is None and all(
+    return geometry.cut_outs is None and all(
         getattr(one, key) == getattr(bare, key) for one in scene.materials
         for key in ("ior", "emission", "texture", "alpha", "cutoff", "emission_texture", "alpha_texture"))
 
@@ -59,7 +61,12 @@ def _name(material: int) -> str:
 
 def _obj(scene: Scene) -> str:
     geometry, lines, material = scene.geometry, ["# triangles in the order of triangle_id"], -1
-    lines += [_row("v", vertex) for vertex in geometry.vertices]
+    points = geometry.vertices
+    if geometry.colours is not None:  # of a vertex: all faces that share it have the same one there
+        of_vertex = np.ones_like(points)
+        of_vertex[geometry.faces] = geometry.colours
+        points = np.hstack([points, of_vertex])
+    lines += [_row("v", vertex) for vertex in points]
     normals = geometry.vertex_normals
     lines += [] if normals is None else [_row("vn", normal) for normal in normals]
     for face, own in zip(geometry.faces + 1, geometry.material_of_face, strict=True):

@@ -63,6 +63,18 @@ def test_primaries_are_converted_and_said(tmp_path, chromaticities, matrix):
     assert np.abs(found.planes - RGB).max() > 0.01
 
 
+def test_pixels_beyond_float32_are_infinite_after_a_conversion(tmp_path):
+    """Of XYZ, red is 3.24 X - 1.54 Y - 0.50 Z: the largest numbers of X alone are more than float32 holds."""
+    planes = np.zeros((3, 2, 2), np.float32)
+    planes[0, 0] = np.finfo(np.float32).max, np.nan
+    planes[0, 1] = np.inf, 1
+    with pytest.warns(RefgiWarning, match="colours are converted") as warned:
+        found = read_colour(save(tmp_path / "a.exr", planes, chromaticities=next(iter(TO_709)))).planes
+    assert len(warned) == 1
+    assert np.array_equal(np.isfinite(found[0]), [[False, False], [False, True]])
+    assert found[0, 0, 0] == np.inf
+
+
 def test_rec_709_by_name_is_left_to_the_bit(tmp_path):
     file = save(tmp_path / "a.exr", chromaticities=(0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329))
     assert np.array_equal(read_colour(file).planes, RGB)
@@ -74,6 +86,15 @@ def test_rec_709_by_name_is_left_to_the_bit(tmp_path):
 def test_primaries_without_a_space_are_refused(tmp_path, chromaticities):
     with pytest.raises(InputError, match="expected primaries that span a space of colours"):
         read_colour(save(tmp_path / "a.exr", chromaticities=chromaticities))
+
+
+def test_an_attribute_of_another_type_is_refused(tmp_path):
+    file = save(tmp_path / "a.exr", chromaticities=P3)
+    content, known = file.read_bytes(), b"chromaticities\0chromaticities\0"
+    assert content.count(known) == 1
+    file.write_bytes(content.replace(known, known[:-2] + b"x\0"))
+    with pytest.raises(InputError, match=r"a\.exr: chromaticities: expected an attribute of 8 number"):
+        read_colour(file)
 
 
 def test_layers_are_chosen_by_name(tmp_path):

@@ -189,6 +189,19 @@ def test_point_and_directional_lights(tmp_path: Path) -> None:
     assert np.allclose(lights[1].direction, (0, -1, 0), atol=1e-15)
 
 
+def test_cameras_beside_the_first_are_counted_where_the_file_s_own_is_taken(tmp_path: Path) -> None:
+    tree = gltf_tree()
+    tree["nodes"] += [{"camera": 0, "translation": [0, 0, k]} for k in (7, 9)]
+    tree["scenes"][0]["nodes"] += [3, 4]
+    path = tmp_path / "three.glb"
+    path.write_bytes(glb_bytes(tree))
+    with pytest.warns(RefgiWarning) as warned:
+        assert load_scene(path).camera.eye == (0, 0, 5)
+    assert [str(one.message) for one in warned] == [f"{path}: 2 camera(s) beside the first passed over"]
+    other = Camera((0, 0, 4), (0, 0, 0))
+    assert load_scene(path, camera=other).camera == other
+
+
 def test_without_camera_and_light_both_are_placed(tmp_path: Path) -> None:
     path = written(tmp_path, lambda tree: tree["scenes"][0].update(nodes=[0]))
     with pytest.warns(RefgiWarning, match="no camera and no light"):

@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 
 from refgi.errors import InputError, RefgiWarning
+from refgi.methods import render
+from refgi.provenance.content import materials_digest
 from refgi.scene import Material, load_scene
 from tests.scene.samples import glb_bytes, gltf_tree
 
@@ -160,3 +162,36 @@ def test_the_strength_of_emission_multiplies(tmp_path: Path) -> None:
         "emissiveFactor": [1, 0.5, 0]})
     assert material.emission == (5, 2.5, 0)
     assert [text.partition(",")[0] for text in said] == ["1 emissive surface lights nothing here"]
+
+
+@pytest.mark.parametrize(("turned", "changes", "share"), [
+    (False, {}, None), (True, {}, "100"), (True, {"doubleSided": False}, "100"), (True, {"doubleSided": True}, None),
+    (True, None, "100")])
+def test_backs_that_the_file_leaves_out_are_said_where_they_are_seen(
+    tmp_path: Path, turned: bool, changes: dict[str, Any] | None, share: str | None
+) -> None:
+    """`changes`: of the material; None: there is none, and the format's default has no back."""
+    tree = gltf_tree()
+    tree["nodes"][0] = {"mesh": 0, "translation": [0.5 if turned else -0.5, -0.5, 3],
+                        "rotation": [0, 1, 0, 0] if turned else [0, 0, 0, 1]}
+    tree["materials"][0] |= changes or {}
+    if changes is None:
+        del tree["meshes"][0]["primitives"][0]["material"]
+    path = tmp_path / "square.glb"
+    path.write_bytes(glb_bytes(tree))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        picture = render(path, width=24, height=16, rsm_resolution=16)
+    assert picture.radiance.max() > 0
+    assert [str(one.message) for one in said if "doubleSided" in str(one.message)] == ([] if share is None else [
+        f"square: {share} % of what the picture shows are backs that the file leaves out (glTF's doubleSided): "
+        "drawn and lit as fronts"])
+
+
+def test_backs_do_not_change_the_record_of_materials(tmp_path: Path) -> None:
+    digests = set()
+    for sides in (True, False):
+        (material,), _ = loaded(tmp_path, {"pbrMetallicRoughness": DIFFUSE, "doubleSided": sides})
+        assert material.one_sided is not sides
+        digests.add(materials_digest(load_scene(tmp_path / "square.glb")))
+    assert len(digests) == 1

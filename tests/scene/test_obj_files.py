@@ -147,6 +147,36 @@ def test_one_number_is_grey(folder: Folder, line: str, diffuse: tuple[float, ...
     assert (material.specular, material.emission) == ((0.5, 0.5, 0.5), (2, 2, 2))
 
 
+@pytest.mark.parametrize(("line", "diffuse", "cut"), [
+    ("Kd xyz 0.2 0.3 0.1", (0.13710, 0.37311, 0.05564), 0),
+    ("Kd xyz 0.3", (0.36144, 0.28452, 0.27261), 0),  # equal energy: pinkish
+    ("Kd xyz 0.9505 1 1.0891", (1, 1, 1), 0),  # the white of Rec. 709: over 1 by rounding alone
+    ("Kd xyz 0 0.5 0", (0, 0.9379, 0), 1)])  # green of no display: red and blue are below 0
+def test_cie_xyz_is_linear_rec_709(folder: Folder, line: str, diffuse: tuple[float, ...], cut: int) -> None:
+    """By the matrix of IEC 61966-2-1: rows 3.2406 -1.5372 -0.4986, -0.9689 1.8758 0.0415, 0.0557 -0.2040 1.0570."""
+    folder.put(a_mtl=f"newmtl a\n{line}\nKe xyz 0.9505 1 1.0891\nnewmtl b\nKd 1 0 0\n")
+    scene, said = folder.load("mtllib a.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n")
+    assert scene.materials[0].diffuse == pytest.approx(diffuse, abs=2e-4)
+    assert scene.materials[0].emission == pytest.approx((1, 1, 1), abs=2e-4)
+    assert [one for one in said if "CIE" in one] == [
+        f"{folder.path / 'a.mtl'}: 1 colour(s) of CIE XYZ outside of Rec. 709 cut"] * cut
+
+
+def test_spectral_colours_are_passed_over_and_said(folder: Folder) -> None:
+    folder.put(a_mtl="newmtl a\nKd spectral leaf.rfl 0.5\nKs spectral leaf.rfl\nNs 9\nnewmtl b\nKd 0.8 0.1 0.1\n")
+    scene, said = folder.load("mtllib a.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n")
+    assert [one.diffuse for one in scene.materials] == [GREY, RED]
+    assert not scene.materials[0].is_glossy
+    assert said == [f"{folder.path / 'a.mtl'}: 2 spectral colour(s) (.rfl) passed over: no spectra here"]
+
+
+@pytest.mark.parametrize("line", ["Kd xyz", "Kd xyz a", "Kd xyz 0.1 0.2", "Kd XYZ 0.1 0.2 0.3", "Kd 0.1 0.2"])
+def test_colours_that_lack_numbers_are_refused(folder: Folder, line: str) -> None:
+    folder.put(a_mtl=f"newmtl a\n{line}\n")
+    with pytest.raises(InputError, match=r"a\.mtl: line 2: expected 3 number"):
+        folder.load("mtllib a.mtl\n" + SQUARE + "usemtl a\nf 1 2 3\n")
+
+
 @pytest.mark.parametrize("name", ["Material #25", "wire#1", "a b  c", "grün"])
 def test_names_hold_what_programs_write(folder: Folder, name: str) -> None:
     library = f"# a\nnewmtl {name}\nKd 0.8 0.1 0.1 # red\nnewmtl Material #26\nKd 0 0 1\n"

@@ -58,6 +58,14 @@ def test_what_shows_as_much_from_anywhere_is_seen_from_the_front_right(name: str
     assert np.allclose(unit(np.subtract(lamp.position, middle)), unit(LIGHT_DIRECTION))
 
 
+def test_walls_that_are_seen_edge_on_show_nothing() -> None:
+    """Of eight boxes side by side, walls in the middle's planes hold a third of all points, and hide in each other."""
+    parts = [box() for _ in range(8)]
+    vertices = np.concatenate([part.vertices + CORNERS[k] for k, part in enumerate(parts)])
+    faces = np.concatenate([part.faces + 8 * k for k, part in enumerate(parts)])
+    assert np.allclose(view(Geometry(vertices, faces, np.zeros(len(faces), np.int32))), unit(VIEWS[0]))
+
+
 @pytest.mark.parametrize("seed", range(24))
 def test_a_flat_mesh_is_lit_on_the_side_that_is_seen(seed: int) -> None:
     vertices = np.random.default_rng(seed).normal(size=(3, 3))

@@ -144,6 +144,11 @@ def test_ends_of_line(tmp_path: Path, form: str, end: str) -> None:
     assert read(tmp_path, ply(form, vertices(), faces([0, 1, 2, 3], [3, 2, 4]), end=end)).faces.shape == (3, 3)
 
 
+def test_the_first_line_may_be_in_capitals(tmp_path: Path) -> None:
+    content = ply("ascii", vertices(), faces([0, 1, 2])).replace(b"ply", b"PLY", 1)
+    assert read(tmp_path, content).faces.tolist() == [[0, 1, 2]]
+
+
 def test_a_byte_order_mark_and_blank_lines(tmp_path: Path) -> None:
     content = ply("ascii", vertices(), faces([0, 1, 2]))
     content = content.replace(b"end_header\n", b"end_header\n\n").replace(b"3 0", b"\n3 0")

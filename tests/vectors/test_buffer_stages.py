@@ -5,8 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from refgi.vectors.bounds import large_value
+from refgi.literal.colours import tint
+from refgi.scene import load_scene
+from refgi.vectors.bounds import distance, isolated_bounds, large_value
 from refgi.vectors.cases import hssil, sii
+from refgi.vectors.scenefile import write_scene
 from refgi.vectors.spec import expected_of, kind_of, outputs_of
 
 CASES = {**sii.QUICK, "sii-smooth": sii.FULL["sii-smooth"], "sii-ramp": {**sii.QUICK, **sii.FULL}.get("sii-ramp"),
@@ -21,7 +24,7 @@ LIMIT = {"gbuffer.ids": 0.0, "rsm.ids": 0.0, "before.ids": 0.0, "shadow": 0.0, "
 @cache
 def made(name):
     """Return a case and all its arrays."""
-    case = CASES[name]()
+    case = {**CASES, **sii.FULL}[name]()
     return case, expected_of(case)
 
 
@@ -40,3 +43,47 @@ def test_literal_text_without_a_bug_gives_what_the_stage_does(name):
                 np.testing.assert_array_equal(np.isfinite(found), finite)
                 off = np.abs(found[finite].astype(np.float64) - expected[finite]).max(initial=0.0)
                 assert off <= limit * large_value(expected), key
+
+
+def test_colours_are_linear_between_the_corners_of_a_triangle():
+    vertices, faces = np.array([[0.0, 0, 0], [2, 0, 1], [0, 2, 3]]), np.array([[0, 1, 2]])
+    colours = np.array([[[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]])  # a corner's share is its channel
+    shares = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0.2, 0.3, 0.5]])
+    ids = np.array([[0, 0, 0, 0, 0], [-1] * 5])
+    points = np.stack([(shares @ vertices).T] * 2, axis=1)
+    found = tint(ids, points, vertices, faces, colours)
+    np.testing.assert_allclose(found[:, 0], shares.T, atol=1e-15)
+    assert not found[:, 1].any()
+
+
+def test_literal_vertex_colours_without_a_bug_are_the_stages():
+    case, known = made("sii-colours")
+    steps = [step for step in case.stages if "scene.colours" in step.reads]
+    assert [step.name for step in steps] == ["gbuffer.surface", "rsm0.flux", "rsm1.flux"]
+    for step in steps:
+        for name, found in outputs_of(step, known, np.float64, step.variants[-1]).items():
+            finite = np.isfinite(known[name])
+            off = np.abs(found[finite] - known[name][finite]).max()
+            assert off <= SINGLE * large_value(known[name]), name
+
+
+def test_every_likely_bug_of_vertex_colours_is_told():
+    case, known = made("sii-colours")
+    told = {}
+    for step in case.stages:
+        bounds = isolated_bounds(case, step, known, 1) if "scene.colours" in step.reads else {}
+        for bug in step.bugs if bounds else ():
+            bad = outputs_of(step, known, np.float64, bug.run)
+            told[step.name, bug.cause] = any((distance(bad[name], known[name]) > bound.limit).any()
+                                             for name, bound in bounds.items())
+    assert [bug for bug, is_told in told.items() if not is_told] == []
+    assert len(told) == 17 + 2 * 18
+
+
+def test_a_coloured_scene_is_written_for_other_programs(tmp_path):
+    case, known = made("sii-colours")
+    write_scene(case.scene, (8, 6), tmp_path)
+    loaded = load_scene(tmp_path / "scene.json")
+    np.testing.assert_array_equal(loaded.geometry.colours.astype(np.float32), known["scene.colours"])
+    np.testing.assert_array_equal(loaded.geometry.vertices[loaded.geometry.faces].astype(np.float32),
+                                  known["scene.vertices"][known["scene.faces"]])

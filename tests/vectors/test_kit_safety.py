@@ -69,7 +69,7 @@ def outside(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("changes", [
     {"file": "../../../outside/cases/a/out/sum.npy"}, {"file": "ABSOLUTE/out/sum.npy"},
     {"manifest": "../outside/cases/a/manifest.json"}, {"manifest": "ABSOLUTE/manifest.json"},
-    {"extra": "../../../outside/cases/a/out/sum.npy"}, {"extra": "/dev/zero"}, {"file": "out/\0"},
+    {"extra": "../../../outside/cases/a/out/sum.npy"}, {"extra": "/dev/zero"}, {"file": "out/\0"}, {"manifest": "a\nb"},
 ])
 def test_files_outside_a_kit_are_not_read(tmp_path, output, changes):
     other = outside(tmp_path)
@@ -93,12 +93,29 @@ def test_a_link_out_of_a_kit_is_not_followed(tmp_path, output):
     assert check_output(Kit(tmp_path / "linked"), output, Asked()).verdict == "exact"  # a kit that is one itself
 
 
-@pytest.mark.parametrize("name", ["../a", "..", "a/../../b", "/etc", "", "a\\b"])
+@pytest.mark.parametrize("name", ["../a", "..", "a/../../b", "/etc", "", "a\\b", "a\nb", "x" * 300, "ü" * 150])
 @pytest.mark.parametrize("what", ["case", "name"])
 def test_names_of_cases_and_arrays_are_names_of_files(tmp_path, output, what, name):
     kit = write_kit(tmp_path / "kit", **{what: name})
     with pytest.raises(DamagedError, match="expected names of files, got"):
         check_output(Kit(kit), output, Asked())
+
+
+def test_a_kit_without_stages_is_damaged(tmp_path, output):
+    kit = write_kit(tmp_path / "kit")
+    whole = json.loads((kit / "kit.json").read_text())
+    (kit / "kit.json").write_text(json.dumps(whole | {"cases": []}))
+    with pytest.raises(DamagedError, match="kit: expected cases with stages, got none"):
+        check_output(Kit(kit), output, Asked())
+    assert check(kit, output).exit_code == 5
+
+
+def test_faults_of_a_kit_are_a_line_each(tmp_path):
+    kit = write_kit(tmp_path / "kit")
+    (kit / "kit.json").write_text(json.dumps({"x\ny": 1}))
+    with pytest.raises(DamagedError) as error:
+        Kit(kit)
+    assert all(line.startswith(f"{kit / 'kit.json'}: ") for line in str(error.value).splitlines())
 
 
 def header(shape: str, kind: str = "'<f4'", version: tuple[int, int] = (1, 0)) -> bytes:

@@ -1,8 +1,9 @@
-"""Geometric (face) normals of the G-buffer's triangles, where shading normals are interpolated."""
+"""Face normals of the G-buffer's triangles, where shading normals are interpolated, and backs that are seen."""
 
 import math
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
@@ -36,6 +37,34 @@ def facing_normals(geometry: Geometry, triangle_id: Array, normal: Array) -> Arr
     facing = plane(normal.shape, normal.dtype)
     _fill_facing(geometry.vertices, geometry.faces, triangle_id, normal, facing)
     return facing
+
+
+@stage("rsm.backs")
+def share_of_backs(geometry: Geometry, one_sided: Array, eye: tuple[float, float, float], triangle_id: Array) -> float:
+    """Return the share of pixels with a surface that show the back of one that its file leaves out.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles; fronts are counter-clockwise.
+    one_sided : (k,) ndarray of bool
+        Which materials have no back.
+    eye : tuple of 3 floats
+        Where the camera is, m.
+    triangle_id : (h, w) ndarray of int32
+        Which triangle a pixel sees; -1 for none.
+
+    Returns
+    -------
+    float
+        From 0 to 1.
+    """
+    pixels = np.bincount(triangle_id[triangle_id >= 0], minlength=1)
+    seen = np.flatnonzero(pixels)
+    a, b, c = (geometry.vertices[geometry.faces[seen, k]] for k in range(3))
+    turned = np.einsum("ij,ij->i", np.cross(b - a, c - a), np.asarray(eye) - a) < 0
+    backs = seen[turned & one_sided[geometry.material_of_face[seen]]]
+    return float(pixels[backs].sum() / max(1, pixels.sum()))
 
 
 @kernel(parallel=True)

@@ -19,7 +19,7 @@ READ = ("baseColorTexture", "emissiveTexture")
 SHARPEST = 1e4  # exponent of a lobe of full glossiness, which would be a mirror
 HALF = 0.5  # of the light: what transmits less is opaque
 WHITE = (1.0, 1.0, 1.0)
-UNPAINTED = Material(diffuse=WHITE)  # of a primitive without material
+UNPAINTED = Material(diffuse=WHITE, one_sided=True)  # of a primitive without material
 
 Say = Callable[[str], None]  # counts a line of what is not as the file says
 
@@ -50,7 +50,8 @@ def read_material(document: Document, index: int, say: Say) -> Material:
     try:
         return Material(document.name(entry, where), (base[0], base[1], base[2]), specular, exponent, ior,
                         emission=_emission(document, entry, extensions, where),
-                        alpha=1.0 if cutoff is None else base[3], cutoff=cutoff)
+                        alpha=1.0 if cutoff is None else base[3], cutoff=cutoff,
+                        one_sided=not ior and entry.get("doubleSided") is not True)
     except InputError as error:
         raise InputError(f"{document.path}: {where}: {error}") from error
 

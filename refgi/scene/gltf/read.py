@@ -211,9 +211,9 @@ class _Reader:
         found = self.document.item("materials", index, f"{where}.material")
         if index not in self._looks:
             clear = self.materials[index].is_dielectric
-            look = None if clear else base_colour(self.document, found, f"materials[{index}]")
+            look = None if clear else base_colour(self.document, found, f"materials[{index}]", self._say)
             glows = any(self.materials[index].emission)
-            shining = emissive(self.document, found, f"materials[{index}]") if glows else None
+            shining = emissive(self.document, found, f"materials[{index}]", self._say) if glows else None
             if look is not None:
                 self.materials[index] = dataclasses.replace(self.materials[index], texture=look.texture)
             self._looks[index] = look or shining

@@ -4,6 +4,7 @@ Image, sampler, set of texture coordinates, KHR_texture_transform.
 """
 
 import contextlib
+import itertools
 import math
 import weakref
 from collections.abc import Iterator
@@ -14,15 +15,21 @@ import numpy as np
 from refgi.errors import InputError, expect, shortened
 from refgi.scene.gltf.container import Document
 from refgi.scene.gltf.extensions import IMAGES, packed
-from refgi.scene.gltf.materials import GLOSSY
+from refgi.scene.gltf.materials import GLOSSY, Say
 from refgi.scene.texture.image import Image, decoded, expect_all_fit
 from refgi.scene.texture.texture import Filter, Texture, Wrap
 from refgi.scene.values import Array
 
 EXTENSION = "KHR_texture_transform"
 WRAPS: dict[int, Wrap] = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
-FILTERS: dict[int, Filter] = {9728: "nearest", 9729: "bilinear", 9984: "trilinear", 9985: "trilinear",
-                              9986: "trilinear", 9987: "trilinear"}
+NEAREST, LINEAR, TRILINEAR = 9728, 9729, 9987
+FILTERS: dict[int, Filter] = {NEAREST: "nearest", LINEAR: "bilinear", 9984: "trilinear", 9985: "trilinear",
+                              9986: "trilinear", TRILINEAR: "trilinear"}
+NAMES = {NEAREST: "NEAREST", LINEAR: "LINEAR", 9984: "NEAREST_MIPMAP_NEAREST", 9985: "LINEAR_MIPMAP_NEAREST",
+         9986: "NEAREST_MIPMAP_LINEAR", TRILINEAR: "LINEAR_MIPMAP_LINEAR"}
+# of magFilter and minFilter, what one filter here is; None: the file leaves it open. Mip levels are blended in any case
+ALIKE = {(NEAREST, NEAREST), (NEAREST, None), (None, NEAREST),
+         *itertools.product((LINEAR, None), (LINEAR, 9985, TRILINEAR, None))}
 LARGEST_SET = 15  # of texture coordinates
 
 _judged: "weakref.WeakSet[Document]" = weakref.WeakSet()  # documents whose images fit in memory
@@ -40,25 +47,26 @@ class Look(NamedTuple):
         return self.coordinates == other.coordinates and np.array_equal(self.transform, other.transform)
 
 
-def base_colour(document: Document, material: dict[str, Any], where: str) -> Look | None:
+def base_colour(document: Document, material: dict[str, Any], where: str, say: Say) -> Look | None:
     """Return the texture of a material's base colour, None where it has none.
 
-    Raises `InputError` that names file and image if it cannot be read.
+    `say` is told of a filter that is not as the file has it. Raises `InputError` that names file and image if it cannot
+    be read.
     """
     extensions = document.member(material, "extensions", where)
     if GLOSSY in extensions:
         glossy = document.member(extensions, GLOSSY, where)
-        return _look(document, glossy, "diffuseTexture", f"{where}.extensions.{GLOSSY}")
+        return _look(document, glossy, "diffuseTexture", f"{where}.extensions.{GLOSSY}", say)
     surface = document.member(material, "pbrMetallicRoughness", where)
-    return _look(document, surface, "baseColorTexture", f"{where}.pbrMetallicRoughness")
+    return _look(document, surface, "baseColorTexture", f"{where}.pbrMetallicRoughness", say)
 
 
-def emissive(document: Document, material: dict[str, Any], where: str) -> Look | None:
+def emissive(document: Document, material: dict[str, Any], where: str, say: Say) -> Look | None:
     """Return the texture of a material's emission, as `base_colour` does."""
-    return _look(document, material, "emissiveTexture", where)
+    return _look(document, material, "emissiveTexture", where, say)
 
 
-def _look(document: Document, owner: dict[str, Any], key: str, where: str) -> Look | None:
+def _look(document: Document, owner: dict[str, Any], key: str, where: str, say: Say) -> Look | None:
     if key not in owner:
         return None
     where = f"{where}.{key}"
@@ -67,7 +75,7 @@ def _look(document: Document, owner: dict[str, Any], key: str, where: str) -> Lo
     number = document.integer(change, "texCoord", where, document.integer(info, "texCoord", where, 0))
     expect(number <= LARGEST_SET, f"{document.path}: {where}.texCoord", f"0 to {LARGEST_SET}", number)
     transform = _transform(document, change, f"{where}.extensions.{EXTENSION}")
-    return Look(_texture(document, info, where), number, transform)
+    return Look(_texture(document, info, where, say), number, transform)
 
 
 def transformed(uv: Array, transform: Array) -> Array:
@@ -84,7 +92,7 @@ def _transform(document: Document, change: dict[str, Any], where: str) -> Array:
     return np.array([[c * sx, s * sy, ox], [-s * sx, c * sy, oy]])
 
 
-def _texture(document: Document, info: dict[str, Any], where: str) -> Texture:
+def _texture(document: Document, info: dict[str, Any], where: str, say: Say) -> Texture:
     index = info.get("index")
     entry, where = document.item("textures", index, f"{where}.index"), f"textures[{index}]"
     wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
@@ -94,7 +102,7 @@ def _texture(document: Document, info: dict[str, Any], where: str) -> Texture:
         key = f"samplers[{entry['sampler']}]"
         across, down = (_code(document, sampler, name, key, WRAPS, 10497) for name in ("wrapS", "wrapT"))
         wrap = WRAPS[across], WRAPS[down]
-        chosen = FILTERS[_code(document, sampler, "minFilter", key, FILTERS, 9987)]
+        chosen = _filter(document, sampler, key, say)
     if "source" not in entry:
         found = document.member(entry, "extensions", where)
         for name, form in IMAGES.items():
@@ -104,6 +112,19 @@ def _texture(document: Document, info: dict[str, Any], where: str) -> Texture:
         raise InputError(f"{document.path}: {where}.source: expected a PNG or JPEG image, got none "
                          f"(extensions: {shortened(extensions, 80)})")
     return Texture(_image(document, entry["source"], f"{where}.source"), wrap, chosen)
+
+
+def _filter(document: Document, sampler: dict[str, Any], where: str, say: Say) -> Filter:
+    """Return the one filter that stands for a sampler's two; `say` is told where it is not as both."""
+    larger, smaller = sampler.get("magFilter"), sampler.get("minFilter")
+    larger = larger if larger in (NEAREST, LINEAR) else None  # any other is not of the format
+    default = NEAREST if larger == NEAREST else TRILINEAR
+    chosen = FILTERS[_code(document, sampler, "minFilter", where, FILTERS, default)]
+    if (larger, smaller) not in ALIKE:
+        both = (("magFilter", larger), ("minFilter", smaller))
+        told = ", ".join(f"{key} {NAMES[code]}" for key, code in both if code)
+        say(f"material texture(s) of {told} filtered {chosen}")
+    return chosen
 
 
 def _code(document: Document, owner: dict[str, Any], key: str, where: str, known: dict[int, Any], default: int) -> int:

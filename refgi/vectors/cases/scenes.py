@@ -51,6 +51,14 @@ def room(*lights: Any, matte: bool = False, smooth: bool = False, camera: Camera
     return stored_scene(Scene("kit room", geometry, materials, camera, lights))
 
 
+def coloured(scene: Scene) -> Scene:
+    """Return a scene with vertex colours, other ones at each vertex and in each channel."""
+    count = len(scene.geometry.vertices)
+    colours = 0.08 + 0.9 * (np.arange(3 * count) * 0.6180339887498949 % 1).reshape(count, 3)
+    geometry = dataclasses.replace(scene.geometry, colours=colours[scene.geometry.faces])
+    return stored_scene(dataclasses.replace(scene, geometry=geometry))
+
+
 def kerbs(*lights: Any, camera: Camera = VIEW) -> Scene:
     """Return a floor before a wall with four slanted kerbs on it: seen from the floor they reach down to its plane."""
     geometry, materials = merge([quad(*sides) for sides in (
@@ -97,10 +105,11 @@ def stored_scene(scene: Scene) -> Scene:
         return dataclasses.replace(part, **{name: rounded(getattr(part, name)) for name in names
                                             if hasattr(part, name)})
 
-    geometry, normals = scene.geometry, scene.geometry.vertex_normals
+    geometry, normals, colours = scene.geometry, scene.geometry.vertex_normals, scene.geometry.colours
     return dataclasses.replace(
         scene, geometry=Geometry(_single(geometry.vertices), geometry.faces, geometry.material_of_face,
-                                 None if normals is None else _single(normals)),
+                                 None if normals is None else _single(normals),
+                                 colours=None if colours is None else _single(colours)),
         materials=tuple(each(one, "diffuse", "specular", "exponent") for one in scene.materials),
         camera=each(scene.camera, "eye", "target", "up", "vfov"),
         lights=tuple(each(light, "position", "direction", "intensity", "irradiance", "inner_half_angle",

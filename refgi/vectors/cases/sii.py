@@ -10,7 +10,7 @@ from refgi.lights.warp import Warp
 from refgi.pairs.settings import PairSettings
 from refgi.scene import Scene
 from refgi.settings import of
-from refgi.vectors.cases.scenes import BULB, DOWN, POLE, RAMP, SPOT, SUN, far_away, room
+from refgi.vectors.cases.scenes import BULB, DOWN, POLE, RAMP, SPOT, SUN, coloured, far_away, room
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
 from refgi.vectors.stages.buffers import add_gbuffer, add_rsm, give_scene
@@ -74,6 +74,9 @@ FULL = {
                                     (32, 24), 24, (48, 24), shifts=((0.1, 0.2), (0.3, 0.45))),
     "sii-far-away": lambda: splatting("sii-far-away", "a scene at 100 km, in float32 to 8 mm",
                                       far_away(room(SPOT, matte=True), 1e5), (24, 18), 13, (40,)),
+    "sii-colours": lambda: splatting("sii-colours", "vertex colours multiply the diffuse part, of glossy surfaces too",
+                                     coloured(room(SPOT, BULB)), (24, 18), 13, (24, 12),
+                                     shifts=((0.1, 0.2), (0.3, 0.45))),
     "sii-large": lambda: splatting("sii-large", "64 x 48 pixels, 256 lights of two lamps", room(SPOT, BULB), (64, 48),
                                    48, (128, 128), warp=A3, shifts=((0.1, 0.2), (0.3, 0.45))),
 }

@@ -31,6 +31,7 @@ from refgi.vectors.stages.buffer_forms import (
     surface_lists,
     view_lists_of_flux,
 )
+from refgi.vectors.stages.vertex_colours import COLOURS, Tinted, colours_read, give_colours
 
 VECTOR, POINT = "unit vector", "m"
 QUADRATURE = 8.0  # roundings that a float32 sum over a texel's nodes gathers; the bound is SAFETY times as wide
@@ -51,6 +52,7 @@ def give_scene(recipe: Recipe, scene: Scene) -> None:
     if geometry.vertex_normals is not None:
         recipe.give("scene.vertex_normals", geometry.vertex_normals,
                     Spec("vertex, xyz", VECTOR, "normals, interpolated over triangles", "world"))
+    give_colours(recipe, geometry)
     recipe.give("materials.diffuse", materials.diffuse, Spec("material, rgb", "1", "reflectance of the diffuse part"))
     recipe.give("materials.specular", materials.specular, Spec("material, rgb", "1", "reflectance of the Phong lobe"))
     recipe.give("materials.exponent", materials.exponent, Spec("material", "1", "Phong exponent"))
@@ -73,8 +75,8 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
     _add_ids(recipe, name, name, maps, scene)
     _add_surface(recipe, name, name, maps, scene, ("depth", "position", "normal"))
     glossy = any(any(material.specular) for material in scene.materials)
-    reads = (*SCENE, *_normals(recipe), *REFLECTANCE, *_map_names(name), f"{name}.triangle_id",
-             *_light_names(lamp, light))
+    reads = (*SCENE, *_normals(recipe), *colours_read(recipe, f"{name}.position"), *REFLECTANCE, *_map_names(name),
+             f"{name}.triangle_id", *_light_names(lamp, light))
 
     def flux(arrays: Arrays, real: Any) -> Arrays:
         map_here = rsm_of(arrays, name, lamp, light, maps, real, scene)
@@ -96,6 +98,13 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
                    f"{name}.lobe_exponent": Spec(sheet, "1", "Phong exponent; 0 without a lobe")}
     # a spot's flux is an integral over each texel, which refgi takes in float64 in any run
     summed = writing(flux, **{f"{name}__flux": lambda a: (a * (1.0 + QUADRATURE * ROUNDING)).astype(a.dtype)})
+    if COLOURS in recipe.specs:
+        tinted = Tinted(flux, name, f"{name}.flux")
+        recipe.add(f"{name}.flux", "flux that leaves each texel's surface", flux, reads, writes,
+                   paper="SII Sec. 3.1; docs/radiometry",
+                   variants=(*((summed,) if isinstance(light, SpotLight) else ()), tinted.variant()),
+                   bugs=(*tinted.bugs(), *((tinted.specular_bug(f"{name}.lobe_flux"),) if glossy else ())))
+        return
     form = flux_form(name, lamp, light, maps, bool(_normals(recipe)))
     recipe.add(f"{name}.flux", "flux that leaves each texel's surface", flux, reads, writes,
                paper="SII Sec. 3.1; docs/radiometry",
@@ -118,11 +127,12 @@ def rsm_of(
 
 def geometry_of(arrays: Arrays, scene: Scene) -> Geometry:
     """Return the triangles among arrays."""
-    normals = arrays.get("scene.vertex_normals")
+    normals, colours = arrays.get("scene.vertex_normals"), arrays.get(COLOURS)
     return dataclasses.replace(scene.geometry, vertices=np.asarray(arrays["scene.vertices"], np.float64),
                                faces=np.asarray(arrays["scene.faces"], np.int32),
                                material_of_face=np.asarray(arrays["scene.material_of_face"], np.int32),
-                               vertex_normals=None if normals is None else np.asarray(normals, np.float64))
+                               vertex_normals=None if normals is None else np.asarray(normals, np.float64),
+                               colours=None if colours is None else np.asarray(colours, np.float64))
 
 
 def materials_of(arrays: Arrays, real: Any) -> MaterialTable:
@@ -233,7 +243,9 @@ def _add_surface(
              "normal": Spec("xyz, row, column", VECTOR, "on the side that is seen; 0 without surface", "world"),
              "albedo": Spec("rgb, row, column", "1", "diffuse reflectance; 0 without surface", "linear RGB")}
     lists = () if name == EARLIER else surface_lists(maps, smooth, "albedo" in channels)
+    tinted = Tinted(surface, name, f"{name}.albedo") if "albedo" in channels and COLOURS in recipe.specs else None
     recipe.add(f"{name}.surface", "depth, position and normal of what each texel sees", surface,
-               (*SCENE, *_normals(recipe), *REFLECTANCE, *_map_names(view), f"{name}.triangle_id"),
-               {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1",
-               bugs=form.bugs("surface/side", *lists), variants=(in_float64(form.run()),))
+               (*SCENE, *_normals(recipe), *(colours_read(recipe) if tinted else ()), *REFLECTANCE, *_map_names(view),
+                f"{name}.triangle_id"), {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1",
+               bugs=tinted.bugs() if tinted else form.bugs("surface/side", *lists),
+               variants=(tinted.variant() if tinted else in_float64(form.run()),))

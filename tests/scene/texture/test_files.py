@@ -88,16 +88,45 @@ def test_images_come_from_data_uris_and_files_beside(tmp_path: Path, place: str)
 @pytest.mark.parametrize(("sampler", "wrap", "chosen"), [
     ({}, ("repeat", "repeat"), "trilinear"),
     ({"wrapS": 33071, "wrapT": 33648, "minFilter": 9728}, ("clamp", "mirror"), "nearest"),
-    ({"wrapS": 33648, "wrapT": 10497, "minFilter": 9729, "magFilter": 9728}, ("mirror", "repeat"), "bilinear"),
-    *(({"wrapT": 33071, "minFilter": code}, ("repeat", "clamp"), "trilinear") for code in (9984, 9985, 9986, 9987)),
+    ({"minFilter": 9728, "magFilter": 9728}, ("repeat", "repeat"), "nearest"),
+    ({"magFilter": 9728}, ("repeat", "repeat"), "nearest"),  # what is smaller than texels, the file leaves open
+    ({"wrapS": 33648, "wrapT": 10497, "minFilter": 9729, "magFilter": 9729}, ("mirror", "repeat"), "bilinear"),
+    ({"minFilter": 9987, "magFilter": 9729}, ("repeat", "repeat"), "trilinear"),
+    ({"minFilter": 9987}, ("repeat", "repeat"), "trilinear"), ({"minFilter": 9985}, ("repeat", "repeat"), "trilinear"),
+    ({"magFilter": 9729}, ("repeat", "repeat"), "trilinear"),
 ])
 def test_samplers(tmp_path: Path, sampler: dict[str, int], wrap: tuple[str, str], chosen: str) -> None:
-    def edit(tree: dict[str, Any]) -> None:
-        tree["samplers"] = [{}, sampler]
-        tree["textures"][0]["sampler"] = 1
-
-    found = texture_of(load_scene(textured(tmp_path, edit)))
+    found = texture_of(load_scene(textured(tmp_path, sampled(sampler))))
     assert (found.wrap, found.filter) == (wrap, chosen)
+
+
+@pytest.mark.parametrize(("sampler", "chosen", "said"), [
+    ({"magFilter": 9728, "minFilter": 9987}, "trilinear", "magFilter NEAREST, minFilter LINEAR_MIPMAP_LINEAR"),
+    ({"magFilter": 9728, "minFilter": 9729}, "bilinear", "magFilter NEAREST, minFilter LINEAR"),
+    ({"magFilter": 9729, "minFilter": 9728}, "nearest", "magFilter LINEAR, minFilter NEAREST"),
+    *(({"wrapT": 33071, "minFilter": code}, "trilinear", f"minFilter {name}") for code, name in (
+        (9984, "NEAREST_MIPMAP_NEAREST"), (9986, "NEAREST_MIPMAP_LINEAR")))])
+def test_filters_that_are_not_as_the_file_says_are_said(
+    tmp_path: Path, sampler: dict[str, int], chosen: str, said: str
+) -> None:
+    def edit(tree: dict[str, Any]) -> None:
+        sampled(sampler)(tree)
+        tree["textures"] += [tree["textures"][0], {"source": 0}]
+        first, primitive = tree["materials"][0], tree["meshes"][0]["primitives"][0]
+        for index in (1, 2):
+            surface = first["pbrMetallicRoughness"] | {"baseColorTexture": {"index": index}}
+            tree["materials"].append({"pbrMetallicRoughness": surface})
+            tree["meshes"][0]["primitives"].append(primitive | {"material": index})
+
+    path = textured(tmp_path, edit)
+    with pytest.warns(RefgiWarning) as warned:
+        assert texture_of(load_scene(path)).filter == chosen
+    assert [str(one.message) for one in warned] == [f"{path}: 2 material texture(s) of {said} filtered {chosen}"]
+
+
+def sampled(sampler: dict[str, int]) -> Edit:
+    """Return what gives the sample's texture a sampler."""
+    return lambda tree: (tree.update(samplers=[{}, sampler]), tree["textures"][0].update(sampler=1))
 
 
 def test_the_set_of_coordinates_is_the_one_that_is_asked_for(tmp_path: Path) -> None:
@@ -237,6 +266,12 @@ def test_obj_faces_without_coordinates_and_options_that_are_not_read(tmp_path: P
     assert painted.material.texture is not None
     assert (plain.material.texture, plain.uv) == (None, None)
     assert [len(mesh.faces) for mesh in (painted, plain)] == [1, 1]
+
+
+@pytest.mark.parametrize("option", ["-s 1 1e12", "-o 1e30", "-s 1e308 1e308", "-s 1 1e308 -o 0 -1e308"])
+def test_an_obj_texture_that_lies_too_far_away_names_its_material(tmp_path: Path, option: str) -> None:
+    with pytest.raises(InputError, match=r"square\.obj: material 'a': uv of face 0: expected finite texture"):
+        load_scene(obj(tmp_path, f"newmtl a\nmap_Kd {option} wood.png\n"))
 
 
 def test_an_obj_texture_that_is_missing_names_line_and_image(tmp_path: Path) -> None:

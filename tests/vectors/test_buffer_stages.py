@@ -24,7 +24,7 @@ LIMIT = {"gbuffer.ids": 0.0, "rsm.ids": 0.0, "before.ids": 0.0, "shadow": 0.0, "
 @cache
 def made(name):
     """Return a case and all its arrays."""
-    case = {**CASES, **sii.FULL}[name]()
+    case = {**CASES, **sii.FULL, **hssil.FULL}[name]()
     return case, expected_of(case)
 
 
@@ -56,15 +56,17 @@ def test_colours_are_linear_between_the_corners_of_a_triangle():
     assert not found[:, 1].any()
 
 
-def test_literal_vertex_colours_without_a_bug_are_the_stages():
-    case, known = made("sii-colours")
+@pytest.mark.parametrize(("name", "stages"), [("sii-colours", ["gbuffer.surface", "rsm0.flux", "rsm1.flux"]),
+                                              ("hssil-colours", ["gbuffer.surface"])])
+def test_literal_vertex_colours_without_a_bug_are_the_stages(name, stages):
+    case, known = made(name)
     steps = [step for step in case.stages if "scene.colours" in step.reads]
-    assert [step.name for step in steps] == ["gbuffer.surface", "rsm0.flux", "rsm1.flux"]
+    assert [step.name for step in steps] == stages
     for step in steps:
-        for name, found in outputs_of(step, known, np.float64, step.variants[-1]).items():
-            finite = np.isfinite(known[name])
-            off = np.abs(found[finite] - known[name][finite]).max()
-            assert off <= SINGLE * large_value(known[name]), name
+        for array, found in outputs_of(step, known, np.float64, step.variants[-1]).items():
+            finite = np.isfinite(known[array])
+            off = np.abs(found[finite] - known[array][finite]).max()
+            assert off <= SINGLE * large_value(known[array]), array
 
 
 def test_every_likely_bug_of_vertex_colours_is_told():

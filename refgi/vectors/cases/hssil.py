@@ -11,7 +11,7 @@ from refgi.scene import Scene, SpotLight
 from refgi.settings import of, replaced
 from refgi.sssil.settings import PRESETS, HssilSettings, TemporalSettings
 from refgi.sssil.temporal.sequence import Sequence
-from refgi.vectors.cases.scenes import BULB, DOWN, POLE, RAMP, SPOT, VIEW, room, stored_scene
+from refgi.vectors.cases.scenes import BULB, DOWN, POLE, RAMP, SPOT, VIEW, coloured, room, stored_scene
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
 from refgi.vectors.stages.buffers import add_gbuffer, give_scene
@@ -36,6 +36,7 @@ SETTINGS = {
                                          "downsample": "closest_average", "pattern": "fixed"}),
     "hssil-all": replaced(CLOSEST, {"radius": 2.0, "levels": 3, "pattern": "all"}),
     "hssil-ramp": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "seed": 4}),
+    "hssil-colours": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "seed": 8}),
 }
 VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
     "hssil-default": (room(SPOT, BULB), (40, 28), "map"),
@@ -47,6 +48,7 @@ VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
     "hssil-radiance": (room(SPOT, BULB, matte=True, smooth=True), (30, 21), "exact"),
     "hssil-all": (room(BULB, matte=True), (18, 14), "exact"),
     "hssil-ramp": (room(RAMP, SPOT, matte=True), (16, 12), "exact"),
+    "hssil-colours": (coloured(room(SPOT, BULB, matte=True)), (20, 15), "exact"),
 }
 TEMPORAL = {
     "hssil-temporal": of(TemporalSettings),
@@ -131,5 +133,6 @@ FULL: dict[str, Any] = {
     "hssil-radiance": _quick("hssil-radiance", "the closest texels with the mean radiance of all; one mirror-symmetric "
                              "set of samples, no blur"),
     "hssil-all": _quick("hssil-all", "every texel of disc and crown is a sample, no blur"),
+    "hssil-colours": _quick("hssil-colours", "vertex colours multiply the albedo, and so the light that senders send"),
     "hssil-moving": lambda: coherent("hssil-moving", "a surface that moves by itself before a camera that moves too"),
 }

@@ -66,12 +66,20 @@ def compiled(
         for name, value in one.__globals__.items():
             if scope.setdefault(name, value) is not value and name in one.__code__.co_names:
                 raise StaleEditError(f"{what}: two functions that {_name(function)} runs know another {name}")
-    for one, text in parts.items():
+    for one, text in _reached(parts).items():
         try:
             exec(compile(text, one.__code__.co_filename, "exec"), scope)
         except SyntaxError as error:
             raise StaleEditError(f"{_name(one)}: {what}: no program is left: {error}") from error
     return scope[function.__name__]  # type: ignore[no-any-return]
+
+
+def _reached(parts: Mapping[Function, str | ast.Module]) -> dict[Function, str | ast.Module]:
+    """Return the texts that differ, and of functions that call those; others stay as they are, caches too."""
+    reached = {one for one, text in parts.items() if text != code_of(one)}
+    while above := {one for one in parts if one not in reached and not reached.isdisjoint(_literal_names(one))}:
+        reached |= above
+    return {one: text for one, text in parts.items() if one in reached}
 
 
 @functools.cache

@@ -37,7 +37,7 @@ def box(points: Any) -> Any:
 
 
 def kmeans_start(position: Any, normal: Any, count: int) -> Any:
-    """Return centres and normals (3, M) at which clusters begin, the same in each frame (Sec. 5.2, 6)."""
+    """Return centres and normals (3, M) at which clusters begin: those of light floor(k N / M) (Sec. 5.2, 6)."""
     n, k = position.shape[1], np.arange(count)
     first = k * n // count
     return position[:, first], normal[:, first]
@@ -62,8 +62,8 @@ def kmeans_assign(
     if distance == "raw":
         d = w_x * dx + w_a * angle  # Sec. 5.1: d = w_x dx + w_alpha dalpha
     elif distance == "squared":
-        chord = np.sqrt(((normal[:, :, None] - axis[:, None]) ** 2).sum(axis=0))
-        d = w_x * (dx / diagonal) ** 2 + w_a * chord**2
+        turned = ((normal[:, :, None] - axis[:, None]) ** 2).sum(axis=0)
+        d = w_x * (dx / diagonal) ** 2 + w_a * turned
     else:
         d = w_x * dx / diagonal + w_a * angle / np.pi
     of = d.argmin(axis=1)
@@ -110,9 +110,9 @@ def kmeans_each(position: Any, normal: Any) -> Any:
 def areas(position: Any, center: Any, normal: Any, of: Any, axes: str, extent: str, unbiased: bool) -> Any:
     """Return the rectangle around each cluster's lights, projected along its normal (Sec. 6, E-VAL-10).
 
-    Frames of maps (M, 3, 3); axes of the rectangle (M, 2, 3), the map's ("fixed"), of the lights' spread ("pca") or of
-    least area; its sides, and its middle from the centre (2, M), Delta, the distance of its farthest light (M,), m: the
-    root of the sides' product, the longer or the shorter; lights (M,). `unbiased`: as of infinitely many lights.
+    Frames of maps (M, 3, 3); axes of rectangles (M, 2, 3), the map's ("fixed"), along the lights' spread ("pca") or of
+    least area ("min_area"); sides, and middles from the centres (2, M), m; Delta (M,), m, the "root" of both sides'
+    product, the "longer" or the "shorter"; distances of the farthest lights (M,), m; numbers of lights (M,).
     """
     frame, count = map_frames(normal), center.shape[1]
     along, members = frame[:, :2].copy(), np.bincount(of, minlength=count)
@@ -219,8 +219,9 @@ def parts(
     each = pair(x, n, p, m, phi, lobe, 0.0 if area is None else area[:, None])
     row, column = np.indices(triangle_id.shape)
     own = row % side * side + column % side
-    taken = (np.zeros_like(of) if subset is None else subset)[:, None] == own.reshape(-1)
-    each = np.where(taken & (triangle_id.reshape(-1) >= 0), each, 0)
+    subset = np.zeros_like(of) if subset is None else subset
+    takes = subset[:, None] == own.reshape(-1)
+    each = np.where(takes & (triangle_id.reshape(-1) >= 0), each, 0)
     sums = np.stack([each[:, of == k].sum(axis=1) for k in range(center.shape[1])])
     return side**2 * sums.reshape(-1, *position.shape)
 

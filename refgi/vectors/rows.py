@@ -19,8 +19,6 @@ import numpy as np
 from refgi.vectors.edits import PACKAGE, Edits, StaleEditError, edited
 from refgi.vectors.spec import Array, Arrays, Bug, Run
 
-Read = str | tuple["Read | None", ...]  # name of an array, or of several; None: what one of several has not
-
 
 class Row(NamedTuple):
     """A likely bug."""
@@ -36,10 +34,11 @@ class Form:
     """The literal form of a stage: which function, what it reads and writes. Runs as the stage does."""
 
     function: Callable[..., Any]
-    reads: Mapping[str, Read]  # parameter: array, or several, such as those of all maps
+    reads: Mapping[str, Any]  # parameter: array, or a tuple of several, such as those of all maps; None: there is none
     writes: tuple[str, ...]  # in the order in which the function returns them
     numbers: Mapping[str, Any] = field(default_factory=dict)  # its other arguments
     adapt: Mapping[str, Callable[[Array], Array]] = field(default_factory=dict)  # what parameters are made of arrays
+    double: bool = False  # in float64 whatever it reads, as refgi does where digits cancel
 
     def __call__(self, arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG002 in the type of the arrays
         """Return what the stage writes."""
@@ -47,13 +46,11 @@ class Form:
 
     def by(self, function: Callable[..., Any], arrays: Arrays) -> Arrays:
         """Return what the stage writes with another function, such as an edited one."""
+        if self.double:
+            arrays = {name: one.astype(np.float64) if one.dtype.kind == "f" else one for name, one in arrays.items()}
         read = {name: self.adapt.get(name, _as_it_is)(_read(arrays, array)) for name, array in self.reads.items()}
         made = function(**read, **self.numbers)
-        return dict(zip(self.writes, made if len(self.writes) > 1 else (made,), strict=True))
-
-    def run(self) -> Run:
-        """Return what the stage runs."""
-        return self
+        return dict(zip(self.writes, made if isinstance(made, list | tuple) else (made,), strict=True))
 
     def bugs(self, *lists: str, of: str = "") -> tuple[Bug, ...]:
         """Return the likely bugs of some lists, in the order of the file; `of`: a literal module that it calls."""
@@ -65,7 +62,7 @@ def _as_it_is(array: Array) -> Array:
     return array
 
 
-def _read(arrays: Arrays, name: Read | None) -> Any:
+def _read(arrays: Arrays, name: Any) -> Any:
     return None if name is None else arrays[name] if isinstance(name, str) else tuple(
         _read(arrays, one) for one in name)
 

@@ -55,7 +55,7 @@ def _add_level(recipe: Recipe, view: Projection, index: int, first: int, whole: 
         f"the nearest of {parts}, with the mean radiance of all pixels that show a surface"
     recipe.add(f"level{index}", what, run, reads, own, paper=MEANS,
                exact=(levels.PICTURE[0],) if index == 0 else (f"level{index - 1}.depth",), bugs=form.bugs(rows),
-               variants=(form.run(),))
+               variants=(form,))
 
 
 def _form(index: int, number: int, size: tuple[int, int], whole: bool) -> Form:

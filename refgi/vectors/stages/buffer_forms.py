@@ -3,30 +3,18 @@
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from refgi.literal import buffers, light_flux
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection
 from refgi.scene import DirectionalLight, SpotLight
 from refgi.scene.model import Light
-from refgi.vectors.rows import Form, Read
-from refgi.vectors.spec import Arrays, Run
+from refgi.vectors.rows import Form
 
 VIEWS = "view/centre", "view/resolution", "view/frame", "view/origin", "view/extent"
 TRIANGLES = {"vertices": "scene.vertices", "faces": "scene.faces"}
 MATERIAL, NORMALS = {"material_of_face": "scene.material_of_face"}, {"vertex_normals": "scene.vertex_normals"}
 
 
-def in_float64(run: Run) -> Run:
-    """Return the run of a stage that computes in float64 whatever it reads, as refgi does where digits cancel."""
-    def run_in_float64(arrays: Arrays, real: Any) -> Arrays:
-        return run({name: array.astype(np.float64) if array.dtype.kind == "f" else array
-                    for name, array in arrays.items()}, real)
-
-    return run_in_float64
-
-
-def view_reads(view: str) -> dict[str, Read]:
+def view_reads(view: str) -> dict[str, Any]:
     """Return what the literal text reads of a camera or light's map."""
     return {key: f"{view}.{key}" for key in ("origin", "frame", "half")}
 
@@ -39,7 +27,7 @@ def view_numbers(maps: Projection) -> dict[str, Any]:
 def ids_form(name: str, view: str, maps: Projection) -> Form:
     """Return the literal form of a view's ids."""
     return Form(buffers.visible_triangles, {**TRIANGLES, **view_reads(view)}, (f"{name}.triangle_id",),
-                view_numbers(maps))
+                view_numbers(maps), double=True)
 
 
 def ids_lists(maps: Projection) -> tuple[str, ...]:
@@ -53,7 +41,7 @@ def surface_form(name: str, view: str, maps: Projection, smooth: bool) -> Form:
     reads = {**TRIANGLES, **MATERIAL, **(NORMALS if smooth else {}), "diffuse": "materials.diffuse",
              "triangle_id": f"{name}.triangle_id", **view_reads(view)}
     return Form(buffers.surface, reads, tuple(f"{name}.{key}" for key in ("depth", "position", "normal", "albedo")),
-                view_numbers(maps))
+                view_numbers(maps), double=True)
 
 
 def surface_lists(maps: Projection, smooth: bool, albedo: bool) -> tuple[str, ...]:
@@ -73,7 +61,7 @@ def flux_form(name: str, lamp: str, light: Light, maps: Projection, smooth: bool
     if isinstance(light, SpotLight):
         reads["half_angles"], numbers["falloff"] = f"{lamp}.half_angles", light.falloff
     return Form(light_flux.reflected_flux, reads, tuple(f"{name}.{key}" for key in (
-        "solid_angle", "flux", "lobe_flux", "lobe_axis", "lobe_exponent")), numbers)
+        "solid_angle", "flux", "lobe_flux", "lobe_axis", "lobe_exponent")), numbers, double=True)
 
 
 def flux_lists(light: Light, maps: Projection, glossy: bool) -> tuple[str, ...]:

@@ -26,7 +26,6 @@ from refgi.vectors.stages.buffer_forms import (
     flux_lists,
     ids_form,
     ids_lists,
-    in_float64,
     surface_form,
     surface_lists,
     view_lists_of_flux,
@@ -108,7 +107,7 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
     form = flux_form(name, lamp, light, maps, bool(_normals(recipe)))
     recipe.add(f"{name}.flux", "flux that leaves each texel's surface", flux, reads, writes,
                paper="SII Sec. 3.1; docs/radiometry",
-               variants=(in_float64(form.run()), *((summed,) if isinstance(light, SpotLight) else ())),
+               variants=(form, *((summed,) if isinstance(light, SpotLight) else ())),
                bugs=(*form.bugs(*flux_lists(light, maps, glossy)),
                      *form.bugs(*view_lists_of_flux(maps, glossy), of="buffers")))
 
@@ -215,7 +214,7 @@ def _add_ids(recipe: Recipe, name: str, view: str, maps: Projection, scene: Scen
     lists = () if name == EARLIER else ids_lists(maps)
     recipe.add(f"{name}.ids", "nearest triangle at each texel's centre", ids, (*SCENE, *_map_names(view)),
                {f"{name}.triangle_id": Spec("row, column", "1", "nearest triangle, -1 for none", tier="T0")},
-               paper="docs/rasterizer", bugs=form.bugs("view/upwards", *lists), variants=(in_float64(form.run()),))
+               paper="docs/rasterizer", bugs=form.bugs("view/upwards", *lists), variants=(form,))
 
 
 def _half_texel(maps: Projection) -> Any:
@@ -248,4 +247,4 @@ def _add_surface(
                (*SCENE, *_normals(recipe), *(colours_read(recipe) if tinted else ()), *REFLECTANCE, *_map_names(view),
                 f"{name}.triangle_id"), {f"{name}.{key}": specs[key] for key in channels}, paper="SII Sec. 3.1",
                bugs=tinted.bugs() if tinted else form.bugs("surface/side", *lists),
-               variants=(tinted.variant() if tinted else in_float64(form.run()),))
+               variants=(tinted.variant() if tinted else form,))

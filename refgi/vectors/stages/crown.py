@@ -68,7 +68,7 @@ def add_samples(
     kinds = ("", f"/{sampling.density}", *(("/disc", f"/{sampling.density} disc") if inner else ()))
     recipe.add(name, "texels around a receiver that are its samples, and how many texels each stands for", run,
                (points, shifts), _specs(name), paper=CROWN, bugs=form.bugs(*(f"crown_samples{one}" for one in kinds)),
-               variants=(form.run(),))
+               variants=(form,))
 
 
 def _specs(name: str) -> dict[str, Spec]:
@@ -95,7 +95,7 @@ def add_gather(recipe: Recipe, settings: HssilSettings, index: int) -> None:
     recipe.add(name.split(".")[0], "irradiance of a level's texels by their samples, those outside the picture, on "
                "nothing or on the texel itself left out", run, (*planes, *samples), {
                    name: Spec("rgb, row, column", "W/m^2", "irradiance by this level; 0 without surface", "linear RGB",
-                              EQ4)}, paper=f"HSS Eq. 1; {EQ4}", exact=(planes[0],), variants=(form.run(),), bugs=(
+                              EQ4)}, paper=f"HSS Eq. 1; {EQ4}", exact=(planes[0],), variants=(form,), bugs=(
                        *form.bugs("gather"), *_parts_left_out(form, settings.sampling.counts(index)[0]),
                        *_scaled_again(form, index)))
 
@@ -107,7 +107,7 @@ def _parts_left_out(form: Form, inner: int) -> tuple[Bug, ...]:
         names = (form.reads[key].replace(".", "__") for key in ("offsets", "weight"))
         cut = dict(zip(names, (lambda a: a[..., part, :], lambda a: a[..., part]), strict=True))
         left = "disc are left out: the crown" if part.start else "crown are left out: the disc"
-        return Bug(f"the samples of the {left} alone", reading(form.run(), **cut), "HSS Sec. 3.2")
+        return Bug(f"the samples of the {left} alone", reading(form, **cut), "HSS Sec. 3.2")
 
     return (only(slice(inner, None)), only(slice(inner))) if inner else ()
 
@@ -115,10 +115,10 @@ def _parts_left_out(form: Form, inner: int) -> tuple[Bug, ...]:
 def _scaled_again(form: Form, index: int) -> tuple[Bug, ...]:
     """Return bugs of 4^k, which areas of level k have already."""
     area, light = (name.replace(".", "__") for name in (form.reads["area"], form.writes[0]))
-    return (Bug("areas are scaled by 4^k a second time", writing(form.run(), **{light: lambda a: a * 4.0**index}),
+    return (Bug("areas are scaled by 4^k a second time", writing(form, **{light: lambda a: a * 4.0**index}),
                 AREA),
             Bug("areas are divided by 4^k: a coarse texel counts as one of the first level",
-                reading(form.run(), **{area: lambda a: a / 4.0**index}), AREA)) if index else ()
+                reading(form, **{area: lambda a: a / 4.0**index}), AREA)) if index else ()
 
 
 def _in_phases(offsets: Array, weight: Array) -> tuple[Array, Array]:
@@ -135,7 +135,7 @@ def _add_points(recipe: Recipe, name: str, inner: int, crown: int) -> None:
     recipe.add(f"points of {name}", "points of the sequence, j steps from 1/2, the disc's then the crown's; modulo 1, "
                "in double precision", lambda arrays, real: {f"{name}.points": sample_points(inner, crown)},  # noqa: ARG005
                (), {f"{name}.points": POINTS}, paper=CROWN,
-               bugs=form.bugs(*(f"sample_points{one}" for one in kinds)), variants=(form.run(),))
+               bugs=form.bugs(*(f"sample_points{one}" for one in kinds)), variants=(form,))
 
 
 def _add_shifts(recipe: Recipe, name: str, counts: tuple[int, int], tile: tuple[int, int]) -> None:
@@ -157,4 +157,4 @@ def _add_shifts(recipe: Recipe, name: str, counts: tuple[int, int], tile: tuple[
                    f"{name}.points": POINTS,
                    f"{name}.shifts": Spec("row of the tile, column of the tile, uv", "1",
                                           "what each texel of a tile adds to u and v, modulo 1"),
-               }, paper=CROWN, exact=(f"{name}.shift",), bugs=form.bugs(*lists), variants=(form.run(),))
+               }, paper=CROWN, exact=(f"{name}.shift",), bugs=form.bugs(*lists), variants=(form,))

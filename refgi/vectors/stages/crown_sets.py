@@ -30,7 +30,7 @@ def add_mirrored(
     recipe.add(name, "half of the points, shifted, at angles pi (v - 1/2), to the right of the receiver, each followed "
                "by its mirror image to the left; the disc's pairs, the crown's; then the odd point of each, straight "
                "above or below", run, (f"{name}.shift",), specs, paper=CROWN, exact=(f"{name}.shift",),
-               bugs=form.bugs("mirrored_samples", f"mirrored_samples/{density}"), variants=(form.run(),))
+               bugs=form.bugs("mirrored_samples", f"mirrored_samples/{density}"), variants=(form,))
 
 
 def add_every_texel(recipe: Recipe, index: int, radius: float, specs: Mapping[str, Spec]) -> None:
@@ -45,4 +45,4 @@ def add_every_texel(recipe: Recipe, index: int, radius: float, specs: Mapping[st
     recipe.add(name, f"every texel less than {2 * radius:g} texels away" + (f" and {low:g} at least" if low else "")
                + ", row by row: those to the right, nearest first, each followed by its mirror image to the left; then "
                "those straight above and below", run, (), specs, paper=CROWN,
-               bugs=form.bugs("every_texel", *(("every_texel/ring",) if low else ())), variants=(form.run(),))
+               bugs=form.bugs("every_texel", *(("every_texel/ring",) if low else ())), variants=(form,))

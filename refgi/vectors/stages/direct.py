@@ -15,9 +15,9 @@ from refgi.rsm.raster.projection import Projection, camera_projection
 from refgi.scene import DirectionalLight, Scene, SpotLight, material_table
 from refgi.scene.model import Light
 from refgi.vectors.recipe import Recipe
-from refgi.vectors.rows import Form, Read
+from refgi.vectors.rows import Form
 from refgi.vectors.spec import Array, Arrays, Spec
-from refgi.vectors.stages.buffer_forms import falloff_lists, in_float64, view_numbers, view_reads
+from refgi.vectors.stages.buffer_forms import falloff_lists, view_numbers, view_reads
 from refgi.vectors.stages.buffers import (
     SCENE,
     _add_ids,
@@ -86,10 +86,10 @@ def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
     smooth = points[1] == FACING
     form = Form(literal.shadow_map, {
         **_points(points), **view_reads(name), "depth": depths[0], "map_position": depths[1]},
-        (f"shadow{index}.visible",), view_numbers(maps))
+        (f"shadow{index}.visible",), view_numbers(maps), double=True)
     lists = (*(("shadow_map/cube",) if maps.maps > 1 else ()), *(("shadow_map/smooth",) if smooth else ()))
     # faces turned away from the light, which the literal text does not know, are dark where normals are interpolated
-    variants = () if smooth else (in_float64(form.run()),)
+    variants = () if smooth else (form,)
     recipe.add(f"shadow{index}", "the nearest texel's point does not lie above the receiver's own plane", test,
                (*points, *_map_names(name), *depths), {f"shadow{index}.visible": _visible_spec()},
                paper="docs/rasterizer: receiver-plane bias", exact=(*points[:2], *depths),
@@ -109,14 +109,15 @@ def _add_rays(recipe: Recipe, scene: Scene, index: int) -> None:
     key = "direction" if isinstance(light, DirectionalLight) else "place"
     form = Form(literal.shadow_rays, {
         **_points(points), "vertices": "scene.vertices", "faces": "scene.faces",
-        key: f"{lamp}.direction" if key == "direction" else f"{lamp}.position"}, (f"shadow{index}.visible",))
+        key: f"{lamp}.direction" if key == "direction" else f"{lamp}.position"}, (f"shadow{index}.visible",),
+        double=True)
     recipe.add(f"shadow{index}", "no triangle lies between the pixel's point and the light", test,
                (*SCENE, *points, *_light_names(lamp, light)), {f"shadow{index}.visible": _visible_spec()},
                paper="shadow rays", exact=("scene.vertices", *points[:2]),
-               bugs=form.bugs("shadow_rays", f"shadow_rays/{key}"), variants=(in_float64(form.run()),))
+               bugs=form.bugs("shadow_rays", f"shadow_rays/{key}"), variants=(form,))
 
 
-def _points(points: Sequence[str]) -> dict[str, Read]:
+def _points(points: Sequence[str]) -> dict[str, Any]:
     return dict(zip(("position", "normal", "triangle_id"), points, strict=True))
 
 
@@ -141,7 +142,7 @@ def _add_sum(recipe: Recipe, scene: Scene, view: Projection) -> None:
     recipe.add("direct", "direct irradiance of all lights, without albedo/pi", run, (*POINTS, *names, *shadows),
                {"direct.irradiance": Spec("rgb, row, column", "W/m^2", "direct irradiance; 0 without surface",
                                           "linear RGB", "E = I(w) cos / d^2")},
-               paper="HSS Sec. 4; docs/radiometry", exact=(POINTS[0], *positions), variants=(in_float64(form.run()),),
+               paper="HSS Sec. 4; docs/radiometry", exact=(POINTS[0], *positions), variants=(form,),
                bugs=(*form.bugs(*lists), *form.bugs(*falloff_lists(scene.lights), of="light_flux")))
 
 
@@ -154,7 +155,7 @@ def _irradiance_form(lights: Sequence[tuple[str, Light]], shadows: Sequence[str]
     return Form(literal.direct_irradiance, {
         **_points(POINTS), "visible": tuple(shadows), "strength": of_each("intensity", "irradiance"),
         "place": of_each("position"), "direction": of_each("direction"), "half_angles": of_each("half_angles")},
-        ("direct.irradiance",), {"falloff": falloffs})
+        ("direct.irradiance",), {"falloff": falloffs}, double=True)
 
 
 def _visible_spec() -> Spec:

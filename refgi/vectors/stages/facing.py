@@ -32,4 +32,4 @@ def add_facing(recipe: Recipe, scene: Scene) -> None:
                ("gbuffer.normal", "gbuffer.triangle_id", *source),
                {FACING: Spec("xyz, row, column", VECTOR, "plane of what a pixel sees; 0 without surface", "world")},
                paper="A.6 P4: receiver's plane", bugs=form.bugs("facing/smooth" if smooth else "facing/flat"),
-               variants=(form.run(),))
+               variants=(form,))

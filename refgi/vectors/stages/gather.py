@@ -56,7 +56,7 @@ def _add_pattern(recipe: Recipe, points: Array, squared: bool) -> None:
     recipe.add("gather.pattern", "offsets in a disc of radius 1 and their weights", run, ("gather.xi",), {
         OFFSET: Spec("sample, (down, right)", "1", "xi1 (cos, sin)(2 pi xi2), radii"),
         WEIGHT: Spec("sample", "1", weights)}, paper=PAPER,
-        bugs=form.bugs("pattern", "pattern/squared" if squared else "pattern/plain"), variants=(form.run(),))
+        bugs=form.bugs("pattern", "pattern/squared" if squared else "pattern/plain"), variants=(form,))
 
 
 def _add_total(recipe: Recipe, count: int) -> None:
@@ -71,7 +71,7 @@ def _add_total(recipe: Recipe, count: int) -> None:
     form = Form(literal.all_maps, {"irradiance": names}, ("gather.sum",))
     recipe.add("gather.sum", "light of all maps", run, names, {"gather.sum": Spec(
         "rgb, row, column", "W/m^2", "gathered irradiance where every pixel runs the sum", "linear RGB")}, paper=PAPER,
-        bugs=form.bugs("maps") if count > 1 else (), variants=(form.run(),))
+        bugs=form.bugs("maps") if count > 1 else (), variants=(form,))
 
 
 def add_interpolation(recipe: Recipe, settings: Interpolation) -> None:
@@ -101,4 +101,4 @@ def add_interpolation(recipe: Recipe, settings: Interpolation) -> None:
                                                tier="T0"),
                    "gather.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB")},
                paper="RSM 2005, Sec. 4; SII Fig. 12", exact=(RECEIVERS[0],), bugs=form.bugs("interpolate"),
-               variants=(form.run(),))
+               variants=(form,))

@@ -62,7 +62,7 @@ def add_centers(recipe: Recipe, index: int, maps: Projection, decided: bool) -> 
                    depth: Spec("row, column", "m", "depth along the axis of the map it lies on, whose border is part "
                                "of it; inf outside of all and without surface")},
                paper=PAPER, exact=(RECEIVERS[0], *planes) if decided else (), bugs=form.bugs(*lists),
-               variants=(form.run(),))
+               variants=(form,))
 
 
 def add_texels(recipe: Recipe, index: int, maps: Projection, disc: Disc, decided: bool) -> None:
@@ -84,7 +84,7 @@ def add_texels(recipe: Recipe, index: int, maps: Projection, disc: Disc, decided
                (center, OFFSET, RECEIVERS[2]), {texel: Spec(
                    "sample, row, column", "1", "row * columns + column over the stacked maps; -1 outside and without "
                    "surface", tier="T0", index_of=(rows, columns))}, paper=PAPER, exact=(center, OFFSET)
-                   if decided else (), bugs=form.bugs("texels"), variants=(form.run(),))
+                   if decided else (), bugs=form.bugs("texels"), variants=(form,))
 
 
 def add_disc_sum(recipe: Recipe, index: int, disc: Disc, offset: float) -> None:
@@ -116,4 +116,4 @@ def add_disc_sum(recipe: Recipe, index: int, disc: Disc, offset: float) -> None:
                (*RECEIVERS, texel, WEIGHT, *surface), {light: Spec(
                    "rgb, row, column", "W/m^2", "R^2 T / S sum of weight E_t, T texels of one map, S samples, R radius "
                    "in map widths, E_t the light of one texel by Eq. 2; without albedo/pi", "linear RGB")},
-               paper=PAPER, exact=(RECEIVERS[0], surface[0]), bugs=form.bugs("sum"), variants=(form.run(),))
+               paper=PAPER, exact=(RECEIVERS[0], surface[0]), bugs=form.bugs("sum"), variants=(form,))

@@ -73,7 +73,7 @@ def _add_first(recipe: Recipe, view: Projection, first: int) -> None:
                                                     ()), *(("first_level/cut",) if cut else ()))
     recipe.add("level0", f"nearest surface to each texel of {1 << first} x {1 << first} pixels, what it reflects and "
                "the surface that the texel stands for", run, PICTURE, level_specs(0, view), paper=f"{CLOSEST}; {EQ2}",
-               exact=(PICTURE[0],), bugs=(*form.bugs(*lists), *_in_world(form, view)), variants=(form.run(),))
+               exact=(PICTURE[0],), bugs=(*form.bugs(*lists), *_in_world(form, view)), variants=(form,))
 
 
 def _in_world(form: Form, view: Projection) -> tuple[Bug, ...]:
@@ -81,7 +81,7 @@ def _in_world(form: Form, view: Projection) -> tuple[Bug, ...]:
     cause = "positions lie in the world, not relative to the eye: the camera's origin is added"
 
     def run(arrays: Arrays, real: Any) -> dict[str, Array]:
-        made = dict(form.run()(arrays, real))
+        made = dict(form(arrays, real))
         seen = made["level0.pixel"] >= 0
         return {**made, "level0.position": made["level0.position"] + seen * view.origin[0][:, None, None]}
 
@@ -110,7 +110,7 @@ def _add_coarser(recipe: Recipe, view: Projection, first: int, index: int) -> No
     fine = level_names(index - 1, *PLANES)
     recipe.add(f"level{index}", "the nearest of four texels of the finer level, or of the two or one that there are",
                run, fine, level_specs(index, view), paper=f"{CLOSEST}; {EQ2}", exact=(fine[1],),
-               bugs=form.bugs(*lists), variants=(form.run(),))
+               bugs=form.bugs(*lists), variants=(form,))
 
 
 def _named(index: int, level: Level) -> dict[str, Array]:

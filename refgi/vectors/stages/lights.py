@@ -76,7 +76,7 @@ def add_points(
                  *(["halton/shifted later"] if shifted and index else [])]
     recipe.add(f"rsm{index}.points", "Halton points in bases 2 and 3 from index 0" if pattern == "halton" else
                "centres of n x n cells, row by row", points, (shift,) if shifted else (), {name: spec},
-               paper="SII Sec. 3.1", bugs=form.bugs(*lists), variants=(form.run(),))
+               paper="SII Sec. 3.1", bugs=form.bugs(*lists), variants=(form,))
 
 
 def _add_texels(
@@ -107,7 +107,7 @@ def _add_texels(
         texel: Spec("light", "1", "row * columns + column over the stacked maps", tier="T0", index_of=(rows, columns)),
         weight: Spec("light", "1", "T/N times the weight of the warp: how many texels a light stands for"),
     }, paper="SII Sec. 3.1", exact=(points,), bugs=form.bugs("texels", *(["texels/warped"] if own else [])),
-        variants=(form.run(),))
+        variants=(form,))
 
 
 def _add_importance(recipe: Recipe, name: str, maps: int) -> None:
@@ -123,7 +123,7 @@ def _add_importance(recipe: Recipe, name: str, maps: int) -> None:
     recipe.add(f"{name}.importance", "largest channel of a texel's flux, lobe included", largest,
                tuple(reads.values()), {f"{name}.importance": Spec("row, column", "W", "importance of each texel")},
                paper="SII Sec. 3.5", bugs=form.bugs("importance", *(["importance/glossy"] if glossy else []), *(
-                   ["importance/cube"] if maps > 1 else [])), variants=(form.run(),))
+                   ["importance/cube"] if maps > 1 else [])), variants=(form,))
 
 
 def _summed_row_by_row(importance: Array) -> Array:
@@ -150,7 +150,7 @@ def _add_warped(recipe: Recipe, name: str, maps: int, warp: Warp) -> str:
                    weight: Spec("point", "1", "w, 1 / density over the unit square")},
                paper="SII Sec. 3.5, Eq. 5 and 6",
                bugs=form.bugs("warp", f"warp/{warp.method}", *(["warp/cube"] if maps > 1 else [])),
-               variants=(reading(run, **{f"{name}__importance": _summed_row_by_row}), form.run()))
+               variants=(reading(run, **{f"{name}__importance": _summed_row_by_row}), form))
     return warped
 
 
@@ -191,7 +191,7 @@ def _add_chosen(recipe: Recipe, scene: Scene, resolution: int, counts: tuple[int
              *(["lights/warped"] if any(f"rsm{k}.density_weight" in recipe.specs for k in numbers) else []),
              *(["lights/cube"] if any(maps.maps > 1 for _, _, maps in lamps) else [])]
     recipe.add("lights", "texels with flux as pixel lights; those without are dropped", run, tuple(reads), writes,
-               paper="SII Sec. 3.1", bugs=form.bugs(*lists), variants=(form.run(),))
+               paper="SII Sec. 3.1", bugs=form.bugs(*lists), variants=(form,))
 
 
 def pixel_lights_of(arrays: Arrays, real: Any) -> PixelLights:

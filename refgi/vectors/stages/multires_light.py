@@ -42,7 +42,7 @@ def add_points(recipe: Recipe, representative: Representative, top: int) -> None
             POINTS[0]: Spec("xyz, subsplat", "m", "surface point", "world"),
             POINTS[1]: Spec("xyz, subsplat", VECTOR, "its normal", "world")},
         paper="AMS Sec. 3.4; E-AMS-11", exact=RECEIVERS[:2] if representative == "pixel" else (),
-        variants=(form.run(),), bugs=form.bugs("points", f"points/{representative}"))
+        variants=(form,), bugs=form.bugs("points", f"points/{representative}"))
 
 
 def add_irradiance(recipe: Recipe, pairs: PairSettings) -> None:
@@ -62,7 +62,7 @@ def add_irradiance(recipe: Recipe, pairs: PairSettings) -> None:
     recipe.add("multires.irradiance", "irradiance of every pixel light at every subsplat, without albedo/pi",
                run, (*POINTS, *names, *area),
                {LIGHT: Spec("rgb, subsplat", "W/m^2", "indirect irradiance", "linear RGB", EQ2)}, paper=EQ2,
-               exact=(POINTS[0], "lights.position"), variants=(form.run(),), bugs=(*bugs, *own))
+               exact=(POINTS[0], "lights.position"), variants=(form,), bugs=(*bugs, *own))
 
 
 def light_parameters(recipe: Recipe, area: bool) -> dict[str, str]:
@@ -94,5 +94,5 @@ def add_detail(recipe: Recipe, a: float) -> None:
     recipe.facts["multires.detail"] = a
     recipe.add("multires.detail", "E (a <V, N> + 1 - a)", run, ("multires.upsampled.0", *RECEIVERS, "camera.origin"), {
         "multires.detailed": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", "AMS Eq. 3")},
-        paper="AMS Eq. 3", exact=(RECEIVERS[0], "camera.origin"), variants=(form.run(),),
+        paper="AMS Eq. 3", exact=(RECEIVERS[0], "camera.origin"), variants=(form,),
         bugs=form.bugs("detail"))

@@ -23,7 +23,7 @@ from refgi.vectors.spec import Arrays, Spec
 from refgi.vectors.stages.lights import light_names, pixel_lights_of
 from refgi.vectors.stages.multires_light import light_parameters, pair_bugs
 from refgi.vectors.stages.multires_list import SUBSPLATS, subsplats_of
-from refgi.vectors.stages.multires_ranges import IDS, LevelForm, covered_of
+from refgi.vectors.stages.multires_ranges import IDS, covered_of
 from refgi.vectors.stages.multires_upsample import LIGHT, LIST
 from refgi.vectors.stages.pairs import EQ2, RECEIVERS
 
@@ -58,12 +58,12 @@ def _add_representatives(recipe: Recipe, top: int, size: tuple[int, int]) -> Non
     def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 whole numbers
         return dict(zip(names, representatives(covered_of(arrays), top), strict=True))
 
-    form = LevelForm(criteria.representatives, {"triangle_id": IDS}, names, {"top": top})
+    form = Form(criteria.representatives, {"triangle_id": IDS}, names, {"top": top})
     recipe.add("multires.representatives", "the pixel right and below of each cell's centre, moved into the picture; "
                "where it shows no surface the nearest that does, of equally near ones the upper, then the left", run,
                (IDS,), {name: Spec("row, column", "1", "row * columns + column of the picture; -1 without surface",
                                    tier="T0", index_of=index_of) for name in names}, paper="E-AMS-11",
-               variants=(form.run(),), bugs=form.bugs("representatives"))
+               variants=(form,), bugs=form.bugs("representatives"))
 
 
 def _add_samples(recipe: Recipe, pairs: PairSettings, top: int) -> None:
@@ -84,44 +84,44 @@ def _add_samples(recipe: Recipe, pairs: PairSettings, top: int) -> None:
             made[name] = np.where(pixel >= 0, whole[:, :, np.maximum(pixel, 0)], 0)
         return made
 
-    form = LevelForm(literal.samples, {"position": RECEIVERS[0], "normal": RECEIVERS[1],
-                                       **light_parameters(recipe, bool(area))}, names, levels={"pixels": places})
+    form = Form(literal.samples, {"position": RECEIVERS[0], "normal": RECEIVERS[1], "pixels": places,
+                                  **light_parameters(recipe, bool(area))}, names)
     bugs = [one for one in pair_bugs(form, recipe, bool(area)) if not any(word in one.cause for word in SINGLE)]
     recipe.add("multires.samples", "irradiance of each light at the representative of every cell", run,
                (*RECEIVERS, *lights, *area, *places), {name: Spec(
                    "light, rgb, row, column", "W/m^2", "its irradiance; 0 without surface", "linear RGB", EQ2)
-                   for name in names}, paper=EQ2, exact=(RECEIVERS[0], "lights.position"), variants=(form.run(),),
+                   for name in names}, paper=EQ2, exact=(RECEIVERS[0], "lights.position"), variants=(form,),
                bugs=(*bugs, *form.bugs("samples")))
 
 
 def _add_splits(recipe: Recipe, settings: ByIrradiance, top: int) -> None:
     names = _names("split", top, 1)
-    form = LevelForm(literal.splits, {}, names, {"finest": settings.finest, "threshold": settings.threshold,
-                                                 "relative": settings.form == "relative"},
-                     levels={"pixels": _names("representative", top), "sampled": _names("sample", top)})
+    form = Form(literal.splits, {"pixels": _names("representative", top), "sampled": _names("sample", top)}, names,
+                {"finest": settings.finest, "threshold": settings.threshold,
+                 "relative": settings.form == "relative"})
     share = "times the largest channel of all samples of the light at the quadrants' level and above" if \
         settings.form == "relative" else "W/m^2"
     recipe.add("multires.splits", f"cells that a light's list comes to and splits: max - min of a channel over the "
-               f"samples of its quadrants exceeds {settings.threshold:g} {share}", form.run(),
+               f"samples of its quadrants exceeds {settings.threshold:g} {share}", form,
                (*_names("representative", top), *_names("sample", top)), {name: Spec(
                    "light, row, column", "1", "whether the cell is split; false where the list does not come to it",
                    tier="T0") for name in names}, paper=SPLIT,
-               variants=(form.run(),), bugs=form.bugs("splits", f"splits/{settings.form}"))
+               variants=(form,), bugs=form.bugs("splits", f"splits/{settings.form}"))
 
 
 def _add_leaves(recipe: Recipe, top: int) -> None:
     reads = (*_names("representative", top), *_names("sample", top), *_names("split", top, 1))
-    form = LevelForm(literal.lists, {}, (FIRST, *SUBSPLATS[:3], LIGHT), levels={
+    form = Form(literal.lists, {
         "pixels": _names("representative", top), "sampled": _names("sample", top),
-        "split_levels": _names("split", top, 1)})
+        "split_levels": _names("split", top, 1)}, (FIRST, *SUBSPLATS[:3], LIGHT))
     recipe.add("multires.lists", "subsplats of each light: cells with a surface that are not split, but whose coarser "
-               "cell is; with their samples", form.run(), reads, {
+               "cell is; with their samples", form, reads, {
                    FIRST: Spec("light and one more", "1", "where each light's list begins, and the end", tier="T0"),
                    SUBSPLATS[0]: Spec("subsplat", "1", "level: side of 2^level pixels", tier="T0"),
                    SUBSPLATS[1]: Spec("subsplat", "1", "row in the grid of its level", tier="T0"),
                    SUBSPLATS[2]: Spec("subsplat", "1", "column in the grid of its level", tier="T0"),
                    LIGHT: Spec("rgb, subsplat", "W/m^2", "irradiance of its light", "linear RGB", EQ2)},
-               paper="AMS Sec. 3.3.1", variants=(form.run(),), bugs=form.bugs("lists"))
+               paper="AMS Sec. 3.3.1", variants=(form,), bugs=form.bugs("lists"))
 
 
 def _add_picture(recipe: Recipe, settings: ByIrradiance, top: int, filter_all: bool, corner: bool) -> None:
@@ -142,5 +142,5 @@ def _add_picture(recipe: Recipe, settings: ByIrradiance, top: int, filter_all: b
     recipe.add("multires.sum", "each light's subsplats upsampled by themselves, coarsest level first, and added", run,
                (IDS, FIRST, *SUBSPLATS[:3], LIGHT), {name: Spec(
                    "rgb, row, column", "W/m^2", "indirect irradiance; 0 without surface", "linear RGB")},
-               paper="AMS Sec. 3.3.1, 3.5; E-AMS-09", variants=(form.run(),), bugs=form.bugs(
+               paper="AMS Sec. 3.3.1, 3.5; E-AMS-09", variants=(form,), bugs=form.bugs(
                    "sum_of_pictures", f"sum_of_pictures/{'filter all' if filter_all else 'copy'}"))

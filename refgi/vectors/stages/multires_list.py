@@ -11,8 +11,9 @@ from refgi.splat.multires.refinement.mipmap import layout, level_views
 from refgi.splat.multires.refinement.refine import depth_first
 from refgi.splat.multires.settings import Diagonal
 from refgi.vectors.recipe import Recipe
+from refgi.vectors.rows import Form
 from refgi.vectors.spec import Array, Arrays, Spec
-from refgi.vectors.stages.multires_ranges import IDS, LevelForm, covered_of, of_levels
+from refgi.vectors.stages.multires_ranges import IDS, covered_of, of_levels
 
 SUBSPLATS = ("multires.level", "multires.row", "multires.column", "multires.pixel")
 
@@ -32,8 +33,7 @@ def add_states(recipe: Recipe, diagonal: Diagonal, top: int) -> None:
     """Add what becomes of the cells of levels 1 to `top`: empty, fine enough or refined."""
     marks, states = of_levels("discontinuous", top), of_levels("state", top)
 
-    form = LevelForm(literal.states, {"triangle_id": IDS}, states, {"diagonal": diagonal},
-                     levels={"discontinuous": marks})
+    form = Form(literal.states, {"triangle_id": IDS, "discontinuous": marks}, states, {"diagonal": diagonal})
 
     def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 decisions alone
         covered = covered_of(arrays)
@@ -46,7 +46,7 @@ def add_states(recipe: Recipe, diagonal: Diagonal, top: int) -> None:
     recipe.add("multires.states", "which cells are refined, by their own need or across a corner", run, (IDS, *marks), {
         name: Spec("row, column", "1", "0 no surface, 1 a subsplat may end here, 2 refined", tier="T0")
         for name in states},
-        paper="AMS Sec. 3.3, 5.2; E-AMS-10", variants=(form.run(),), bugs=form.bugs("states", *lists))
+        paper="AMS Sec. 3.3, 5.2; E-AMS-10", variants=(form,), bugs=form.bugs("states", *lists))
 
 
 def add_subsplats(recipe: Recipe, top: int) -> None:
@@ -67,12 +67,12 @@ def add_subsplats(recipe: Recipe, top: int) -> None:
     def run(arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG001 decisions alone
         return named(*depth_first(cells(arrays))[:4])
 
-    form = LevelForm(literal.subsplats, {"triangle_id": IDS}, SUBSPLATS,
-                     {"finest": recipe.facts["multires"]["finest_level"]}, levels={"cell_states": states})
+    form = Form(literal.subsplats, {"triangle_id": IDS, "cell_states": states}, SUBSPLATS,
+                {"finest": recipe.facts["multires"]["finest_level"]})
     what = {"level": "cell of 2^level pixels a side", "row": "in the grid of its level", "column": "in the grid of its "
             "level", "pixel": "row * width + column of the pixel right and below of the cell's centre, or of the "
             "nearest that shows a surface, the first of several"}
     recipe.add("multires.subsplats", "the list of subsplats: cells of the coarsest level row by row, in each depth "
                "first, top left, top right, bottom left, bottom right", run, (IDS, *states),
                {f"multires.{key}": Spec("subsplat", "1", one, tier="T0") for key, one in what.items()},
-               paper="AMS Sec. 3.3; E-AMS-08, E-AMS-11", variants=(form.run(),), bugs=form.bugs("subsplats"))
+               paper="AMS Sec. 3.3; E-AMS-08, E-AMS-11", variants=(form,), bugs=form.bugs("subsplats"))

@@ -4,8 +4,7 @@ Level l has cells of 2^l x 2^l pixels, cut at the right and lower border; a pixe
 `multires_list` goes on with the list of subsplats.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
 from typing import Any, get_args
 
 import numpy as np
@@ -29,23 +28,6 @@ from refgi.vectors.spec import Array, Arrays, Spec
 IDS = "gbuffer.triangle_id"
 
 
-@dataclass(frozen=True)
-class LevelForm(Form):
-    """A literal form some of whose parameters are lists of levels, and which returns a list of all that it writes."""
-
-    levels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # parameter: arrays, finest level first
-
-    def by(self, function: Callable[..., Any], arrays: Arrays) -> Arrays:
-        """Return what the stage writes with another function, such as an edited one."""
-        lists = {name: [arrays[one] for one in names] for name, names in self.levels.items()}
-
-        def of_levels(**others: Any) -> Any:
-            made = function(**others, **lists)
-            return made if len(self.writes) > 1 else made[0]
-
-        return super().by(of_levels, arrays)
-
-
 def covered_of(arrays: Arrays) -> Array:
     """Return which pixels show a surface."""
     return np.asarray(arrays[IDS]) >= 0
@@ -61,7 +43,7 @@ def add_ranges(recipe: Recipe, what: str, top: int, rim: int, components: int) -
     source = f"gbuffer.{what}"
     lows, highs = of_levels(f"{what}_least", top), of_levels(f"{what}_largest", top)
     components_of = {} if what == "depth" else {"components": components}
-    form = LevelForm(literal.depth_ranges if what == "depth" else literal.normal_ranges,
+    form = Form(literal.depth_ranges if what == "depth" else literal.normal_ranges,
                      {what: source, "triangle_id": IDS}, (*lows, *highs), {"top": top, "rim": rim, **components_of})
 
     def run(arrays: Arrays, real: Any) -> Arrays:
@@ -77,14 +59,14 @@ def add_ranges(recipe: Recipe, what: str, top: int, rim: int, components: int) -
         **{name: Spec(axes, unit, text.format("least", "inf")) for name in lows},
         **{name: Spec(axes, unit, text.format("largest", "-inf")) for name in highs},
     }, paper="AMS Sec. 3.2.1" if what == "depth" else "AMS Sec. 3.2.2", exact=(source,),
-        variants=(form.run(),), bugs=form.bugs("ranges", f"ranges/{'' if rim else 'no '}rim", f"{what}_ranges",
+        variants=(form,), bugs=form.bugs("ranges", f"ranges/{'' if rim else 'no '}rim", f"{what}_ranges",
                                                *(("ranges/three levels",) if top > 2 else ())))
 
 
 def add_slopes(recipe: Recipe, top: int, relative: bool) -> None:
     """Add the steepest change of depth of levels 1 to `top`."""
     names = of_levels("slope", top)
-    form = LevelForm(literal.slopes, {"depth": "gbuffer.depth", "triangle_id": IDS}, names,
+    form = Form(literal.slopes, {"depth": "gbuffer.depth", "triangle_id": IDS}, names,
                      {"top": top, "relative": relative})
 
     def run(arrays: Arrays, real: Any) -> Arrays:
@@ -95,14 +77,14 @@ def add_slopes(recipe: Recipe, top: int, relative: bool) -> None:
                ("gbuffer.depth", IDS), {
                    name: Spec("row, column", "1/pixel" if relative else "m/pixel", "sqrt(dx^2 + dy^2), the larger of "
                               "both differences along each axis" + ", over the depth" * relative) for name in names},
-               paper="AMS Sec. 3.2.1", exact=("gbuffer.depth",), variants=(form.run(),),
+               paper="AMS Sec. 3.2.1", exact=("gbuffer.depth",), variants=(form,),
                bugs=form.bugs("slopes", f"slopes/{'relative' if relative else 'absolute'}"))
 
 
 def add_curvatures(recipe: Recipe, top: int, rate: bool) -> None:
     """Add the largest chord between neighbouring normals of levels 1 to `top`."""
     names = of_levels("curvature", top)
-    form = LevelForm(literal.curvatures, {
+    form = Form(literal.curvatures, {
         "normal": "gbuffer.normal", "position": "gbuffer.position", "triangle_id": IDS}, names,
         {"top": top, "rate": rate})
 
@@ -114,7 +96,7 @@ def add_curvatures(recipe: Recipe, top: int, rate: bool) -> None:
                ("gbuffer.normal", "gbuffer.position", IDS), {
                    name: Spec("row, column", "1/m" if rate else "1", "largest |N1 - N2|" + " / |x1 - x2|" * rate,
                               paper="AMS Eq. 1; E-AMS-01") for name in names},
-               paper="AMS Eq. 1; E-AMS-01", exact=("gbuffer.normal", "gbuffer.position"), variants=(form.run(),),
+               paper="AMS Eq. 1; E-AMS-01", exact=("gbuffer.normal", "gbuffer.position"), variants=(form,),
                bugs=form.bugs("curvatures", f"curvatures/{'rate' if rate else 'chord'}"))
 
 
@@ -128,8 +110,8 @@ def add_discontinuities(
                                     ("normal", ("normal_least", "normal_largest")), ("curvature", ("curvature",)))
              if getattr(criteria, kind) is not None for key in keys]
 
-    form = LevelForm(literal.discontinuities, {}, names, {"top": top, "finest": finest, **_numbers(criteria)},
-                     levels={key: of_levels(key, top) for key in parts})
+    form = Form(literal.discontinuities, {key: of_levels(key, top) for key in parts}, names,
+                {"top": top, "finest": finest, **_numbers(criteria)})
 
     def marks(arrays: Arrays, real: Any) -> Array:
         found = np.zeros(count, np.bool_)
@@ -152,7 +134,7 @@ def add_discontinuities(
     recipe.add("multires.discontinuities", "cells that a test of their own finds discontinuous", run,
                tuple(name for key in parts for name in of_levels(key, top)),
                {name: Spec("row, column", "1", "true where a test exceeds its threshold", tier="T0") for name in names},
-               paper="AMS Sec. 3.2, 3.3; E-AMS-07", variants=(form.run(),),
+               paper="AMS Sec. 3.2, 3.3; E-AMS-07", variants=(form,),
                bugs=form.bugs("discontinuities", *(f"discontinuities/{one}" for one in _tests(criteria, finest))))
 
 

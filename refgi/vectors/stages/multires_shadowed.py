@@ -77,4 +77,4 @@ def add_halved(recipe: Recipe, covered: Array, source: str) -> None:
     recipe.add("multires.halved", "mean over those of four finer pixels that show a surface; where none does but the "
                "pixel itself, the mean of the pixels around it", run, (source, RECEIVERS[2], shown), {
                    "multires.halved": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB")},
-               paper="AMS Sec. 4", variants=(form.run(),), bugs=form.bugs("halved"))
+               paper="AMS Sec. 4", variants=(form,), bugs=form.bugs("halved"))

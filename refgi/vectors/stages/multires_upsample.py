@@ -70,7 +70,7 @@ def _add_level(recipe: Recipe, mode: Upsampling, level: int, top: int, filter_al
                                "linear RGB"),
                    mask: Spec("row, column", "1", "cells with light: evaluated here or coarser, with surface",
                               tier="T0")},
-               paper="AMS Sec. 3.5; E-AMS-09", variants=(form.run(),),
+               paper="AMS Sec. 3.5; E-AMS-09", variants=(form,),
                bugs=form.bugs("upsample_level", *(f"upsample_level/{one}" for one in lists)))
 
 
@@ -84,6 +84,6 @@ def _add_at_once(recipe: Recipe, mode: Upsampling, top: int) -> None:
                "sum of all levels, each interpolated as if it were black where it holds nothing"}[mode], run,
                (IDS, *SUBSPLATS[:3], LIGHT), {"multires.upsampled.0": Spec(
                    "rgb, row, column", "W/m^2", "indirect irradiance; 0 without surface", "linear RGB")},
-               paper="AMS Sec. 3.5, Fig. 7", variants=(form.run(),),
+               paper="AMS Sec. 3.5, Fig. 7", variants=(form,),
                bugs=form.bugs("upsample", f"upsample/{mode}", *(f"upsample/not {one}" for one in get_args(Upsampling)
                                                                 if one != mode)))

@@ -59,7 +59,7 @@ def add_footprints(recipe: Recipe, maps: int) -> None:
                (*light_names(recipe), "lights.texel", "lights.map", *places, *(
                    f"rsm{k}.{key}" for k in numbers for key in texels)),
                {"lights.area": Spec("light", "m^2", "Omega d^2 / cos of the light's texel, times T/N w")},
-               paper="docs/methods/sii_sum", bugs=form.bugs("footprints"), variants=(form.run(),))
+               paper="docs/methods/sii_sum", bugs=form.bugs("footprints"), variants=(form,))
 
 
 def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
@@ -84,7 +84,7 @@ def add_sum(recipe: Recipe, pairs: PairSettings | None = None) -> None:
     recipe.add("sum", "irradiance of every pixel light at every pixel, without visibility and albedo/pi", run,
                (*RECEIVERS, *names, *area),
                {"sum.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", EQ2)},
-               paper=EQ2, exact=("gbuffer.position", "lights.position"), variants=(form.run(),),
+               paper=EQ2, exact=("gbuffer.position", "lights.position"), variants=(form,),
                bugs=form.bugs(*pair_lists("irradiance", glossy, bool(area), count)))
 
 
@@ -113,7 +113,7 @@ def add_pairs(recipe: Recipe, lights: Arrays, position: Array, normal: Array) ->
         "pairs.irradiance": Spec("rgb, row, pair", "W/m^2", "irradiance; 0 where light and receiver coincide",
                                  "linear RGB", EQ2, alone=True)},
         paper=EQ2, bugs=form.bugs(*pair_lists("pairs", glossy, False, count)),
-        exact=("gbuffer.position", "lights.position"), variants=(form.run(),))
+        exact=("gbuffer.position", "lights.position"), variants=(form,))
 
 
 def _give_lights(recipe: Recipe, lights: Arrays) -> None:

@@ -42,7 +42,7 @@ def add_motion(recipe: Recipe, scene: Scene, before: Scene, view: Projection) ->
                    "motion.normal": Spec("xyz, row, column", VECTOR, "its normal then", "world"),
                    "motion.speed": Spec("row, column", "pixels", "how far it moved as this frame's camera sees it"),
                }, paper="HSS Sec. 4", exact=("scene.vertices", "before.vertices", "gbuffer.position"),
-               bugs=form.bugs("motion"), variants=(form.run(),))
+               bugs=form.bugs("motion"), variants=(form,))
     return "motion.position", "motion.normal"
 
 
@@ -89,7 +89,7 @@ def add_reprojection(
                      "fetch": settings.fetch})
     recipe.add("reprojected", "light of the frame before at this frame's points: the texels around, those that show "
                "the same surface by depth and normal", run, reads, writes, paper=WARP,
-               exact=(points[0], "before.origin", "before.depth"), variants=(form.run(),), bugs=(
-                   Bug("this frame's camera in place of that of the frame before", reading(form.run(), **{
+               exact=(points[0], "before.origin", "before.depth"), variants=(form,), bugs=(
+                   Bug("this frame's camera in place of that of the frame before", reading(form, **{
                        f"before__{key}": lambda a, key=key: np.asarray(now[key], a.dtype) for key in now}), WARP),
                    *form.bugs("reprojection", f"reprojection/{settings.fetch}")))

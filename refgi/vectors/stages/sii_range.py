@@ -88,7 +88,7 @@ def _add_peaks(recipe: Recipe, parts: tuple[str, ...]) -> None:
     recipe.add("range.peaks", "I_0, the peak intensity of each part of each light", run, light_names(recipe), {
         name: Spec("light", "W/sr", f"largest channel of I_0 of the {part} part; 0 without it", paper=PAPER)
         for name, part in zip(names, parts, strict=True)}, paper=PAPER, bugs=form.bugs(*lists_of("peaks", parts)),
-        variants=(form.run(),))
+        variants=(form,))
 
 
 def _strengths(arrays: Arrays, parts: tuple[str, ...]) -> list[Array]:
@@ -117,7 +117,7 @@ def _add_strengths(recipe: Recipe, parts: tuple[str, ...]) -> None:
                    "light, row, column", "W/m^2", f"I(w) / r^2 of the {part} part, without the pixel's cosine; 0 "
                    "without surface", paper=PAPER) for name, part in zip(names, parts, strict=True)},
                paper=PAPER, exact=(RECEIVERS[0], "lights.position"), bugs=form.bugs("strengths"),
-               variants=(form.run(),))
+               variants=(form,))
 
 
 def _add_length(recipe: Recipe, parts: tuple[str, ...], drawn: int) -> None:
@@ -134,7 +134,7 @@ def _add_length(recipe: Recipe, parts: tuple[str, ...], drawn: int) -> None:
                    "pixel, k = 125/768 of all pairs of drawn light and pixel, rounded; at most 10 diagonals of pixels "
                    "and lights; 1 where nothing is lit")},
                paper="SII Fig. 8; E-SII-11", exact=(RECEIVERS[0], "lights.position"), bugs=form.bugs("length"),
-               variants=(form.run(),))
+               variants=(form,))
 
 
 def _add_low(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
@@ -147,4 +147,4 @@ def _add_low(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
     recipe.add("range.low", f"I_low = {share:g} max I_0 / L^2", run,
                (LENGTH, *(f"range.{part}_peak" for part in parts)), {
         LOW: Spec("one", "W/m^2", "irradiance under which pairs are left out; 0 without lights", paper=PAPER)},
-        paper=PAPER, bugs=form.bugs(*lists_of("low", parts)), variants=(form.run(),))
+        paper=PAPER, bugs=form.bugs(*lists_of("low", parts)), variants=(form,))

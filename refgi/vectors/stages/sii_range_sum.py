@@ -40,7 +40,7 @@ def add_ellipsoids(recipe: Recipe) -> None:
     recipe.add("range.ellipsoids", "ellipsoids of revolution around the region in units of R_0: centred where it is "
                "widest, and the least wasteful one through the light", run, ("range.exponent",), {
                    name: Spec("shape", "1", what[name.split("_", 1)[1]] + ", in R_0") for name in names},
-               paper="SII Eq. 7 and 8; E-SII-12, E-SII-13", bugs=form.bugs("ellipsoids"), variants=(form.run(),))
+               paper="SII Eq. 7 and 8; E-SII-12, E-SII-13", bugs=form.bugs("ellipsoids"), variants=(form,))
 
 
 def pairs_of(parts: tuple[str, ...]) -> dict[str, str]:
@@ -79,7 +79,7 @@ def add_squares(recipe: Recipe, parts: tuple[str, ...], share: float) -> None:
                (LOW, LENGTH, *(f"range.{part}_peak" for part in parts)), {
                    name: Spec("light", "m^2", f"square of the largest distance at which the {part} part counts")
                    for name, part in zip(names, parts, strict=True)}, paper=PAPER, bugs=form.bugs("squares"),
-        variants=(form.run(),))
+        variants=(form,))
 
 
 def add_kept(recipe: Recipe, parts: tuple[str, ...]) -> None:
@@ -95,7 +95,7 @@ def add_kept(recipe: Recipe, parts: tuple[str, ...]) -> None:
                 tuple(names))
     recipe.add("range.kept", "pairs that count: B >= I_low", run, (LOW, *sources), {
         name: Spec("light, row, column", "1", f"true where the {part} part counts; never where B is 0", tier="T0")
-        for name, part in zip(names, parts, strict=True)}, paper=PAPER, bugs=form.bugs("kept"), variants=(form.run(),))
+        for name, part in zip(names, parts, strict=True)}, paper=PAPER, bugs=form.bugs("kept"), variants=(form,))
 
 
 def add_sum(recipe: Recipe, parts: tuple[str, ...], pairs: PairSettings) -> None:
@@ -121,4 +121,4 @@ def add_sum(recipe: Recipe, parts: tuple[str, ...], pairs: PairSettings) -> None
     recipe.add("range.sum", "irradiance of the pairs that count", run, (LOW, *kept, *RECEIVERS, *names, *area), {
         LIGHT: Spec("rgb, row, column", "W/m^2", "indirect irradiance without visibility and albedo/pi", "linear RGB")},
         paper=PAPER, exact=(RECEIVERS[0], "lights.position"), bugs=form.bugs(*lists_of("sum", parts)),
-        variants=(form.run(),))
+        variants=(form,))

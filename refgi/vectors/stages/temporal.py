@@ -98,7 +98,7 @@ def _add_entering(
                    "entering.share": Spec("row, column", "1", "exp(-v / entering_speed), v pixels; 0 but for points "
                                           "that entered"),
                }, paper="HSS Sec. 3.3", exact=(position, "before.origin"), bugs=form.bugs("entering"),
-               variants=(form.run(),))
+               variants=(form,))
     return "entering.irradiance"
 
 
@@ -118,7 +118,7 @@ def _add_clamp(recipe: Recipe, settings: TemporalSettings, light: str) -> str:
     recipe.add("clamp", "earlier light within some standard deviations of the mean of the new light in a square", run,
                (light, "new.irradiance", "gbuffer.triangle_id"), {
                    "clamped.irradiance": replace(LIGHT, what="earlier light, clamped")},
-               paper="docs/methods/hssil", bugs=form.bugs("clamp"), variants=(form.run(),))
+               paper="docs/methods/hssil", bugs=form.bugs("clamp"), variants=(form,))
     return "clamped.irradiance"
 
 
@@ -147,4 +147,4 @@ def _add_blend(recipe: Recipe, settings: TemporalSettings, light: str, moved: bo
     kinds = (("counted", counted), ("entering", entered), ("moving", moved))
     recipe.add("temporal", "light of this frame and of those before" + (", at most n / (n + 1) of these" if counted
                                                                         else ""), run, reads, writes, paper=FORM,
-               bugs=form.bugs("blend", *(f"blend/{kind}" for kind, used in kinds if used)), variants=(form.run(),))
+               bugs=form.bugs("blend", *(f"blend/{kind}" for kind, used in kinds if used)), variants=(form,))

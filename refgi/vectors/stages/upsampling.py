@@ -35,7 +35,7 @@ def add_blur(recipe: Recipe, settings: GeometryBlur, index: int, number: int) ->
                "tangent plane that face as it does", run, (light, *planes), {
                    name: Spec("rgb, row, column", "W/m^2", "irradiance by this level, averaged", "linear RGB", BLUR)},
                paper=BLUR, exact=planes, bugs=form.bugs("blur", *(("blur/even",) if settings.size % 2 == 0 else ())),
-               variants=(form.run(),))
+               variants=(form,))
 
 
 def add_light(recipe: Recipe, settings: HssilSettings, index: int, added: str, coarse: str) -> str:
@@ -69,7 +69,7 @@ def add_light(recipe: Recipe, settings: HssilSettings, index: int, added: str, c
     recipe.add(name.split(".")[0], "light of the coarser levels at this level's texels, and this level's own" if adds
                else "light of all levels at the pixels", run, (coarse, *below, *here, *((added,) if adds else ())), {
                    name: Spec("rgb, row, column", "W/m^2", "irradiance; 0 without surface", "linear RGB", BILATERAL)},
-               paper=BILATERAL, exact=(below[0], here[0]), variants=(form.run(),),
+               paper=BILATERAL, exact=(below[0], here[0]), variants=(form,),
                bugs=(*form.bugs(*lists), *(_other_light(recipe, run, coarse, added) if adds else ())))
     return name
 

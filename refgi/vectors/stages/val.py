@@ -88,7 +88,7 @@ def add_lighting(recipe: Recipe, settings: ValSettings) -> None:
     recipe.add("sum", "E = sum V_m E_m over all area lights", run, ("parts.irradiance", "visibility.share"),
                {"sum.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance" + (
                    ", not blurred" if block > 1 else ""), "linear RGB")}, paper="VAL Sec. 4",
-               bugs=form.bugs("shadowed"), variants=(form.run(),))
+               bugs=form.bugs("shadowed"), variants=(form,))
     if block > 1 and settings.blur is not None:
         _add_blur(recipe, settings.blur, block)
 
@@ -106,7 +106,7 @@ def _add_subsets(recipe: Recipe, settings: ValSettings, block: int) -> None:
     recipe.add("interleaving", "which of n^2 subsets each light belongs to", run, ("clusters.of",),
                {"interleaving.subset": Spec("light", "1", "0 to n^2 - 1", tier="T0")},
                paper="VAL Sec. 6, E-VAL-13", bugs=form.bugs("interleaving", f"interleaving/{kind}"),
-               variants=(form.run(),))
+               variants=(form,))
 
 
 def _add_parts(recipe: Recipe, settings: ValSettings, block: int) -> None:
@@ -143,7 +143,7 @@ def _add_parts(recipe: Recipe, settings: ValSettings, block: int) -> None:
         {"parts.irradiance": Spec("area light, rgb, row, column", "W/m^2", "irradiance of the cluster's lights",
                                   "linear RGB", EQ2)},
         paper="VAL Sec. 4, E-VAL-01, E-VAL-13", exact=("gbuffer.position", "lights.position"),
-        bugs=form.bugs("parts", *(("parts/interleaved",) if own else ())), variants=(form.run(),))
+        bugs=form.bugs("parts", *(("parts/interleaved",) if own else ())), variants=(form,))
 
 
 def _receivers(arrays: Arrays, real: Any) -> Receivers:
@@ -169,6 +169,6 @@ def _add_blur(recipe: Recipe, settings: BoxBlur | GeometryBlur, block: int) -> N
          "every subset": settings.every_subset} if isinstance(settings, GeometryBlur) else {})
     recipe.add("blur", "mean over n x n pixels of the same surface, each subset once", run, reads,
                {"blur.irradiance": Spec("rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB")},
-               paper=BLUR, exact=("gbuffer.position", "gbuffer.normal"), variants=(form.run(),),
+               paper=BLUR, exact=("gbuffer.position", "gbuffer.normal"), variants=(form,),
                bugs=form.bugs(*(("blur/geometry", f"blur/every subset {how['every_subset']}") if how else ()), "blur",
                               *(("blur/even",) if block % 2 == 0 else ())))

@@ -43,7 +43,7 @@ def add_areas(recipe: Recipe, settings: AreaLightSettings) -> None:
                    "areas.radius": Spec("cluster", "m", "from the centre to its farthest light"),
                    "areas.members": Spec("cluster", "1", "how many lights it has", tier="T0")},
                paper="VAL Sec. 6, E-VAL-10", exact=(LIGHTS[0], "clusters.center"),
-               bugs=form.bugs("areas", *lists), variants=(form.run(),))
+               bugs=form.bugs("areas", *lists), variants=(form,))
 
 
 def _areas(arrays: Arrays, settings: AreaLightSettings) -> AreaLights:

@@ -53,7 +53,7 @@ def _add_series_depths(recipe: Recipe, csm: Csm) -> None:
     recipe.add("maps.t", "depths of the series: log2(z / origin) slope, 0 to the range" + (
         "; beyond the disc the texel at (s, t) / (s^2 + t^2)" if mirrored else ""), run, ("maps.depth", *SCALE),
         {"maps.t": Spec(SHEET, "1", "depth; the range where nothing is; 0 on empty maps", paper="E-VAL-05")},
-        paper="E-VAL-05", exact=("maps.depth",), bugs=form.bugs("map_depths", *lists), variants=(form.run(),))
+        paper="E-VAL-05", exact=("maps.depth",), bugs=form.bugs("map_depths", *lists), variants=(form,))
 
 
 def _add_level_0(recipe: Recipe, csm: Csm) -> None:
@@ -75,7 +75,7 @@ def _add_level_0(recipe: Recipe, csm: Csm) -> None:
     recipe.add("basis", "sines and cosines of each texel's depth, and the same times the depth" + (
         ", in 8 and 16 bits" if quantised else ""), run, ("maps.t",), {
         "basis.0": Spec(CHANNELS, "1", "S_1.., C_1.., t S_1.., t C_1.., t; 0 on empty maps", paper="E-VAL-02")},
-        paper="VAL Sec. 4.1, E-VAL-02" + (", 6" if quantised else ""), exact=("maps.t",), variants=(form.run(),),
+        paper="VAL Sec. 4.1, E-VAL-02" + (", 6" if quantised else ""), exact=("maps.t",), variants=(form,),
         bugs=form.bugs("basis", *(("basis/bytes",) if quantised else ())))
 
 
@@ -104,7 +104,7 @@ def _add_levels(recipe: Recipe, csm: Csm) -> None:
     recipe.add("mip", "each level halves the one before by means of 2 x 2 texels; of an odd side the last counts twice",
                run, ("basis.0",), {name: Spec(CHANNELS, "1", f"means over {2**level} x {2**level} texels")
                                    for level, name in enumerate(names, 1)},
-               paper="VAL Sec. 6", variants=(form.run(),),
+               paper="VAL Sec. 6", variants=(form,),
                bugs=form.bugs("mip_levels", *(("mip_levels/bytes",) if quantised else ())))
 
 

@@ -45,7 +45,7 @@ def add_extents(recipe: Recipe, maps: int) -> None:
                                                              ("position", "flux")), *lobes),
                {"extents.visible": Spec(box, "m", "box of the pixels' surface points", "world"),
                 "extents.illuminated": Spec(box, "m", "box of the texels with flux, of all lamps", "world")},
-               paper="docs/methods/val", bugs=form.bugs("extents"), variants=(form.run(),))
+               paper="docs/methods/val", bugs=form.bugs("extents"), variants=(form,))
 
 
 def extent_of(arrays: Arrays, *names: str) -> Extent:
@@ -81,7 +81,7 @@ def add_kmeans(recipe: Recipe, settings: Clusters, total: int) -> None:
                 tuple(_clusters()), {**_metric(settings), "rounds": settings.rounds - ROUNDS})
     recipe.add("kmeans", "further rounds until no light changes its cluster", run,
                (*LIGHTS, "extents.illuminated", *last), _clusters(), paper="VAL Sec. 5.1; A.6 P5",
-               exact=(*LIGHTS, *last), bugs=form.bugs("kmeans"), variants=(form.run(),))
+               exact=(*LIGHTS, *last), bugs=form.bugs("kmeans"), variants=(form,))
 
 
 def _add_each(recipe: Recipe) -> None:
@@ -92,7 +92,7 @@ def _add_each(recipe: Recipe) -> None:
 
     form = Form(literal.kmeans_each, READS, tuple(_clusters()))
     recipe.add("kmeans", "as many clusters as lights: each light is one, coincident lights too", run, LIGHTS,
-               _clusters(), paper="VAL Sec. 5.1", bugs=form.bugs("kmeans_each"), variants=(form.run(),))
+               _clusters(), paper="VAL Sec. 5.1", bugs=form.bugs("kmeans_each"), variants=(form,))
 
 
 def _clusters() -> dict[str, Spec]:
@@ -112,7 +112,7 @@ def _add_start(recipe: Recipe, count: int, total: int) -> None:
 
     form = Form(literal.kmeans_start, READS, tuple(_centers(0)), {"count": count})
     recipe.add("kmeans.start", "cluster k begins at light floor(k N / M)", run, LIGHTS, _centers(0),
-               paper="VAL Sec. 5.1; A.6 P5", exact=LIGHTS, bugs=form.bugs("kmeans_start"), variants=(form.run(),))
+               paper="VAL Sec. 5.1; A.6 P5", exact=LIGHTS, bugs=form.bugs("kmeans_start"), variants=(form,))
 
 
 def _centers(number: int) -> dict[str, Spec]:
@@ -138,7 +138,7 @@ def _add_assignment(recipe: Recipe, settings: Clusters, number: int) -> None:
                (*LIGHTS, "extents.illuminated", center, normal),
                {f"kmeans.of{number}": Spec("light", "1", "nearest cluster", tier="T0"),
                 f"kmeans.distance{number}": Spec("light", "1", "its distance", paper=METRIC)},
-               paper=METRIC, exact=(*LIGHTS, center, normal), variants=(form.run(),), bugs=(
+               paper=METRIC, exact=(*LIGHTS, center, normal), variants=(form,), bugs=(
                    *form.bugs(*lists), *(_box_bugs(recipe, form) if settings.distance == "normalised" else ())))
 
 
@@ -149,9 +149,9 @@ def _box_bugs(recipe: Recipe, form: Form) -> tuple[Bug, ...]:
     both = np.stack([np.minimum(visible[0], illuminated[0]), np.maximum(visible[1], illuminated[1])])
     return (
         Bug("the diagonal of the visible box (extent of the camera's pixels), not of the illuminated one",
-            reading(form.run(), extents__illuminated=lambda _: visible), METRIC),
+            reading(form, extents__illuminated=lambda _: visible), METRIC),
         Bug("the diagonal of both boxes together, not of the illuminated one",
-            reading(form.run(), extents__illuminated=lambda _: both), METRIC))
+            reading(form, extents__illuminated=lambda _: both), METRIC))
 
 
 def _add_means(recipe: Recipe, number: int) -> None:
@@ -165,7 +165,7 @@ def _add_means(recipe: Recipe, number: int) -> None:
     form = Form(literal.kmeans_means, {**READS, "of": of, "center": before[0], "axis": before[1]}, after)
     recipe.add(f"kmeans.means{number + 1}", "means of each cluster's lights; without lights a cluster stays", run,
                (*LIGHTS, of, *before), _centers(number + 1), paper="VAL Sec. 5.1; A.6 P5", exact=before,
-               bugs=form.bugs("kmeans_means"), variants=(form.run(),))
+               bugs=form.bugs("kmeans_means"), variants=(form,))
 
 
 def clusters_of(settings: ValSettings) -> Clusters:

@@ -64,7 +64,7 @@ def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
                (*PIXELS, *LIGHT, *SCALE, "series.weight", "series.bias", "search.pending", "search.means"),
                {**penumbra_specs(), "penumbra.t": Spec(PLACE, "1", "depth of the pixel on the series' scale")},
                paper="VAL Sec. 4.1, E-VAL-02, 04, 07", exact=("maps.center",),
-               variants=(form.run(),), bugs=(*form.bugs("penumbra", "region", *exact, of="val_visibility"),
+               variants=(form,), bugs=(*form.bugs("penumbra", "region", *exact, of="val_visibility"),
                                              *form.bugs(*(("csm_penumbra", "shade") if exact else ()))))
     _add_means(recipe, settings, csm, "penumbra", "penumbra.shaded", 2 * csm.terms)
     hard = ("hard.share",) if "hard.share" in recipe.specs else ()
@@ -87,7 +87,7 @@ def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
 
     recipe.add("visibility", "V = gain (1/2 + sum w_k (cos(c_k d') S_k - sin(c_k d') C_k)), where shaded", share,
                ("penumbra.shaded", "penumbra.t", "penumbra.means", "series.weight", "series.bias", *hard),
-               {"visibility.share": share_spec()}, paper="VAL Sec. 4.1, E-VAL-02", variants=(final.run(),),
+               {"visibility.share": share_spec()}, paper="VAL Sec. 4.1, E-VAL-02", variants=(final,),
                bugs=final.bugs("csm", "shade", *(("csm/hard",) if hard else ())))
 
 
@@ -117,7 +117,7 @@ def _add_means(recipe: Recipe, settings: ValSettings, csm: Csm, name: str, flag:
                (flag, f"{name}.region", *levels),
                {f"{name}.means": Spec("area light, channel, row, column", "1",
                                       "means of the channels of basis.0 over the disc; 0 where none is asked for")},
-               paper="VAL Sec. 6", variants=(form.run(),), bugs=form.bugs("means", mean.__name__))
+               paper="VAL Sec. 6", variants=(form,), bugs=form.bugs("means", mean.__name__))
 
 
 def _chain(arrays: Arrays, csm: Csm, real: Any) -> tuple[Array, Series]:

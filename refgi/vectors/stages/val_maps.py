@@ -40,7 +40,7 @@ def add_maps(recipe: Recipe, settings: ValSettings) -> None:
     recipe.add("maps.range", "nearest and farthest distance on each map", run, ("maps.depth",), {
         "maps.near": Spec("area light", "m", "least distance; inf on an empty map"),
         "maps.far": Spec("area light", "m", "greatest finite distance; 0 on an empty map")},
-        paper="E-VAL-05", bugs=form.bugs("map_ranges"), variants=(form.run(),))
+        paper="E-VAL-05", bugs=form.bugs("map_ranges"), variants=(form,))
 
 
 def _add_views(recipe: Recipe, settings: ValSettings) -> None:
@@ -63,7 +63,7 @@ def _add_views(recipe: Recipe, settings: ValSettings) -> None:
                {"maps.center": Spec("area light, xyz", "m", "centre of the map, a little off the surface", "world"),
                 "maps.ball": Spec("area light", "m", "what is nearer to the centre blocks nothing"),
                 "maps.scene_far": Spec("area light", "m", "to the farthest corner of the extents' common box")},
-               paper="VAL Sec. 5.1, E-VAL-12", bugs=form.bugs("map_views"), variants=(form.run(),))
+               paper="VAL Sec. 5.1, E-VAL-12", bugs=form.bugs("map_views"), variants=(form,))
 
 
 def _add_blockers(recipe: Recipe, settings: ValSettings) -> None:
@@ -86,7 +86,7 @@ def _add_blockers(recipe: Recipe, settings: ValSettings) -> None:
     recipe.add("maps.blockers", "triangles with ends of light, seen vertices and pixel lights, on both sides", run,
                ("scene.vertices", "scene.faces", "gbuffer.triangle_id", "lights.position", *EXTENTS),
                {"maps.blocks": Spec("triangle", "1", "whether it may lie between a light and a receiver", tier="T0")},
-               paper="docs/methods/val_visibility", bugs=form.bugs("blockers"), variants=(form.run(),))
+               paper="docs/methods/val_visibility", bugs=form.bugs("blockers"), variants=(form,))
 
 
 def _add_depth(recipe: Recipe, settings: ValSettings, behind: bool = False) -> None:
@@ -111,7 +111,7 @@ def _add_depth(recipe: Recipe, settings: ValSettings, behind: bool = False) -> N
                                    "q = s^2 + t^2; inf without blocker, outside the disc, without lights",
                                    paper="VAL Sec. 4.2, E-VAL-06")},
                paper="VAL Sec. 4.2, E-VAL-06, E-VAL-12", exact=("scene.vertices", *VIEW),
-               bugs=form.bugs("depth_maps", *(() if behind else ("depth_maps/ahead",))), variants=(form.run(),))
+               bugs=form.bugs("depth_maps", *(() if behind else ("depth_maps/ahead",))), variants=(form,))
 
 
 def _geometry(arrays: Arrays) -> Geometry:

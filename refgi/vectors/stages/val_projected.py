@@ -61,4 +61,4 @@ def add_back_projection(recipe: Recipe) -> None:
     recipe.add("visibility", f"V: share of {CELLS} x {CELLS} cells of the rectangle, those above the pixel's plane, "
                "whose centres no texel hides; a texel is a patch at its depth, before the pixel's plane", run,
                (*PIXELS, FACING, "maps.depth", *LIGHT, *AREAS), {"visibility.share": share_spec()}, paper=PAPER,
-               exact=("maps.center",), variants=(form.run(),), bugs=form.bugs("back_projection"))
+               exact=("maps.center",), variants=(form,), bugs=form.bugs("back_projection"))

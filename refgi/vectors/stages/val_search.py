@@ -150,5 +150,5 @@ def add_search(recipe: Recipe, settings: ValSettings) -> None:
                    "search.region": REGION,
                    "search.distance": Spec(PLACE, "m", "d, from the map's centre; 0 where not pending")},
                paper="VAL Sec. 4.2, E-VAL-09; disc: E-VAL-08", exact=("maps.center",),
-               variants=(form.run(),),
+               variants=(form,),
                bugs=form.bugs("search", "region", *(("search/exact", "cone") if by_default(settings) else ())))

@@ -36,7 +36,7 @@ def add_series(recipe: Recipe, csm: Csm) -> None:
         "series.weight": Spec("term", "1", "w_k = 2 / c_k, c_k = (2k - 1) pi", paper="E-VAL-02"),
         "series.bias": Spec("(search, comparison)", "1", "b*, where f_M is 1 for the first time", paper="E-VAL-03"),
         "series.range": Spec("one", "1", "1 - 2 b*, the depth of what is farthest", paper="E-VAL-05")},
-        paper="VAL Sec. 4.1, E-VAL-02, 03, 05", variants=(form.run(),),
+        paper="VAL Sec. 4.1, E-VAL-02, 03, 05", variants=(form,),
         bugs=form.bugs("series", "series/plain" if plain else "series/damped"))
 
 
@@ -60,7 +60,7 @@ def add_scale(recipe: Recipe, csm: Csm) -> None:
                ("maps.near", "maps.far", "maps.scene_far", "series.range"),
                {"scale.origin": Spec("area light", "m", "distance of depth 0; 0 for empty maps"),
                 "scale.slope": Spec("area light", unit, "depths per octave of distance or per metre; 0 on empty maps")},
-               paper="E-VAL-05", bugs=form.bugs("depth_scale", f"depth_scale/{kind}", *others), variants=(form.run(),))
+               paper="E-VAL-05", bugs=form.bugs("depth_scale", f"depth_scale/{kind}", *others), variants=(form,))
 
 
 def scale_at(arrays: Arrays, csm: Csm, k: int) -> DepthScale:

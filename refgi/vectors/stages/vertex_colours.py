@@ -38,7 +38,7 @@ class Tinted:
 
     def variant(self) -> Run:
         """Return the stage with the literal colours in place of refgi's."""
-        return self._times(self._form.run())
+        return self._times(self._form)
 
     def bugs(self) -> tuple[Bug, ...]:
         """Return likely bugs of the colours; those of the rest are told by cases without any."""
@@ -50,7 +50,7 @@ class Tinted:
         """Return the bug of colours that multiply an array of lobes too."""
         def altered(arrays: Arrays, real: object) -> Arrays:
             made = dict(self._run(arrays, real))
-            return made | {lobe: made[lobe] * self._form.run()(arrays, real)[self._target]}
+            return made | {lobe: made[lobe] * self._form(arrays, real)[self._target]}
 
         return Bug("vertex colours multiply the specular part too", altered, "a factor of the diffuse part alone")
 

@@ -68,7 +68,7 @@ def _add_facing(recipe: Recipe, scene: Scene) -> None:
     recipe.add("vpl.facing", "normal of the triangle that each pixel sees", run, (*GEOMETRY, *RECEIVERS), {FACING: Spec(
         "xyz, row, column", VECTOR, "the face's normal, on the side of the pixel's normal; 0 without surface",
         "world")},
-        paper="docs/conventions", exact=(GEOMETRY[0],), bugs=form.bugs("facing"), variants=(form.run(),))
+        paper="docs/conventions", exact=(GEOMETRY[0],), bugs=form.bugs("facing"), variants=(form,))
 
 
 def _geometry(arrays: Arrays, scene: Scene) -> Geometry:
@@ -127,7 +127,7 @@ def _add_visible(recipe: Recipe, scene: Scene) -> None:
                (*GEOMETRY, *RECEIVERS, FACING, *LIGHTS), {VISIBLE: Spec(
                    "light, row, column", "1", "true where the normals of light and pixel and the pixel's face look at "
                    "the other, whatever the lobe, and nothing lies "
-                   "between", tier="T0")}, paper="SII Eq. 2 with V", bugs=form.bugs("visible"), variants=(form.run(),))
+                   "between", tier="T0")}, paper="SII Eq. 2 with V", bugs=form.bugs("visible"), variants=(form,))
 
 
 def _add_looked_up(recipe: Recipe, scene: Scene, settings: Imperfect, maps: str) -> None:
@@ -146,7 +146,7 @@ def _add_looked_up(recipe: Recipe, scene: Scene, settings: Imperfect, maps: str)
                    "light, row, column", "1", "true where the normals of light and pixel and the pixel's face look at "
                    "the other and the texel does not hide the pixel", tier="T0")},
                paper="Ritschel et al. 2008, Sec. 3", exact=(maps,), bugs=form.bugs("looked up"),
-               variants=(form.run(),))
+               variants=(form,))
 
 
 def _add_sum(recipe: Recipe) -> None:
@@ -175,4 +175,4 @@ def _add_sum(recipe: Recipe) -> None:
     recipe.add("vpl.sum", "irradiance of the visible pixel lights at every pixel, without albedo/pi", run,
                (*RECEIVERS, VISIBLE, *names), {LIGHT: Spec(
                    "rgb, row, column", "W/m^2", "indirect irradiance", "linear RGB", EQ2)}, paper=EQ2,
-               exact=(RECEIVERS[0], "lights.position"), bugs=(*bugs, *form.bugs("sum")), variants=(form.run(),))
+               exact=(RECEIVERS[0], "lights.position"), bugs=(*bugs, *form.bugs("sum")), variants=(form,))

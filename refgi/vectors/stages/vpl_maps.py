@@ -73,7 +73,7 @@ def _add_points(recipe: Recipe, scene: Scene, points: int) -> None:
                    POINTS[0]: Spec("light, point, xyz", "m", "the points", "world"),
                    POINTS[1]: Spec("light, point", "1", "the triangle that each lies on", tier="T0"),
                    POINTS[2]: Spec("number", "m", "r of a point's disc, pi r^2 = A / n", paper="docs/methods/vpl")},
-               paper=PAPER, exact=("vpl.shift",), bugs=form.bugs("points"), variants=(form.run(),))
+               paper=PAPER, exact=("vpl.shift",), bugs=form.bugs("points"), variants=(form,))
 
 
 @kernel
@@ -100,7 +100,7 @@ def _add_frames(recipe: Recipe) -> None:
     recipe.add("vpl.frames", "axes of each light's map: with n its normal and e the sign of n_z, a = -1 / (e + n_z), "
                "right (1 + e n_x^2 a, e n_x n_y a, -e n_x), down (n_x n_y a, e + n_y^2 a, -n_y), forward n", run,
                (LIGHTS[1],), {FRAME: Spec("light, (right, down, forward), xyz", VECTOR, "axes of s, t and z", "world")},
-               paper="Duff et al. 2017", exact=(LIGHTS[1],), bugs=form.bugs("frames"), variants=(form.run(),))
+               paper="Duff et al. 2017", exact=(LIGHTS[1],), bugs=form.bugs("frames"), variants=(form,))
 
 
 def _add_depth(recipe: Recipe, scene: Scene, settings: Imperfect) -> None:
@@ -124,7 +124,7 @@ def _add_depth(recipe: Recipe, scene: Scene, settings: Imperfect) -> None:
                "its width in discs; points nearer than r or beside the light's plane are left out", run,
                (*GEOMETRY, *POINTS, LIGHTS[0], FRAME), {"vpl.depth": Spec(
                    MAP, "m", "rows along t, columns along s; inf where no box covers a texel's centre")},
-               paper=PAPER, exact=(GEOMETRY[0],), bugs=form.bugs("depth"), variants=(form.run(),))
+               paper=PAPER, exact=(GEOMETRY[0],), bugs=form.bugs("depth"), variants=(form,))
 
 
 @kernel
@@ -150,5 +150,5 @@ def _add_filled(recipe: Recipe, levels: int) -> str:
     recipe.add("vpl.filled", "pull: the mean of those of four texels that are no farther than 1.1 times the nearest; "
                "push: holes take from the coarser level, bilinearly, what is no farther than 1.1 times the nearest of "
                "the four", run, ("vpl.depth",), {"vpl.filled": Spec(MAP, "m", "maps whose holes are filled")},
-               paper=PAPER, bugs=form.bugs("filled"), variants=(form.run(),))
+               paper=PAPER, bugs=form.bugs("filled"), variants=(form,))
     return "vpl.filled"

@@ -30,8 +30,7 @@ from refgi.vectors.spec import kind_of
 ROOT = Path(__file__).parents[1]
 BUGS = Path(__file__).with_name("kit_bugs")
 PORTS = ROOT / "examples" / "ports"
-SOURCES = {"c": PORTS / "c", "c_fresh": PORTS / "c", "c_blind": PORTS / "c", "glsl": PORTS / "glsl",
-           "naive": ROOT / "tests"}
+SOURCES = {"c": PORTS / "c", "c_fresh": PORTS / "c", "c_blind": PORTS / "c", "glsl": PORTS / "glsl"}
 LONGEST = 300.0  # s for one run of a port
 AIMS = {"found": 1.0, "named": 0.8}
 
@@ -57,7 +56,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--every", type=int, default=1, help="score each so many-th bug alone")
     parser.add_argument("--first", type=int, default=0, help="and begin with that one")
     parser.add_argument("--search", type=float, default=0.0, metavar="SECONDS",
-                        help="search refgi's source for the change where fewer than three causes are known")
+                        help="search the literal text for the change where fewer than three causes are known")
     parser.add_argument("--bugs", type=lambda text: {int(one) for one in text.split(",")}, help="score these alone")
     options = parser.parse_args(arguments)
     console, scores = Console(), []
@@ -151,9 +150,8 @@ def _run(port: str, source: Path, out: Path, cases: Iterable[str] = ()) -> str:
     kit = str(kit_folder())
     out.mkdir(exist_ok=True)
     in_c = [str(source / "port"), kit, str(out), *cases]
-    commands = {"glsl": [sys.executable, str(source / "run.py"), kit, str(out), *cases],
-                "naive": [sys.executable, "-m", "tests.vectors.naive_run", kit, str(out), *cases]}
-    return _said(commands.get(port, in_c), source.parent if port == "naive" else source)
+    in_glsl = [sys.executable, str(source / "run.py"), kit, str(out), *cases]
+    return _said(in_glsl if port == "glsl" else in_c, source)
 
 
 def _said(command: list[str], folder: Path) -> str:

@@ -110,11 +110,6 @@ LONG = {
     ),
     "tests/test_cutouts.py": ("test_flux_behind_a_plate_that_is_half_hole[float64]",),
     "tests/test_draws.py": ("test_neighbouring_seeds_streams_and_parts_are_independent",),
-    "tests/vectors/test_hssil_stages.py": ("test_twins_are_a_port[hssil-radiance]",),
-    "tests/vectors/test_naive_port.py": (
-        "test_the_twins_pass[sii-three-lamps-True]",
-        "test_the_twins_pass[sii-warp-a-True]",
-    ),
     "tests/vectors/test_port_c.py": ("test_the_buffers_of_every_method_are_within",),
     "tests/vectors/test_truth_stages.py": (
         "test_a_sum_over_the_light_s_cone_agrees",

@@ -13,7 +13,6 @@ from refgi.sssil.hssil import hssil
 from refgi.vectors.bounds import distance, isolated_bounds, large_value
 from refgi.vectors.cases import hssil as cases
 from refgi.vectors.spec import expected_of
-from tests.vectors import screen_space_port as port
 
 CASES = {**cases.QUICK, **cases.FULL}
 CHAIN = 2e-5  # of the large values: some 20 stages, each rounded to float32 (6e-8) and some divided by small numbers
@@ -21,7 +20,6 @@ FLIPPED = 0.005  # share of values that rounding decides otherwise in the chain:
 MASKED = 0.05  # share of an array that rounding may decide
 LOOSE = 1e-4  # of the large values: most bounds beyond this would hide bugs
 AMPLIFIED = 0.005  # share of bounds beyond: means over texels that weigh next to nothing
-UNCOVERED = {"gbuffer.ids", "gbuffer.surface", "before.ids", "before.surface", "rsm.ids", "rsm.surface"}
 LITERAL = {"level", "points of samples", "shifts of samples", "samples", "gather", "blur", "light", "picture", "motion",
            "reprojected", "entering", "clamp", "temporal"}
 NO_LEVEL = re.compile(r"\d")
@@ -86,21 +84,6 @@ def test_samples_are_those_of_the_method(name):
             offsets, weight = shared_offsets(sampling, index, number, rows, radius)
         np.testing.assert_array_equal(known[f"samples{index}.offsets"], offsets)
         np.testing.assert_allclose(known[f"samples{index}.weight"], weight, atol=1e-6 * weight.max())
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_twins_are_a_port(name):
-    """Stages of ids and surfaces have twins of their own (tests/rsm); all others are covered."""
-    case, known, bounds = made(name)
-    for step in case.stages:
-        read = {key: known[key].astype(float) if known[key].dtype.kind == "f" else known[key] for key in step.reads}
-        written = port.outputs(case, step, read)
-        if written is None:
-            assert NO_LEVEL.sub("", step.name) in UNCOVERED
-            continue
-        for key in step.writes:
-            wrong = outside(written[key], known[key], bounds[key])
-            assert not wrong.any(), f"{step.name}, {key}: {int(wrong.sum())} of {wrong.size}"
 
 
 @pytest.mark.parametrize("name", CASES)

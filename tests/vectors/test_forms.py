@@ -1,0 +1,46 @@
+"""The literal text passes the kit as a port would, stage by stage on the kit's inputs and chained on its own outputs."""
+
+import numpy as np
+import pytest
+
+from refgi.vectors.cases import kit_cases
+from refgi.vectors.check import ALL_WITHIN, Asked, check_output
+from refgi.vectors.spec import kind_of, stored
+from tests.vectors.literal_port import form_of, written
+
+QUICK = tuple(kit_cases("quick"))
+# what passes are made of; normals of faces between interpolated ones; what Embree answers
+WITHOUT_FORM = {"truth", "shadow", "vpl.visible", "maps.depth"}
+
+
+@pytest.mark.parametrize("chained", [False, True], ids=["isolated", "chained"])
+@pytest.mark.parametrize("name", QUICK)
+def test_the_literal_text_passes(kit, tmp_path, evidence, name, chained):
+    case = next(one for one in kit.cases(Asked(cases=(name,))) if one.id == name)
+    own, bare, covered = {}, set(), 0
+    (tmp_path / name).mkdir()
+    for step in kit_cases("quick")[name]().stages:
+        arrays = {one: own[one] if chained and one in own else kit.array(case, one) for one in step.reads}
+        made = written(step, arrays)
+        if made is None:
+            bare.add(kind_of(step.name))
+            continue
+        covered += 1
+        for one, array in made.items():
+            own[one] = stored(array)
+            np.save(tmp_path / name / f"{one}.npy", own[one])
+    result = check_output(kit, tmp_path, Asked(chained=chained, cases=(name,)))
+    wrong = [(one.stage, [array for array in one.arrays if array.verdict != "within"], one.causes)
+             for one in result.stages if one.verdict in ("out", "invalid")]
+    assert not wrong
+    assert bare <= WITHOUT_FORM
+    if covered:
+        assert result.exit_code == ALL_WITHIN
+    worst = max((array.worst or 0.0 for one in result.stages for array in one.arrays), default=0.0)
+    evidence(f"{name}, {'chained' if chained else 'isolated'}: {covered} stages within, worst {worst:.2g} bounds")
+
+
+def test_every_kind_of_stage_has_a_form_but_those_named():
+    steps = [step for make in kit_cases("quick").values() for step in make().stages]
+    with_form = {kind_of(step.name) for step in steps if form_of(step) is not None}
+    assert {kind_of(step.name) for step in steps} - with_form <= WITHOUT_FORM

@@ -1,4 +1,4 @@
-"""The literal text passes the kit as a port would, stage by stage on the kit's inputs and chained on its own outputs."""
+"""The literal text passes the kit as a port, stage by stage on the kit's inputs and chained on its own outputs."""
 
 import numpy as np
 import pytest

@@ -152,10 +152,11 @@ def disc_form_factor(x: Any, n: Any, y: Any, m: Any, ds: Any) -> Any:
 def point_form_factor(x: Any, n: Any, y: Any, m: Any, ds: Any) -> Any:
     """Return what L of samples is multiplied by to be E where each is a point (HSS Eq. 3)."""
     d = y - x
-    square = (d**2).sum(axis=0)
-    cos_i, cos_j = np.maximum(0, (n * d).sum(axis=0)), np.maximum(0, -(m * d).sum(axis=0))
+    square = np.maximum((d**2).sum(axis=0), LEAST)
+    r = np.sqrt(square)
+    cos_i, cos_j = np.maximum(0, (n * d).sum(axis=0) / r), np.maximum(0, -(m * d).sum(axis=0) / r)
     # Eq. (3)
-    return cos_i * cos_j * ds / np.maximum(square, LEAST) ** 2
+    return cos_i * cos_j * ds / square
 
 
 def shared_disc_form_factor(x: Any, n: Any, y: Any, m: Any, area: Any, texels: Any, share: float) -> Any:

@@ -108,11 +108,11 @@ def level_of_means(place: Any, depth: Any, normal: Any, radiance: Any, area: Any
     weight = np.where(ds.any(axis=-1)[..., None], ds, there & near)  # where none has an area the closest alone
     void, total = ~there.any(axis=-1), weight.sum(axis=-1)
     up, light = parts(normal, side), parts(radiance, side)
-    all_of = np.where(void, 1, total)
-    mean_place = (weight * x).sum(axis=-1) / all_of
-    mean_depth = (weight * z).sum(axis=-1) / all_of
-    mean_normal = (weight * up).sum(axis=-1) / all_of
-    mean_radiance = (weight * light).sum(axis=-1) / all_of
+    divisor = np.where(void, 1, total)
+    mean_place = (weight * x).sum(axis=-1) / divisor
+    mean_depth = (weight * z).sum(axis=-1) / divisor
+    mean_normal = (weight * up).sum(axis=-1) / divisor
+    mean_radiance = (weight * light).sum(axis=-1) / divisor
     length = np.sqrt((mean_normal**2).sum(axis=0))
     unit = mean_normal / np.where(length > 0, length, 1)
     return with_void(void, mean_place, mean_depth, unit, mean_radiance, ds.sum(axis=-1), 0)[:5]

@@ -101,3 +101,53 @@ def test_two_texels_light_each_other_by_hand():
     found = literal.gather(position, normal, radiance, np.full((1, 2), 0.25), offsets, np.full((1, 1, 4), 2.0))
     disc = 0.5 / math.pi
     np.testing.assert_allclose(found[0, 0], np.array([5.0, 3.0]) * math.pi * disc / (4 + disc))
+
+
+def test_what_faces_away_gives_nothing():
+    x, n, y = np.zeros((3, 1)), np.array([[0.0], [0], [1]]), np.array([[0.0], [0], [2.0]])
+    for up, other in ((n, n), (-n, -n), (-n, n)):
+        for form in (literal.disc_form_factor, literal.point_form_factor):
+            assert form(x, up, y, other, np.ones(1))[0] == 0
+
+
+def test_a_sample_by_hand():
+    """u = 1/4 + 1/2, a turn of 1/4 + 1/12: 120 degrees from the right, downwards; E-HSS-06: 3 pi r^2 texels or less."""
+    points, shifts = np.array([[0.25, 0.0, 1.0]]), np.array([[[0.5, 1 / 12]]])
+    far = 4 * math.sqrt(1 + 3 * 0.75)
+    expected = [math.floor(far * math.cos(2 * math.pi / 3) + 0.5), math.floor(far * math.sin(2 * math.pi / 3) + 0.5)]
+    offsets, weight = literal.crown_samples(points, shifts, 0, 4.0, "uniform")
+    assert offsets[0, 0, 0].tolist() == expected == [-4, 6]
+    assert weight[0, 0, 0] == pytest.approx(48 * math.pi)
+    offsets, weight = literal.crown_samples(points, shifts, 0, 4.0, "inverse_distance")
+    assert offsets[0, 0, 0].tolist() == [-3, 6]  # 7 texels away
+    assert weight[0, 0, 0] == pytest.approx(56 * math.pi)
+    offsets, weight = literal.crown_samples(points, shifts, 1, 4.0, "inverse_distance")
+    assert offsets[0, 0, 0].tolist() == [-1, 3]  # 3 texels away
+    assert weight[0, 0, 0] == pytest.approx(24 * math.pi)
+
+
+def test_points_and_shifts_by_hand():
+    """Texel (1, 2) of 2 x 3 is the sixth: 5 crowns of 4 points further on."""
+    points, shifts = literal.points_and_shifts((0.1, 0.2), 2, 4, 2, 3)
+    g = 1.324717957244746
+    turn = 2 * math.pi * (0.5 + 3 / g**2)
+    np.testing.assert_allclose(points[5], [(0.5 + 3 / g) % 1, math.cos(turn), math.sin(turn)])
+    np.testing.assert_allclose(shifts[1, 2], [(0.1 + 20 / g) % 1, (0.2 + 20 / g**2) % 1])
+    np.testing.assert_allclose(shifts[0, 0], [0.1, 0.2])
+
+
+def test_sets_in_their_order_by_hand():
+    pairs = [(1, -1), (-1, -1), (1, 0), (-1, 0), (1, 1), (-1, 1)]
+    assert list(map(tuple, literal.every_texel(0.0, 2.0)[0][0, 0].tolist())) == [*pairs, (0, -1), (0, 1)]
+    # u = 0.6, v = 0.7: 8.37 texels away at 36 degrees; then u = 0.355, v = 0.27, straight above
+    offsets, weight = literal.mirrored_samples((0.1, 0.2), 0, 3, 5.0, "uniform")
+    assert offsets[0, 0].tolist() == [[7, 5], [-7, 5], [0, -7]]
+    np.testing.assert_allclose(weight, 25 * math.pi)
+
+
+def test_receivers_read_the_samples_of_their_place_in_the_tile():
+    """A tile of 2 x 2 texels that look right, left, down and up on 3 x 3: nothing wraps round."""
+    offsets = np.array([[[[1, 0]], [[-1, 0]]], [[[0, 1]], [[0, -1]]]])
+    i, j, texels = literal.samples_at((3, 3), offsets, np.arange(1.0, 5).reshape(2, 2, 1))
+    assert texels[..., 0].tolist() == [[1, 2, 0], [3, 4, 3], [1, 2, 0]]
+    assert (i[0, 0, 0], j[0, 0, 0], i[1, 0, 0], j[1, 0, 0]) == (0, 1, 2, 0)

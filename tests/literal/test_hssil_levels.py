@@ -107,3 +107,30 @@ def test_drawn_senders_keep_flux_and_stand_in_its_middle_on_average():
         np.testing.assert_allclose(drawn[4] * drawn[3][:, 0, 0].sum(), flux.sum())
         mean += drawn[0][:, 0, 0] / 4000
     np.testing.assert_allclose(mean, (flux * pixels[0]).sum(axis=(1, 2)) / flux.sum(), rtol=2e-3)
+
+
+def test_the_closest_of_the_closest_is_the_closest_of_all():
+    """Property: with all it has, and the area of all pixels below it, over odd sizes and ties."""
+    rng = np.random.default_rng(4)
+    depth = np.where(rng.random((11, 13)) < 0.3, np.inf, np.round(rng.uniform(1, 3, (11, 13)) * 4) / 4)
+    normal = rng.normal(size=(3, 11, 13)) * 0.2 + np.array([0.0, 0, 1])[:, None, None]
+    picture = depth, normal / np.sqrt((normal**2).sum(axis=0)), *rng.random((2, 3, 11, 13))
+    level = literal.first_level(*picture, FRAME, np.ones(2), 1)
+    for number in (2, 3, 4):
+        level = literal.coarser_level(*level, number, (11, 13))
+        for one, other in zip(level, literal.first_level(*picture, FRAME, np.ones(2), number), strict=True):
+            np.testing.assert_allclose(one, other)
+
+
+def test_a_mean_by_hand():
+    """Areas 1 and 3; normals 60 degrees apart, whose mean is made a unit vector again; a hole beside them."""
+    s = math.sqrt(0.75)
+    planes_ = (np.array([[[0.0, 4, 0]]] * 3), np.array([[2.0, 6, np.inf]]), np.array([[[0, s, 0]], [[0.0, 0, 0]],
+               [[1, 0.5, 0]]]), np.array([[[8.0, 4, 0]]] * 3), np.array([[1.0, 3, 0]]))
+    place, depth, normal, radiance, area = literal.level_of_means(*planes_, 2)
+    assert area.tolist() == [[4.0, 0.0]]
+    assert depth.tolist() == [[5.0, np.inf]]
+    np.testing.assert_allclose(place[0], [[3.0, 0.0]])
+    np.testing.assert_allclose(radiance[0], [[5.0, 0.0]])
+    mean = np.array([3 * s, 0, 2.5])
+    np.testing.assert_allclose(normal[:, 0, 0], mean / np.linalg.norm(mean))

@@ -142,3 +142,35 @@ def test_shares_fall_with_speed():
     share = literal.blend(np.ones((3, 1, 2)), np.zeros((3, 1, 2)), seen, 0.8, 4.0, None, np.array([[0.0, 0.5]]),
                           np.array([[4.0, 0.0]]))[1]
     np.testing.assert_allclose(share, [[0.8 / math.e, 0.4]])
+
+
+def test_nothing_found_is_nothing_and_counts_anew():
+    position, normal, depth = wall((2.0, 0.0))
+    frames = np.full(SHAPE, 3.0)
+    light, weight, n = literal.reprojection(position, normal, np.zeros(SHAPE, int), *CAMERA, depth, normal,
+                                            ramp() + 1, *TESTS, frames)
+    assert (weight > 0).any()
+    assert not light[:, weight == 0].any()
+    np.testing.assert_array_equal(n, 3 * (weight > 0))
+    made, share, counted = literal.blend(np.full((3, *SHAPE), 7.0), light, weight, 0.9, 10.0, n)
+    np.testing.assert_array_equal(counted, np.where(weight > 0, 4, 1))
+    np.testing.assert_allclose(share, np.where(weight > 0, 0.75, 0))
+    assert (made[:, weight == 0] == 7).all()
+
+
+def test_the_eye_of_the_frame_before_counts():
+    """Property: eye and points moved together see the same."""
+    position, normal, depth = wall((0.5, 0.25))
+    away = np.array([3.0, -2, 5])
+    camera = CAMERA[0] + away, *CAMERA[1:]
+    found = literal.reprojection(position + away[:, None, None], normal, np.zeros(SHAPE, int), *camera, depth, normal,
+                                 ramp(), *TESTS)
+    np.testing.assert_allclose(found[0], shown((0.5, 0.25))[0])
+
+
+def test_a_square_ends_at_its_radius():
+    """A bright pixel two columns away is no part of a square of radius 1, and of one of radius 2."""
+    new = np.zeros((3, 1, 5))
+    new[:, 0, 4] = 1
+    found = [literal.clamp(np.ones((3, 1, 5)), new, np.zeros((1, 5), int), 1.0, radius)[0, 0, 2] for radius in (1, 2)]
+    np.testing.assert_allclose(found, [0.0, 0.2 + 0.4])  # mean 1/5, deviation 2/5

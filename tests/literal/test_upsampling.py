@@ -103,3 +103,42 @@ def test_blocks_of_two_keep_a_ramp_on_a_wall():
     found = literal.joint_bilateral(position, normal, covered, ramp)
     assert not found[:, 0, 0].any()
     np.testing.assert_array_equal(found[:, 0, 1], ramp[:, 0, 1])  # the first with a surface of its block
+
+
+def test_weights_by_hand():
+    """Two texels, one 1 % farther away and turned by a cosine of 0.9; a pixel a quarter texel beside the other."""
+    depth, normal = np.full((2, 4), 2.0), np.array([0.0, 0, 1])[:, None, None] * np.ones((3, 2, 4))
+    below, turned = np.array([[2.0, 2.02]]), normal[:, :1, :2].copy()
+    turned[:, 0, 1] = np.sqrt(0.19), 0, 0.9
+    found = literal.upsample(np.array([[[1.0, 5.0]]] * 3), below, turned, depth, normal, 2, 0.02, 8.0, False)
+    delta = 1 - 2 / 2.02
+    other = (1 + 4 * 0.25) / 6 * (1 - delta**2 / (32 * 0.02**2)) ** 16 * 0.9**8
+    own = (2 - 0.25) / 3
+    assert found[0, 0, 1] == pytest.approx((own + 5 * other) / (own + other))
+    assert 0.8 < (1 - delta**2 / (32 * 0.02**2)) ** 16 < np.exp(-(delta**2) / (2 * 0.02**2)) + 1e-3
+
+
+def test_a_pixel_that_no_texel_is_like_takes_the_nearest_in_depth():
+    depth, normal = np.full((2, 4), 2.0), np.array([0.0, 0, 1])[:, None, None] * np.ones((3, 2, 4))
+    found = literal.upsample(np.array([[[1.0, 5.0]]] * 3), np.array([[9.0, 4.0]]), normal[:, :1, :2], depth, normal, 2,
+                             0.02, 8.0, True)
+    np.testing.assert_array_equal(found, 5.0)
+
+
+@pytest.mark.parametrize(("size", "window"), [(3, [0, 1, 1, 1, 0]), (4, [0.5, 1, 1, 1, 0.5])])
+def test_a_window_by_hand(size, window):
+    """One bright texel of a wall spreads over a box about it, along both axes."""
+    light = np.zeros((3, 11, 11))
+    light[:, 5, 5] = 1
+    found = literal.blur(light, *wall((11, 11)), size, 0.01, 0.9)
+    spread = np.pad(window, 3) / size
+    np.testing.assert_allclose(found, [np.outer(spread, spread)] * 3)
+
+
+@pytest.mark.parametrize(("height", "mixes"), [(0.029, True), (0.031, False), (-0.031, False)])
+def test_a_blur_allows_a_share_of_the_depth(height, mixes):
+    """1 % of 3 m."""
+    position, normal, depth = wall((5, 8))
+    position[2] += height * (np.arange(8) >= 4)
+    light = (np.arange(8) >= 4) * np.ones((3, 5, 1))
+    assert (literal.blur(light, position, normal, depth, 3, 0.01, 0.9) != light).any() == mixes

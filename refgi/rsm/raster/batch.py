@@ -24,6 +24,7 @@ from refgi.scene.texture.alpha import is_opaque, lent
 
 Array = npt.NDArray[Any]
 
+IN_PLANE = 1e-7  # share of a triangle's size: a corner not farther from the plane through the eye is taken to lie in it
 NEAREST = 1e-9  # share of a triangle's size under which a hit is rounding: its plane holds the eye
 BATCH = 64  # triangles set up at once
 EMPTY = 0xFFFFFFFF  # key of a texel where nothing is; others have nearness in the upper half, EMPTY - id in the lower
@@ -181,7 +182,10 @@ def set_up(setup: Array, count: int, width: int) -> None:
         xj, yj, wj, nj = setup[at], setup[at + STEP[1]], setup[at + STEP[2]], setup[at + STEP[3]]
         at += STEP[4]
         xk, yk, wk, nk = setup[at], setup[at + STEP[1]], setup[at + STEP[2]], setup[at + STEP[3]]
+        size = max(_size(xi, yi, wi, width), max(_size(xj, yj, wj, width), _size(xk, yk, wk, width)))
         det = ((xj - xi) * (yk - yi) - (xk - xi) * (yj - yi)) * (wi * wj * wk)
+        # a corner i near the plane of the eye is far away on the map: its digits would hide the other corners'
+        det = det if abs(wi) > IN_PLANE * size else _volume(xi, yi, wi, xj, yj, wj, xk, yk, wk)
         sign = 1.0 if det > 0.0 else -1.0
         a0, b0, c0, t0 = edge(xj, yj, wj, xk, yk, wk, sign)
         a1, b1, c1, t1 = edge(xk, yk, wk, xi, yi, wi, sign)
@@ -196,11 +200,19 @@ def set_up(setup: Array, count: int, width: int) -> None:
         setup[at] = (a0 * ni + a1 * nj + a2 * nk) * scale
         setup[at + STEP[1]] = (b0 * ni + b1 * nj + b2 * nk) * scale
         setup[at + STEP[2]] = (c0 * ni + c1 * nj + c2 * nk) * scale
-        size = max(_size(xi, yi, wi, width), max(_size(xj, yj, wj, width), _size(xk, yk, wk, width)))
         # no area, or seen edge-on: nothing is near enough
         limit = 1.0 / (NEAREST * size)
         setup[at + STEP[3]] = limit if (det != 0.0) & (limit > 0.0) else 0.0
         setup[b + np.uint64(DET)] = det
+
+
+@kernel
+def _volume(
+    xi: float, yi: float, wi: float, xj: float, yj: float, wj: float, xk: float, yk: float, wk: float
+) -> float:
+    """Return v_i . (v_j x v_k) of corners as projected, v = (x w, y w, w)."""
+    xi, yi, xj, yj, xk, yk = xi * wi, yi * wi, xj * wj, yj * wj, xk * wk, yk * wk
+    return xi * (yj * wk - yk * wj) + yi * (xk * wj - xj * wk) + wi * (xj * yk - xk * yj)
 
 
 @kernel

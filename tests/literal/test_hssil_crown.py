@@ -62,6 +62,8 @@ def test_weights_are_the_areas_of_disc_and_crown(density):
     assert far[:inner].max() < radius + 1
     assert far[inner:].min() > radius - 1
     assert far[inner:].max() < 2 * radius + 1
+    inside = {"uniform": 0.5, "inverse_distance": math.sqrt(0.5)}[density]  # of the disc's points, by r / sqrt(2)
+    assert (far[:inner] < radius * math.sqrt(0.5)).mean() == pytest.approx(inside, abs=0.02)
     # a quarter of the turn has a quarter of the crown
     right, down = offsets[0, 0, inner:].T
     assert weight[inner:][(right > 0) & (down > 0)].sum() == pytest.approx(0.75 * math.pi * radius**2, rel=0.03)
@@ -96,11 +98,12 @@ def test_fixed_sets_are_their_own_mirror_image(inner, crown):
 def test_two_texels_light_each_other_by_hand():
     """Two walls 2 m apart that face each other; what is outside or the texel itself gives nothing."""
     position = np.array([[[-1.0, 1.0]], [[0, 0]], [[0, 0]]])
-    normal, radiance = -position, np.array([[[3.0, 5.0]]] * 3)
-    offsets = np.array([[1, 0], [-1, 0], [0, 0], [0, 1]]).reshape(1, 1, 4, 2)
-    found = literal.gather(position, normal, radiance, np.full((1, 2), 0.25), offsets, np.full((1, 1, 4), 2.0))
-    disc = 0.5 / math.pi
-    np.testing.assert_allclose(found[0, 0], np.array([5.0, 3.0]) * math.pi * disc / (4 + disc))
+    normal, radiance = -position, np.array([[[3.0, 5.0]], [[1, 2]], [[4, 7]]])
+    offsets = np.array([[1, 0], [-1, 0], [0, 0], [0, 1], [-2, 0], [2, 0]]).reshape(1, 1, 6, 2)
+    weight, area = np.array([2.0, 3, 4, 5, 6, 7]).reshape(1, 1, 6), np.array([[0.25, 0.5]])
+    found = literal.gather(position, normal, radiance, area, offsets, weight)
+    disc = np.array([2 * 0.5, 3 * 0.25]) / math.pi
+    np.testing.assert_allclose(found[:, 0], radiance[:, 0, ::-1] * math.pi * disc / (4 + disc))
 
 
 def test_what_faces_away_gives_nothing():
@@ -134,6 +137,7 @@ def test_points_and_shifts_by_hand():
     np.testing.assert_allclose(points[5], [(0.5 + 3 / g) % 1, math.cos(turn), math.sin(turn)])
     np.testing.assert_allclose(shifts[1, 2], [(0.1 + 20 / g) % 1, (0.2 + 20 / g**2) % 1])
     np.testing.assert_allclose(shifts[0, 0], [0.1, 0.2])
+    np.testing.assert_allclose(shifts[1, 0], [(0.1 + 12 / g) % 1, (0.2 + 12 / g**2) % 1])
 
 
 def test_sets_in_their_order_by_hand():
@@ -143,6 +147,8 @@ def test_sets_in_their_order_by_hand():
     offsets, weight = literal.mirrored_samples((0.1, 0.2), 0, 3, 5.0, "uniform")
     assert offsets[0, 0].tolist() == [[7, 5], [-7, 5], [0, -7]]
     np.testing.assert_allclose(weight, 25 * math.pi)
+    weight = literal.mirrored_samples((0.1, 0.2), 0, 3, 5.0, "inverse_distance")[1]
+    np.testing.assert_allclose(weight[0, 0, :2], 2 * math.pi * 5 * 8 / 3)  # 5 (1 + 0.6) texels away
 
 
 def test_receivers_read_the_samples_of_their_place_in_the_tile():
@@ -151,3 +157,12 @@ def test_receivers_read_the_samples_of_their_place_in_the_tile():
     i, j, texels = literal.samples_at((3, 3), offsets, np.arange(1.0, 5).reshape(2, 2, 1))
     assert texels[..., 0].tolist() == [[1, 2, 0], [3, 4, 3], [1, 2, 0]]
     assert (i[0, 0, 0], j[0, 0, 0], i[1, 0, 0], j[1, 0, 0]) == (0, 1, 2, 0)
+
+
+def test_a_sender_that_leans_shrinks_its_disc_on_both_sides_of_the_fraction():
+    """60 degrees at the sender: R^2 = ds / (2 pi) above and below."""
+    x, n, y = np.zeros((3, 1)), np.array([[0.0], [0], [1]]), np.array([[0.0], [0], [1.0]])
+    m = np.array([[math.sqrt(0.75)], [0], [-0.5]])
+    square = 3.0 * 0.5 / math.pi
+    found = literal.disc_form_factor(x, n, y, m, np.array([3.0]))[0]
+    assert found == pytest.approx(math.pi * square / (1 + square))

@@ -53,11 +53,11 @@ def test_a_wall_seen_head_on_by_hand():
 
 def test_the_closest_of_four_has_its_own_place_and_light():
     depth, normal, albedo, light = planes(np.array([[5.0, 4.0, np.inf], [2.0, 3.0, np.inf]]))
-    albedo *= np.arange(6).reshape(2, 3)
+    albedo *= np.arange(6).reshape(2, 3) * np.array([1.0, 2, 0.5])[:, None, None]
     level = literal.first_level(depth, normal, albedo, light, FRAME, np.ones(2), 1)
     assert level[5].tolist() == [[3, -1]]
     assert level[1].tolist() == [[2.0, np.inf]]
-    np.testing.assert_allclose(level[3][:, 0, 0], 3.0)
+    np.testing.assert_allclose(level[3][:, 0, 0], [3.0, 6, 1.5])
     assert not level[0][:, 0, 1].any()
 
 

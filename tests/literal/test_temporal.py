@@ -39,6 +39,7 @@ def test_shifts_by_parts_of_a_pixel():
     light, weight = shown((0.5, 0.25))
     np.testing.assert_allclose(light[:2, :5, :7], (ramp() + np.array([0.5, 0.25, 0])[:, None, None])[:2, :5, :7])
     np.testing.assert_allclose(weight[:5, 7], 0.5)  # half of the last column's texels lie beside the picture
+    np.testing.assert_allclose(light[0, :5, 7], 7)  # and those that there are are their mean
     light, weight = shown((2.0, 1.0))
     np.testing.assert_array_equal(light[:, :5, :6], ramp()[:, 1:, 2:])
     assert not weight[5].any()
@@ -174,3 +175,21 @@ def test_a_square_ends_at_its_radius():
     new[:, 0, 4] = 1
     found = [literal.clamp(np.ones((3, 1, 5)), new, np.zeros((1, 5), int), 1.0, radius)[0, 0, 2] for radius in (1, 2)]
     np.testing.assert_allclose(found, [0.0, 0.2 + 0.4])  # mean 1/5, deviation 2/5
+
+
+def test_a_leaning_plane_is_one_surface():
+    """Depths of neighbouring texels differ by 5 to 8 %, more than the tolerance: the plane tells."""
+    n = np.array([math.sin(1.2), 0, math.cos(1.2)])
+    row, column = np.mgrid[: SHAPE[0], : SHAPE[1]]
+
+    def seen(shift):
+        rays = np.stack([0.2 * (2 * (column + shift) + 1 - 8) / 8, -0.15 * (2 * row + 1 - 6) / 6, -1.0 + 0 * row])
+        depth = -2.0 / np.tensordot(n, rays, 1)
+        return depth * rays, depth
+
+    normal = n[:, None, None] * np.ones((3, *SHAPE))
+    (_, depth), (points, _) = seen(0.0), seen(0.5)
+    assert (np.abs(np.diff(depth, axis=1)) / depth[:, 1:]).min() > 0.05
+    light, weight = literal.reprojection(points, normal, np.zeros(SHAPE, int), *CAMERA, depth, normal, ramp(), *TESTS)
+    np.testing.assert_allclose(weight[:, :7], 1)
+    np.testing.assert_allclose(light[0, :, :7], column[:, :7] + 0.5)

@@ -142,3 +142,45 @@ def test_a_blur_allows_a_share_of_the_depth(height, mixes):
     position[2] += height * (np.arange(8) >= 4)
     light = (np.arange(8) >= 4) * np.ones((3, 5, 1))
     assert (literal.blur(light, position, normal, depth, 3, 0.01, 0.9) != light).any() == mixes
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_smaller_of_two_slopes_by_hand(axis):
+    nearness = np.array([3.0, 4, 6, 6.5, 5])
+    nearness = (nearness[:, None] if axis == 0 else nearness[None]) * np.ones((5, 5))
+    g = literal.slope(nearness, axis)
+    np.testing.assert_allclose(g[:, 2] if axis == 0 else g[2], [1, 1, 0.5, 0, -1.5])  # 0: a ridge
+
+
+def test_channels_stay_apart():
+    depth, normal = np.full((2, 4), 2.0), np.array([0.0, 0, 1])[:, None, None] * np.ones((3, 2, 4))
+    light = np.array([1.0, 2, 3])[:, None, None] * np.ones((3, 1, 2))
+    found = literal.level_sum(light, depth[::2, ::2], normal[:, ::2, ::2], depth, normal, 10 + 0 * normal, 2, 0.02, 8.0,
+                              True)
+    np.testing.assert_allclose(found, np.array([11.0, 12, 13])[:, None, None] * np.ones((3, 2, 4)))
+
+
+def test_a_blur_beyond_a_gap_at_the_rim_and_over_a_crease():
+    """A texel of another depth between two of one wall; the mean at the rim is over what there is; creases by hand."""
+    position, normal, depth = wall((1, 5))
+    position[2, 0, 2] -= 1
+    light = np.array([1.0, 2, 50, 4, 5]) * np.ones((3, 1, 1))
+    found = literal.blur(light, position, normal, depth, 5, 0.01, 0.9)
+    np.testing.assert_allclose(found[0, 0], [1.5, (1 + 2 + 4) / 3, 50, (2 + 4 + 5) / 3, 4.5])
+    position, normal, depth = wall((1, 5))
+    normal[:, 0, 3:] = np.array([0.0, np.sin(0.2), np.cos(0.2)])[:, None]  # 11 degrees about the row: in both planes
+    found = literal.blur(light, position, normal, depth, 3, 0.01, 0.9)
+    np.testing.assert_allclose(found[0, 0], [1.5, 53 / 3, 56 / 3, 59 / 3, 4.5])
+
+
+def test_a_tolerance_is_of_the_texels_own_plane_and_depth():
+    """A step of 0.035 m: within 1 % of the 4 m that the farther ones are away, not of the nearer ones' 3 m."""
+    position, normal, depth = wall((1, 4))
+    position[2, 0, 2:] -= 0.035
+    depth[0, 2:] = 4
+    light = np.array([1.0, 1, 3, 3]) * np.ones((3, 1, 1))
+    np.testing.assert_allclose(literal.blur(light, position, normal, depth, 3, 0.01, 0.9)[0, 0], [1, 1, 7 / 3, 3])
+    position, normal, depth = wall((1, 2))
+    normal[:, 0, 1] = np.sin(0.3), 0, np.cos(0.3)  # the other's plane passes 0.037 m beside, its own through it
+    light = np.array([1.0, 3]) * np.ones((3, 1, 1))
+    np.testing.assert_allclose(literal.blur(light, position, normal, depth, 3, 0.01, 0.9)[0, 0], [2, 3])

@@ -34,7 +34,8 @@ def test_the_page_of_the_literal_text_is_that_of_the_code():
 
 def test_few_literal_functions_lack_a_test_that_knows_them_from_elsewhere(evidence):
     literal = loaded("literal_page")
-    tests = {f"{module}.{one.__name__}": found for module in literal.order() for one, found in literal.functions(module)}
+    tests = {f"{module}.{one.__name__}": found for module in literal.order()
+             for one, found in literal.functions(module)}
     bare = sorted(name for name, found in tests.items() if not found)
     evidence(f"{len(tests) - len(bare)} of {len(tests)} literal functions are reached by tests in tests/literal")
     assert len(bare) <= len(tests) // 20, bare

@@ -138,13 +138,19 @@ def _add(recipe: Recipe, known: _Known, name: str, run: stages.Run, outputs: Map
              for leaf, array in outputs.items()}
     form, bugs, exact = None, tuple[Bug, ...](), tuple[str, ...]()
     if (beside := described(run.name, arguments)) is not None:
-        form = dataclasses.replace(beside.form, reads={key: reads[leaf] for key, leaf in beside.form.reads.items()},
-                                   writes=tuple(writes[leaf] for leaf in beside.form.writes))
+        form = dataclasses.replace(
+            beside.form, reads={key: _named(reads, leaf) for key, leaf in beside.form.reads.items()},
+            writes=tuple(writes[leaf] for leaf in beside.form.writes))
         bugs = tuple(bug for module, rows in beside.lists for bug in form.bugs(rows, of=module))
         exact = tuple(reads[leaf] for leaf in beside.exact)
     recipe.add(name, _summary(function), _run(function, arguments, reads, writes), tuple(dict.fromkeys(reads.values())),
                specs, paper=f"{function.__module__}.{function.__name__}", bugs=bugs, exact=exact,
                variants=() if form is None else (form,))
+
+
+def _named(reads: Mapping[str, str], leaf: Any) -> Any:
+    """Return the names of arrays for those of leaves."""
+    return tuple(_named(reads, one) for one in leaf) if isinstance(leaf, tuple) else reads[leaf]
 
 
 def _run(

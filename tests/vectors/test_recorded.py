@@ -9,14 +9,16 @@ from refgi.methods import find_method
 from refgi.scene import Camera, Material, Mesh, PointLight, Scene, SpotLight
 from refgi.scene.model import merge
 from refgi.settings import replaced
+from refgi.vectors.bounds import distance, large_value
 from refgi.vectors.check import Asked, check_output
 from refgi.vectors.export import export_case
 from refgi.vectors.kit import Kit
 from refgi.vectors.recorded import leaves, recorded_case
-from refgi.vectors.spec import expected_of
+from refgi.vectors.spec import expected_of, kind_of, outputs_of
 
 SETTINGS = {"sii": {}, "gather": {}, "hssil": {"sampling.samples": 12}, "vpl": {},
             "multires": {"lights.count": 32}, "val": {"lights.count": 64}}
+EDGES = 0.01  # share of elements that rounding decides
 SIZE = {"width": 24, "height": 18, "rsm_resolution": 16}
 
 
@@ -122,6 +124,22 @@ def test_likely_bugs_and_the_search_know_stages_that_have_a_literal_form(tmp_pat
     result = check_output(kit, output.parent, Asked())
     assert result.first == (manifest.id, "pairs.sum")
     assert "over the hemisphere: 1/(2 pi)" in result.findings[0].causes[0].cause
+
+
+@pytest.mark.parametrize(("method", "kinds"), [
+    ("sii", {"pairs.sum", "rsm.direct_irradiance"}), ("hssil", {"sssil.blur", "sssil.upsample"}),
+    ("val", {"cluster.area_lights"})])
+def test_literal_forms_of_recorded_stages_are_the_stages(method, kinds):
+    case = recorded_case("heap", heap(), method, replaced(find_method(method).settings(), SETTINGS[method]), **SIZE)
+    known, found = expected_of(case), set()
+    for step in case.stages:
+        for form in step.variants:
+            made = outputs_of(step, known, np.float64, form)
+            found.add(kind_of(step.name))
+            for name in form.writes:
+                off, large = distance(made[name], known[name]), large_value(known[name])
+                assert np.mean(off > 1e-5 * (np.abs(known[name]) + large)) <= EDGES, (step.name, name)
+    assert kinds <= found
 
 
 def diffuse_light(read):

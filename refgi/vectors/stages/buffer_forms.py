@@ -1,12 +1,12 @@
 """Literal forms of the stages of buffers, and which rows of likely bugs they have."""
 
-from collections.abc import Sequence
 from typing import Any
 
 from refgi.literal import buffers, light_flux
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection
 from refgi.scene import DirectionalLight, SpotLight
 from refgi.scene.model import Light
+from refgi.vectors.forms import falloff_lists
 from refgi.vectors.rows import Form
 
 VIEWS = "view/centre", "view/resolution", "view/frame", "view/origin", "view/extent"
@@ -77,13 +77,6 @@ def view_lists_of_flux(maps: Projection, glossy: bool) -> tuple[str, ...]:
     cube = maps.maps > 1
     return (*(("view/frame",) if glossy else ()), *(("view/cube rows",) if cube else ()),
             *(("view/cube",) if glossy and cube else ()))
-
-
-def falloff_lists(lights: Sequence[Light]) -> tuple[str, ...]:
-    """Return the lists of wrong falloffs of some lights' spots: what is right for all of them is none."""
-    kinds = {light.falloff for light in lights if isinstance(light, SpotLight)}
-    return (*(("falloff",) if kinds else ()), *(("falloff/smooth",) if kinds - {"squared_ramp"} else ()),
-            *(("falloff/squared",) if "squared_ramp" in kinds else ()))
 
 
 def _kind(maps: Projection) -> str:

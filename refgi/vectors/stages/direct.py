@@ -14,10 +14,11 @@ from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.raster.projection import Projection, camera_projection
 from refgi.scene import DirectionalLight, Scene, SpotLight, material_table
 from refgi.scene.model import Light
+from refgi.vectors.forms import falloff_lists
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.rows import Form
 from refgi.vectors.spec import Array, Arrays, Spec
-from refgi.vectors.stages.buffer_forms import falloff_lists, view_numbers, view_reads
+from refgi.vectors.stages.buffer_forms import view_numbers, view_reads
 from refgi.vectors.stages.buffers import (
     SCENE,
     _add_ids,

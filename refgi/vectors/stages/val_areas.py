@@ -9,6 +9,7 @@ from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.settings import AreaLightSettings
 from refgi.literal import val_areas as literal
 from refgi.pairs.pixel_lights import PixelLights
+from refgi.vectors.forms import area_lists
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.rows import Form
 from refgi.vectors.spec import Arrays, Spec
@@ -27,9 +28,6 @@ def add_areas(recipe: Recipe, settings: AreaLightSettings) -> None:
     reads = {"position": LIGHTS[0], "center": "clusters.center", "normal": "clusters.normal", "of": "clusters.of"}
     form = Form(literal.areas, reads, tuple(f"areas.{key}" for key in AREA),
                 {"axes": settings.axes, "extent": settings.extent, "unbiased": settings.unbiased_area})
-    lists = ("areas/root" if settings.extent == "root" else "areas/not root",
-             "areas/fixed" if settings.axes == "fixed" else "areas/not fixed",
-             "areas/unbiased" if settings.unbiased_area else "areas/biased")
     recipe.facts["areas"] = {"axes": settings.axes, "extent": settings.extent, "up": [0, 1, 0],
                              "up where |y| of the normal >= 0.999": [0, 0, -1], "flat below, of the radius": 1e-5}
     recipe.add("areas", "bounding rectangle of each cluster's lights in its plane", run,
@@ -43,7 +41,7 @@ def add_areas(recipe: Recipe, settings: AreaLightSettings) -> None:
                    "areas.radius": Spec("cluster", "m", "from the centre to its farthest light"),
                    "areas.members": Spec("cluster", "1", "how many lights it has", tier="T0")},
                paper="VAL Sec. 6, E-VAL-10", exact=(LIGHTS[0], "clusters.center"),
-               bugs=form.bugs("areas", *lists), variants=(form,))
+               bugs=form.bugs("areas", *area_lists(settings)), variants=(form,))
 
 
 def _areas(arrays: Arrays, settings: AreaLightSettings) -> AreaLights:

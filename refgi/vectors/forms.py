@@ -100,7 +100,8 @@ def rectangles(arguments: Arguments) -> Described | None:
     reads = {"position": "lights.position", "center": "clusters.center", "normal": "clusters.normal",
              "of": "clusters.of"}
     form = Form(val_areas.areas, reads, ("frame", "axes", "side", "offset", "delta", "radius", "members"), {
-        "axes": settings.axes, "extent": settings.extent, "unbiased": settings.unbiased_area}, double=True)
+        "axes": settings.axes, "extent": settings.extent, "unbiased": settings.unbiased_area}, double=True,
+        kept={"center": "clusters.center", "normal": "clusters.normal", "of": "clusters.of"})
     return Described(form, tuple(("", one) for one in ("areas", *area_lists(settings))),
                      ("lights.position", "clusters.center"))
 

@@ -140,7 +140,8 @@ def _add(recipe: Recipe, known: _Known, name: str, run: stages.Run, outputs: Map
     if (beside := described(run.name, arguments)) is not None:
         form = dataclasses.replace(
             beside.form, reads={key: _named(reads, leaf) for key, leaf in beside.form.reads.items()},
-            writes=tuple(writes[leaf] for leaf in beside.form.writes))
+            writes=tuple(writes[leaf] for leaf in beside.form.writes),
+            kept={writes[leaf]: reads[read] for leaf, read in beside.form.kept.items()})
         bugs = tuple(bug for module, rows in beside.lists for bug in form.bugs(rows, of=module))
         exact = tuple(reads[leaf] for leaf in beside.exact)
     recipe.add(name, _summary(function), _run(function, arguments, reads, writes), tuple(dict.fromkeys(reads.values())),

@@ -38,6 +38,7 @@ class Form:
     writes: tuple[str, ...]  # in the order in which the function returns them
     numbers: Mapping[str, Any] = field(default_factory=dict)  # its other arguments
     adapt: Mapping[str, Callable[[Array], Array]] = field(default_factory=dict)  # what parameters are made of arrays
+    kept: Mapping[str, str] = field(default_factory=dict)  # what it writes that is what it reads
     double: bool = False  # in float64 whatever it reads, as refgi does where digits cancel
 
     def __call__(self, arrays: Arrays, real: Any) -> Arrays:  # noqa: ARG002 in the type of the arrays
@@ -50,7 +51,8 @@ class Form:
             arrays = {name: one.astype(np.float64) if one.dtype.kind == "f" else one for name, one in arrays.items()}
         read = {name: self.adapt.get(name, _as_it_is)(_read(arrays, array)) for name, array in self.reads.items()}
         made = function(**read, **self.numbers)
-        return dict(zip(self.writes, made if isinstance(made, list | tuple) else (made,), strict=True))
+        made = dict(zip(self.writes, made if isinstance(made, list | tuple) else (made,), strict=True))
+        return made | {name: arrays[array] for name, array in self.kept.items()}
 
     def bugs(self, *lists: str, of: str = "") -> tuple[Bug, ...]:
         """Return the likely bugs of some lists, in the order of the file; `of`: a literal module that it calls."""

@@ -36,7 +36,7 @@ def scattered_points(vertices: Any, faces: Any, shift: Any, count: int) -> Any:
     return place, face, np.array([radius])
 
 
-def frames(normal: Any) -> Any:
+def map_frames(normal: Any) -> Any:
     """Return the axes (N, 3, 3) of maps along normals (3, N): right, down, forward (Duff et al. 2017)."""
     x, y, z = normal
     e = np.copysign(1, z)

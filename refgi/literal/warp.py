@@ -59,7 +59,10 @@ def warp_map(x: Any, y: Any, importance: Any, levels: int, method: str) -> Any:
 
 
 def halve(x: Any, first: Any, second: Any, even: Any) -> Any:
-    """Return which half (0, 1) places x go to by the halves' importance, their place in it, and the weight's factor."""
+    """Return which half (0, 1) places x go to by the halves' importance, their place x' in it, the weight's factor.
+
+    The paper's new coordinate on the whole cell is (half + x') / 2.
+    """
     total = first + second
     r = np.divide(first, total, out=np.array(even), where=total > 0)  # E-SII-07: without importance nothing moves
     # Eq. (4)

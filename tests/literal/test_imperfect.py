@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from refgi.literal.imperfect import depth_maps, filled, frames, looked_up, scattered_points
+from refgi.literal.imperfect import depth_maps, filled, looked_up, map_frames, scattered_points
 
 # a square of 2 m by 2 m and a triangle of a quarter of its area, beside it
 VERTICES = np.array([[-1.0, -1, 2], [1, -1, 2], [1, 1, 2], [-1, 1, 2], [3, 0, 2], [4, 0, 2], [3, 2, 2]])
@@ -28,7 +28,7 @@ def test_points_are_as_dense_on_every_triangle():
 def test_frames_are_right_handed_about_the_normal():
     normal = np.random.default_rng(0).normal(size=(3, 50))
     normal = np.concatenate([normal / np.linalg.norm(normal, axis=0), [[0.0, 0.0], [0.0, 0.0], [1.0, -1.0]]], axis=1)
-    frame = frames(normal)
+    frame = map_frames(normal)
     np.testing.assert_allclose(frame @ frame.transpose(0, 2, 1), np.tile(np.eye(3), (52, 1, 1)), atol=1e-12)
     np.testing.assert_allclose(np.linalg.det(frame), 1)
     np.testing.assert_array_equal(frame[:, 2].T, normal)

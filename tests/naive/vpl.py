@@ -38,7 +38,7 @@ def imperfect_maps(geometry, lights, maps, seed):
     shift = np.array([[draw(seed, STREAM + 256 * number, c) for c in range(3)]
                       for number in range(lights.flux.shape[1])])
     point, face, radius = imperfect.scattered_points(vertices, faces, shift, maps.points)
-    views = imperfect.frames(np.asarray(lights.normal, float))
+    views = imperfect.map_frames(np.asarray(lights.normal, float))
     depth = imperfect.depth_maps(vertices, faces, point, face, radius, np.asarray(lights.position, float), views,
                                  maps.resolution, maps.splat)
     return imperfect.filled(depth, maps.levels), views, radius

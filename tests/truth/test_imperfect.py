@@ -11,7 +11,7 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights import choose_pixel_lights
-from refgi.literal.imperfect import frames, looked_up
+from refgi.literal.imperfect import looked_up, map_frames
 from refgi.method import Extent
 from refgi.methods import find_method
 from refgi.pairs.shadow_rays import fill_shadow_rays, receivers, senders_of
@@ -52,7 +52,7 @@ def test_what_is_hidden_is_that_of_the_literal_text(frame, lights):
     pairs = _pairs(frame, lights, Imperfect(points=300, resolution=16, bias=0.5))
     at = [part[:, None].astype(float) for part in (pairs.to.position, pairs.to.normal)]
     seen = looked_up(*at, np.zeros((1, len(pairs.to.pixel)), int), pairs.to.facing[:, None].astype(float),
-                     pairs.senders.position, pairs.senders.normal, frames(pairs.senders.normal), pairs.maps.depth,
+                     pairs.senders.position, pairs.senders.normal, map_frames(pairs.senders.normal), pairs.maps.depth,
                      np.array([pairs.maps.radius]), 0.5)[:, 0].T
     sends = pairs.reach > 0
     assert 0.1 < seen[sends].mean() < 0.9

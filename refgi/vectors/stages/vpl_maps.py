@@ -96,7 +96,7 @@ def _add_frames(recipe: Recipe) -> None:
             fill_frame(normal[k], frame[k])
         return {FRAME: frame.astype(real)}
 
-    form = Form(literal.frames, {"normal": LIGHTS[1]}, (FRAME,))
+    form = Form(literal.map_frames, {"normal": LIGHTS[1]}, (FRAME,))
     recipe.add("vpl.frames", "axes of each light's map: with n its normal and e the sign of n_z, a = -1 / (e + n_z), "
                "right (1 + e n_x^2 a, e n_x n_y a, -e n_x), down (n_x n_y a, e + n_y^2 a, -n_y), forward n", run,
                (LIGHTS[1],), {FRAME: Spec("light, (right, down, forward), xyz", VECTOR, "axes of s, t and z", "world")},

@@ -184,3 +184,21 @@ def test_a_tolerance_is_of_the_texels_own_plane_and_depth():
     normal[:, 0, 1] = np.sin(0.3), 0, np.cos(0.3)  # the other's plane passes 0.037 m beside, its own through it
     light = np.array([1.0, 3]) * np.ones((3, 1, 1))
     np.testing.assert_allclose(literal.blur(light, position, normal, depth, 3, 0.01, 0.9)[0, 0], [2, 3])
+
+
+def test_passes_run_along_rows_then_columns():
+    """Three texels about a hole, by hand."""
+    position, normal, depth = wall((2, 2))
+    depth[0, 0] = np.inf
+    light = np.array([[0.0, 2], [4, 8]]) * np.ones((3, 1, 1))
+    np.testing.assert_allclose(literal.blur(light, position, normal, depth, 3, 0.01, 0.9)[0], [[0, 4], [6, 4]])
+
+
+def test_normals_are_compared_with_the_pixels_own():
+    depth, normal = np.full((2, 4), 2.0), np.array([0.0, 0, 1])[:, None, None] * np.ones((3, 2, 4))
+    turned = normal.copy()
+    turned[:, 0, 1] = np.sqrt(0.75), 0, 0.5  # its own texel's is straight, the other's as its own
+    below = np.stack([normal[:, 0, 0], turned[:, 0, 1]], axis=1)[:, None]
+    found = literal.upsample(np.array([[[1.0, 5.0]]] * 3), depth[:1, :2], below, depth, turned, 2, 0.02, 8.0, True)
+    own, other = (2 - 0.25) / 3 * 0.5**8, (1 + 4 * 0.25) / 6
+    assert found[0, 0, 1] == pytest.approx((own + 5 * other) / (own + other))

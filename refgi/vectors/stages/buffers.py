@@ -217,15 +217,6 @@ def _add_ids(recipe: Recipe, name: str, view: str, maps: Projection, scene: Scen
                paper="docs/rasterizer", bugs=form.bugs("view/upwards", *lists), variants=(form,))
 
 
-def _half_texel(maps: Projection) -> Any:
-    """Return what turns frames so that centres lie half a texel up and left, for small texels."""
-    def turned(frame: Array) -> Array:
-        x, y = maps.half[0] / maps.width, maps.half[1] / maps.height
-        return np.stack([frame[:, 0], frame[:, 1], frame[:, 2] - x * frame[:, 0] - y * frame[:, 1]], axis=1)
-
-    return turned
-
-
 def _add_surface(
     recipe: Recipe, name: str, view: str, maps: Projection, scene: Scene, channels: tuple[str, ...]
 ) -> None:

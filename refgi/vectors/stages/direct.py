@@ -17,7 +17,7 @@ from refgi.scene.model import Light
 from refgi.vectors.forms import falloff_lists
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Array, Arrays, Spec
+from refgi.vectors.spec import Arrays, Spec
 from refgi.vectors.stages.buffer_forms import view_numbers, view_reads
 from refgi.vectors.stages.buffers import (
     SCENE,
@@ -161,7 +161,3 @@ def _irradiance_form(lights: Sequence[tuple[str, Light]], shadows: Sequence[str]
 
 def _visible_spec() -> Spec:
     return Spec("row, column", "1", "whether the light reaches the pixel's point; false without surface", tier="T0")
-
-
-def _upside_down(frame: Array) -> Array:
-    return np.asarray(frame * np.array([1.0, -1.0, 1.0]).reshape(3, 1))

@@ -1,13 +1,13 @@
-"""Percentage closer filtering: against plain loops, one texel against the hard test, and what must hold anywhere."""
+"""Percentage closer filtering: against the literal text, one texel against hard shadows, what must hold anywhere."""
 
 import numpy as np
 import pytest
 
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.evaluate import visibility
+from refgi.literal.val_visibility import depth_tests
 from refgi.settings import of
 from tests.cluster.visibility.plates import are_shares, lit_by, map_of_plates, on_plane
-from tests.naive import val as naive
 
 ROUNDING = 1e-14  # of a count over a count
 PLATES = [(-0.6, -0.1, -0.3, 0.3, 1.0), (0.1, 0.6, -0.3, 0.3, 1.0)]
@@ -21,7 +21,7 @@ def pcf(areas, maps, points, normals, texels):
 
 @pytest.mark.feature("VAL-12")
 @pytest.mark.parametrize("texels", [1, 3, 7, 31])
-def test_pcf_is_its_literal_twin(texels, evidence):
+def test_pcf_is_the_literal_text(texels, evidence):
     n, slope = 24, np.array([0.3, -0.2, 1.0]) / np.linalg.norm([0.3, -0.2, 1.0])
     depth = map_of_plates(n, PLATES, 2.8, slope)
     points, _ = on_plane(3.0, 2.2, 9)
@@ -29,14 +29,14 @@ def test_pcf_is_its_literal_twin(texels, evidence):
     points = np.concatenate([points, -points[:, :3]], axis=1)  # some behind the light
     normals = np.repeat(-slope[:, None], points.shape[1], axis=1)
     areas, maps = lit_by(depth, 0.5, FAR)
-    area = naive.AreaLight([0.0] * 3, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 0.5, 0.3, [])
-    seen = naive.Map(depth.tolist(), float(depth.min()), FAR, FAR)
-    expected = np.array([naive.pcf(area, seen, x.tolist(), (-slope).tolist(), texels) for x in points.T])
+    expected = depth_tests(points[:, None], np.zeros((1, points.shape[1]), int), normals[:, None], depth[None],
+                           np.zeros((1, 3)), np.eye(3)[None], np.array([0.5]), depth.min()[None], texels)[0, 0]
     got = pcf(areas, maps, points, normals, texels)
     assert np.abs(got - expected).max() <= ROUNDING
     assert np.array_equal(pcf(areas, maps, points, -normals, texels), got)  # normals on either side
     assert len(np.unique(expected)) > (1 if texels == 1 else 3)
-    evidence(f"{texels} x {texels} texels: {np.abs(got - expected).max():.1e} off plain loops, V {got.min():.2f} to 1")
+    off = np.abs(got - expected).max()
+    evidence(f"{texels} x {texels} texels: {off:.1e} off the literal text, V {got.min():.2f} to 1")
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

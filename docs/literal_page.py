@@ -26,6 +26,9 @@ that are neither a kernel nor a copy, by closed forms, printed numbers, cases co
 (`tests/literal`); those that reach a function are named beside it, `-` where none does. The ports to C and GLSL
 (`examples/ports`) know neither.
 
+`refgi render SCENE --size 64x48 --engine literal` makes a picture with it in place of the kernels of direct light, sums
+over pixel lights, rectangles of area lights, and the blur and upsampling of levels, and says how long each took.
+
 This page is made by `python docs/literal_page.py`.
 """
 

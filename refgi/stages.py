@@ -21,6 +21,7 @@ import numpy as np
 P = ParamSpec("P")
 R = TypeVar("R")
 Status = Literal["ran", "reused", "skipped"]
+Substitute = Callable[[str, Callable[..., Any], tuple[Any, ...], Mapping[str, Any]], Any]  # name, function, arguments
 Counted = Literal["pairs", "rays", "bytes"]  # of light and receiver, before skips within a sum; traced; of arrays made
 
 STAGES: dict[str, Callable[..., Any]] = {}  # every stage that is imported, by name
@@ -53,6 +54,7 @@ class Log:
     memory: "Memory | None" = None
     progress: Callable[[str, float], None] | None = None
     counts: Counter[Counted] | None = None  # of what `tally` counts; None where nobody asked
+    substitute: "Substitute | None" = None  # what runs stages in place of their own functions
     _depth: int = 0
     _open: list[str] = dataclasses.field(default_factory=list)
     _made: dict[int, weakref.ref[Any]] = dataclasses.field(default_factory=dict)  # arrays whose bytes are counted
@@ -146,7 +148,7 @@ def stage(name: str, *, kept: bool = True) -> Callable[[Callable[P, R]], Callabl
 @contextmanager
 def observe(
     *, record: bool = False, memory: Memory | None = None, progress: Callable[[str, float], None] | None = None,
-    counting: bool = False,
+    counting: bool = False, substitute: Substitute | None = None,
 ) -> Iterator[Log]:
     """Log every stage that runs inside the block.
 
@@ -160,13 +162,16 @@ def observe(
         Called with (stage name, fraction done) as long stages advance.
     counting : bool
         Count pairs, rays and bytes of the arrays that stages make, which takes time of its own.
+    substitute : callable, optional
+        Called with a stage's name, function and arguments, positional and by name; what it returns is the output.
 
     Yields
     ------
     Log
         Filled while the block runs.
     """
-    log = Log(record=record, memory=memory, progress=progress, counts=Counter() if counting else None)
+    log = Log(record=record, memory=memory, progress=progress, counts=Counter() if counting else None,
+              substitute=substitute)
     token = _log.set(log)
     try:
         yield log
@@ -287,7 +292,8 @@ def _observed(
         log.progress(name, 0.0)
     started = time.perf_counter()
     try:
-        output = function(*args, **kwargs)
+        output = (function(*args, **kwargs) if log.substitute is None else
+                  log.substitute(name, function, args, kwargs))
     finally:
         seconds = time.perf_counter() - started
         log._depth -= 1

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 @still
 @machine
 @shadows("auto")
+@click.option("--engine", type=click.Choice(["kernels", "literal"]), default="kernels", show_default=True,
+              help="literal: stages run by the plain NumPy of refgi/literal where they have it, far slower.")
 @click.option("--again", metavar="FILE.exr", help="Make this picture again, and say whether it is the same to the bit.")
 @click.option("--scene", "scene_path", metavar="PATH", help="Where the scene of --again is now, if it was moved.")
 @click.option("--exposure", type=Exposure(), help="Factor before the sRGB curve of a PNG, the scene's where absent; "
@@ -84,7 +86,13 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
         warm_up([job.method], str(job.options["dtype"]), tell)
     started = time.perf_counter()
     kept = stages.Memory() if job.still is not None else None  # frames of a resting scene share their buffers
-    with on_threads(options["threads"]), progress() as tell, stages.observe(memory=kept, progress=tell) as log:
+    engine = None
+    if options["engine"] == "literal":
+        from refgi.vectors.engine import Literal
+
+        engine = Literal()
+    with on_threads(options["threads"]), progress() as tell, stages.observe(
+            memory=kept, progress=tell, substitute=engine) as log:
         if job.still is not None:
             from refgi.provenance.frames import render_still
 
@@ -100,7 +108,8 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     auto = options["exposure"] == "auto"
     if auto:
         job = job._replace(exposure=auto_exposure(picture.radiance))
-    record = _record(job, picture) | ({"auto_exposure": {"percentile": EXPOSED}} if auto else {})
+    record = _record(job, picture) | ({"auto_exposure": {"percentile": EXPOSED}} if auto else {}) | (
+        {} if engine is None else {"engine": options["engine"]})
     content = _content(picture, job, seconds, record) | {"stages": [_run(run) for run in log.runs]}
     planes = _write(picture, files, record)
     _say_aloud(content, job.scene)
@@ -111,6 +120,10 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     text += f" -> {', '.join(content['files'])}" if files.files else ""
     text += "".join(f"\n{record[key]['statement']}" for key in ("estimate", "sampling_error") if key in record)
     text += f"\nlobes: {record['estimate']['lobes']['statement']}" if "lobes" in record.get("estimate", {}) else ""
+    if engine is not None:
+        content["literal"] = [one._asdict() for one in engine.timed]
+        text += "".join(f"\n{one.stage} by the literal text: {one.literal:.3f} s, its kernel {one.kernel:.3f} s"
+                        for one in engine.timed) or "\nno stage of this method has a literal form"
     if again is not None:
         other = differences(Path(again), planes)
         content["again"] = {"file": again, "same": not other, "differs": other}

@@ -103,6 +103,9 @@ def job_of(record: Mapping[str, Any], path: Path, scene: str | None = None) -> J
     """
     with blame(file=str(path)):
         _warn_of_other_versions(record, path)
+        if "engine" in record:
+            raise InputError(f"{path}: made by the {record['engine']} engine, whose bits are not promised: render its "
+                             f"scene with --engine {record['engine']}")
         if (checkpoint := record["settings"].get("checkpoint")) is not None:
             warnings.warn(RefgiWarning(f"{path}: checkpoint {checkpoint!r}: neither read nor written; only --out is"),
                           stacklevel=2)

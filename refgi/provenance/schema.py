@@ -88,6 +88,7 @@ class PictureRecord(_Entry):
     options: OptionsEntry
     exposure: Annotated[float, Field(allow_inf_nan=False, gt=0)]
     auto_exposure: ExposureEntry | None = None
+    engine: Literal["literal"] | None = None  # what ran stages in place of kernels
     units: dict[str, str]
     content: str
     method: str

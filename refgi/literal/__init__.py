@@ -1,9 +1,18 @@
-"""The four papers as plain NumPy: one function for each stage, arrays and numbers in, arrays out.
+"""Four papers as plain NumPy: one function for each stage, arrays and numbers in, arrays out.
 
-This is what each equation says; kernels say how it is fast, and never import it. Read in the order of the papers:
-`buffers`, `lights`, `warp`, `pairs`, `gather`, `sii`, `vpl`, `imperfect`, `multires`, `val_areas`, `val_maps`,
-`val_visibility`, `hssil_levels`, `hssil_crown`, `upsampling`, `temporal`. Vectors are arrays whose first axis is x, y,
-z (or red, green, blue); metres, watts, radians, linear RGB. Arithmetic is in the type of the arrays.
+Splatting Indirect Illumination (SII, Dachsbacher and Stamminger 2006), Clustered Visibility (VAL, Dong et al. 2009),
+Hierarchical Screen-Space Indirect Illumination (HSS, Soler et al. 2009) and Adaptive Multiresolution Splatting (AMS,
+Nichols and Wyman 2009), with what they stand on: gathering from reflective shadow maps (Dachsbacher and Stamminger 2005)
+and imperfect shadow maps (Ritschel et al. 2008).
+
+This is what each equation says; kernels say how it is fast, and never import it. Read in this order: `buffers`,
+`colours`, `light_flux`, `direct`, `lights`, `warp`, `pairs`, `gather`, `sii`, `vpl`, `imperfect`, `multires`,
+`multires_lights`, `multires_upsample`, `val_areas`, `val_series`, `val_maps`, `val_visibility`, `val_filters`,
+`val_back_projection`, `hssil_levels`, `hssil_crown`, `upsampling`, `temporal`.
+
+Vectors are arrays whose first axis is x, y, z (or red, green, blue); metres, watts, radians, linear RGB. Arithmetic is
+in the type of the arrays. Which variant and number is the default stands in the settings (`refgi settings METHOD`), not
+here; E-SII-02 and its like are errata of the papers (docs/errata), VAL-03 and its like features (docs/features).
 
 Beside each file lie its likely bugs, `*.bugs`: one row each, an edit of one line (`refgi.vectors.rows`).
 """

@@ -45,30 +45,30 @@ def crown_samples(points: Any, shifts: Any, inner: int, radius: float, density: 
 
     The first `inner` of n points lie in the disc of radius r, the others in the crown from r to 2 r.
     """
-    near = np.where(np.arange(len(points)) < inner, 0.0, 1.0)[None, None]  # 0 in the disc, 1 in the crown
-    number = np.where(near > 0, len(points) - inner, inner)
+    ring = np.where(np.arange(len(points)) < inner, 0.0, 1.0)[None, None]  # 0 in the disc, 1 in the crown
+    number = np.where(ring > 0, len(points) - inner, inner)
     x, y = points[:, 1], points[:, 2]
     u = (points[:, 0] + shifts[..., :1]) % 1
     turn = 2 * np.pi * shifts[..., 1:]
-    far = distance(u, near, radius, density)
+    far = distance(u, ring, radius, density)
     right = far * (x * np.cos(turn) - y * np.sin(turn))
     down = far * (x * np.sin(turn) + y * np.cos(turn))
     column, row = np.floor(right + 0.5), np.floor(down + 0.5)  # E-HSS-10: the texel whose centre is nearest
-    weight = texels_of(far, near, number, radius, density)
+    weight = texels_of(far, ring, number, radius, density)
     return np.stack([column, row], axis=-1).astype(np.int32), weight
 
 
-def distance(u: Any, near: Any, radius: float, density: str) -> Any:
+def distance(u: Any, ring: Any, radius: float, density: str) -> Any:
     """Return how far from the receiver a point lies: equal areas, or rings of equal width, get equally many."""
     if density == "uniform":
-        return radius * np.sqrt(near + (1 + 2 * near) * u)
-    return radius * (near + u)
+        return radius * np.sqrt(ring + (1 + 2 * ring) * u)
+    return radius * (ring + u)
 
 
-def texels_of(far: Any, near: Any, number: Any, radius: float, density: str) -> Any:
+def texels_of(far: Any, ring: Any, number: Any, radius: float, density: str) -> Any:
     """Return how many texels points stand for, E-HSS-06: the area of disc or crown over its own number of points."""
     if density == "uniform":
-        return (1 + 2 * near) * np.pi * radius**2 / number
+        return (1 + 2 * ring) * np.pi * radius**2 / number
     return 2 * np.pi * radius * far / number  # 2 pi d dd over the points in dd
 
 
@@ -78,12 +78,12 @@ def mirrored_samples(start: Any, inner: int, crown: int, radius: float, density:
     Pairs of the disc, of the crown, then the odd point of each, straight above or below.
     """
     pairs, middles = [], []
-    for count, near in ((inner, 0.0), (crown, 1.0)):
+    for count, ring in ((inner, 0.0), (crown, 1.0)):
         j = np.arange((count + 1) // 2)
         u, v = (0.5 + j * FIRST_STEP + start[0]) % 1, (0.5 + j * SECOND_STEP + start[1]) % 1
-        far = distance(u, near, radius, density)
+        far = distance(u, ring, radius, density)
         angle = np.pi * (v - 0.5)
-        weight = texels_of(far, near, max(count, 1), radius, density) + 0 * far
+        weight = texels_of(far, ring, max(count, 1), radius, density) + 0 * far
         right, down = np.floor(far * np.cos(angle) + 0.5), np.floor(far * np.sin(angle) + 0.5)
         middle = np.floor(np.copysign(far, np.sin(angle)) + 0.5)
         even = count // 2

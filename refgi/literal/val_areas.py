@@ -167,7 +167,10 @@ def turn_of_least_area(flat: Any) -> Any:
 
 
 def facing(normal: Any, triangle_id: Any, vertices: Any = None, faces: Any = None) -> Any:
-    """Return unit normals (3, h, w) of the triangles that pixels see, on the side of the interpolated ones (A.6 P4)."""
+    """Return unit normals (3, h, w) of the triangles that pixels see, on the side of the interpolated ones.
+
+    Planes and sides are the triangle's (docs/conventions).
+    """
     if vertices is None:
         return normal  # nothing is interpolated
     a, b, c = vertices[faces].swapaxes(0, 1)

@@ -36,6 +36,7 @@ def halved(level: Any) -> Any:
 def mip_means(pending: Any, region: Any, terms: int, weighed: bool, levels: Any) -> Any:
     """Return means (K, C, h, w) over discs, where pending: 8 texels of two levels, C = 4 M + 1 or, not `weighed`, 2 M.
 
+    `levels`: the basis itself, then those of `mip_levels`. `weighed`: with the terms times depth, for z_avg.
     A read between texels is a tent twice as wide as a texel: one level finer than log2 of the disc's diameter.
     """
     n, top = levels[0].shape[2], len(levels) - 1

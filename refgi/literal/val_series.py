@@ -24,7 +24,7 @@ def series(terms: int, attenuation: float = 0.0, rescale: str = "none", fixed: f
     weight = weights(terms, attenuation)
     if rescale == "plateau":
         weight = weight / min(1.0, 2 * plateau(weight))
-    first = first_lit(weight)
+    first = first_lit(weight)  # a bias: the least z - d that counts as lit, so that no surface half shadows itself
     search = first if fixed is None else fixed
     own = 0.0 if rescale == "scale2" else first
     final = own if fixed is None else fixed

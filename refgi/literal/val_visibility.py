@@ -166,7 +166,7 @@ def pcss_penumbra(
     alpha: bool = False, squares: bool = False, foreshortened: bool = False, axial: bool = False,
     cone: bool = True, biased: Any = None,
 ) -> Any:
-    """Return shaded (K, h, w), z_avg (K, h, w), m, and the region of the penumbra (Sec. 4.1, 4.2; A.6 P4).
+    """Return shaded (K, h, w), z_avg (K, h, w), m, and the region of the penumbra (Sec. 4.1, 4.2).
 
     z_avg is the mean distance of the texels of the search region that lie before the pixel's plane, in the cone;
     `axial`: their mean depth along the axis. `biased` (K, h, w), m: a distance to be nearer than, not the plane.

@@ -37,7 +37,7 @@ def warp(points: Any, importance: Any, maps: int, levels: int, method: str) -> A
 
 
 def warp_map(x: Any, y: Any, importance: Any, levels: int, method: str) -> Any:
-    """Return places (n,) on one map (h, w) after some levels of halving, columns and rows, and their weights (n,)."""
+    """Return places (n,) on one map (h, w) after some levels of halving, rows then columns, and their weights (n,)."""
     rows, columns = importance.shape
     cells = mip(importance)
     levels = min(levels, len(cells) - 1)

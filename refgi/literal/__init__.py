@@ -2,8 +2,8 @@
 
 Splatting Indirect Illumination (SII, Dachsbacher and Stamminger 2006), Clustered Visibility (VAL, Dong et al. 2009),
 Hierarchical Screen-Space Indirect Illumination (HSS, Soler et al. 2009) and Adaptive Multiresolution Splatting (AMS,
-Nichols and Wyman 2009), with what they stand on: gathering from reflective shadow maps (Dachsbacher and Stamminger 2005)
-and imperfect shadow maps (Ritschel et al. 2008).
+Nichols and Wyman 2009), with what they stand on: gathering from reflective shadow maps (Dachsbacher and Stamminger
+2005) and imperfect shadow maps (Ritschel et al. 2008).
 
 This is what each equation says; kernels say how it is fast, and never import it. Read in this order: `buffers`,
 `colours`, `light_flux`, `direct`, `lights`, `warp`, `pairs`, `gather`, `sii`, `vpl`, `imperfect`, `multires`,

@@ -1,6 +1,7 @@
 """Likely bugs as rows: each fits the literal text that it edits, and what is no row is refused."""
 
 import ast
+import dataclasses
 import inspect
 
 import numpy as np
@@ -49,6 +50,34 @@ def test_an_edit_changes_the_function_alone_that_it_is_asked_of():
 def test_an_edit_that_does_not_fit_once_or_leaves_no_program_is_refused(wrong):
     with pytest.raises(edits.StaleEditError, match=r"refgi\.literal\.pairs\.pair"):
         edits.edited(pairs.pair, wrong)
+
+
+def test_text_that_stands_twice_in_one_function_is_not_edited():
+    with pytest.raises(edits.StaleEditError, match="got 2"):
+        edits.edited(pairs.lobe_share, (("(high - low)", "1"),))
+
+
+def test_a_stage_has_the_rows_of_the_lists_that_it_names_alone():
+    form = rows.Form(pairs.irradiance, {}, ("sum",))
+    known = rows.rows("refgi.literal.pairs")
+    assert [bug.cause for bug in form.bugs("pair", "irradiance")] == [
+        row.cause for row in known if row.list in ("pair", "irradiance")]
+    assert len(form.bugs("pair")) < sum(row.list.startswith("pair") for row in known)
+
+
+def test_a_form_hands_on_what_its_fields_say():
+    form = rows.Form(lambda one, several, none, scale: (scale * one, several[1], none is None), {
+        "one": "a", "several": ("a", "b"), "none": None}, ("x", "y", "z"), {"scale": 3.0}, kept={"w": "b"})
+    arrays = {"a": np.full(2, 0.1, np.float32), "b": np.arange(2)}
+    made = form(arrays, np.float32)
+    assert made["x"] == pytest.approx(0.3)
+    assert made["x"].dtype == np.float32
+    assert made["z"] is True
+    assert (made["y"] is arrays["b"], made["w"] is arrays["b"]) == (True, True)
+    double = dataclasses.replace(form, double=True, adapt={"one": np.negative})(arrays, np.float32)
+    assert double["x"].dtype == np.float64
+    assert double["x"] == pytest.approx(-0.3)
+    assert double["y"].dtype == arrays["b"].dtype
 
 
 @pytest.mark.parametrize("line", ["a cause :: pair", "a cause :: pair :: no arrow", "a cause :: pair :: => new"])

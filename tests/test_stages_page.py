@@ -2,6 +2,7 @@
 
 import importlib.util
 import inspect
+import re
 from pathlib import Path
 
 import pytest
@@ -46,3 +47,12 @@ def test_every_stage_says_what_it_takes_and_gives(program):
     for name, stage in stages.STAGES.items():
         if stage.__module__.startswith("refgi."):
             assert program._fields(inspect.cleandoc(stage.__doc__), "Returns"), name
+
+
+def test_literal_functions_that_methods_pages_name_are_there():
+    named = {one for page in (DOCS / "methods").glob("*.md") for one in re.findall(r"`literal\.(\w+\.\w+)`",
+                                                                                 page.read_text(encoding="utf-8"))}
+    missing = [one for one in sorted(named) if not hasattr(
+        importlib.import_module(f"refgi.literal.{one.partition('.')[0]}"), one.partition(".")[2])]
+    assert missing == []
+    assert len(named) > 40

@@ -103,6 +103,20 @@ def test_some_stages_alone_are_given_what_they_read():
     assert expected_of(case)["pairs.sum"] == pytest.approx(expected_of(whole)["pairs.sum"], rel=1e-5, abs=1e-6)
 
 
+@pytest.mark.parametrize(("method", "stage", "changed"), [
+    ("sii", "pairs.sum", "lights.choose.flux"), ("hssil", "sssil.gather", "sssil.senders.0.radiance"),
+    ("sii", "rsm.direct_irradiance0", "rsm.shadow_map_visibility0")])
+def test_a_stage_computes_from_what_it_is_handed(method, stage, changed):
+    case = recorded_case("heap", heap(), method, replaced(find_method(method).settings(), SETTINGS[method]), **SIZE)
+    step, = (one for one in case.stages if one.name == stage)
+    known = expected_of(case)
+    lobes = {one: 0 * known[one] for one in step.reads if one.endswith("lobe_flux")}
+    right, other = (outputs_of(step, known | lobes | {changed: array}, real)[step.writes[0]] for array, real in (
+        (known[changed], np.float64), (known[changed] * False, np.float32)))
+    assert right.any()
+    assert not other.any()
+
+
 def test_axes_and_units_are_those_of_docstrings_and_comments():
     case = recorded_case("sii-heap", heap(), "sii", **SIZE)
     specs = case.specs

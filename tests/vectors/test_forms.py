@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
+from refgi.pairs.pixel_lights import PixelLights
+from refgi.pairs.settings import PairSettings
+from refgi.settings import of, replaced
 from refgi.vectors.cases import kit_cases
 from refgi.vectors.check import ALL_WITHIN, Asked, check_output
+from refgi.vectors.forms import described
 from refgi.vectors.spec import kind_of, stored
 from tests.vectors.literal_port import form_of, written
 
@@ -44,3 +48,19 @@ def test_every_kind_of_stage_has_a_form_but_those_named():
     steps = [step for make in kit_cases("quick").values() for step in make().stages]
     with_form = {kind_of(step.name) for step in steps if form_of(step) is not None}
     assert {kind_of(step.name) for step in steps} - with_form <= WITHOUT_FORM
+
+
+@pytest.mark.parametrize(("changes", "covered"), [
+    ({}, True), ({"clamp": "disc"}, True), ({"clamp": "distance", "clamp.value": 0.1}, False),
+    ({"clamp": "geometry", "clamp.value": 10.0}, False), ({"clamp": "sphere"}, False), ({"offset": 0.01}, False),
+    ({"lobe.widening": 0.1}, False), ({"lobe.norm": "none"}, False),
+    ({"as_published": frozenset({"sii_no_pi"})}, False)])
+def test_sums_that_the_literal_text_does_not_know_have_no_form(changes, covered):
+    one = np.ones((3, 2))
+    arguments = {"lights": PixelLights(one, one, one, None, None, None, 2), "lightcuts": None,
+                 "settings": replaced(of(PairSettings, clamp="none"), changes)}
+    assert (described("pairs.sum", arguments) is not None) is covered
+
+
+def test_stages_without_a_literal_form_have_none():
+    assert described("lights.choose", {}) is None

@@ -62,7 +62,8 @@ def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
 
     recipe.add("penumbra", "mean depth of the blockers in the search disc, and the disc of the penumbra", penumbra,
                (*PIXELS, *LIGHT, *SCALE, "series.weight", "series.bias", "search.pending", "search.means"),
-               {**penumbra_specs(), "penumbra.t": Spec(PLACE, "1", "depth of the pixel on the series' scale")},
+               {**penumbra_specs(),
+                "penumbra.t": Spec(PLACE, "1", "depth on the scale of the series, of all pending pixels")},
                paper="VAL Sec. 4.1, E-VAL-02, 04, 07", exact=("maps.center",),
                variants=(form,), bugs=(*form.bugs("penumbra", "region", *exact, of="val_visibility"),
                                              *form.bugs(*(("csm_penumbra", "shade") if exact else ()))))

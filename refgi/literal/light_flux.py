@@ -1,7 +1,8 @@
 """Flux that each texel of a light's map reflects (SII Sec. 3.1; docs/radiometry).
 
-Phi_t = albedo I(w) Omega_t: neither a cosine nor a distance, both are in the solid angle. A spot's intensity changes
-over a texel, so it is integrated; a directional light has irradiance in place of intensity, and texels areas.
+Phi_t = albedo int_t I dw, or I Omega_t where I is constant: neither a cosine nor a distance, both are in the solid
+angle. A spot's intensity changes over a texel, so it is integrated; a directional light has irradiance in place of
+intensity, and texels areas.
 
 Symbols: t share of the way from outer to inner cone, by cosines; a angle off the spot's axis; x, y image plane, whose
 density of solid angle is cos^3 a = (1 + x^2 + y^2)^(-3/2). Maps are those of `buffers`: (H, W) texels.
@@ -24,7 +25,8 @@ def reflected_flux(
     """Return solid angle, sr, flux (3, H, W), W, and the lobe's flux, W, axis (3, H, W) and exponent of each texel.
 
     `strength` (3,): intensity, W/sr; of a directional light (parallel rays) irradiance, W/m^2, and areas, m^2, stand
-    for solid angles. `half_angles` (2,): inner and outer, rad, of a spot. Lobes are 0 where the surface has none.
+    for solid angles. `half_angles` (2,): inner and outer, rad, of a spot. Lobes are 0, axis and exponent as well, where
+    the surface has none and where no light arrives.
     """
     x0, x1, y0, y1 = texel_sides(half, len(origin), rows, columns)
     angle = (x1 - x0) * (y1 - y0) if parallel else solid_angle(x0, x1, y0, y1)

@@ -8,8 +8,8 @@ import pydantic
 
 from refgi.errors import InputError, shortened
 
-VERSION = "1.0.3"  # of the vectors, apart from the program's: a patch adds cases, a minor adds arrays to a case,
-# a major changes what an array means
+VERSION = "1.0.4"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
+# a case, a major changes what an array means
 KIT, CASE, RESULT = "kit.json", "manifest.json", "result.json"
 
 M = TypeVar("M", bound=pydantic.BaseModel)

@@ -147,3 +147,39 @@ def test_tiles_in_any_order(kit, tmp_path):
     (tmp_path / case.id).mkdir()
     np.save(tmp_path / case.id / "sum.irradiance.npy", tiles)
     assert check_output(kit, tmp_path, Asked(stages=("sum",), cases=("sii-grid",))).exit_code == ALL_WITHIN
+
+
+@pytest.mark.parametrize("chained", [False, True])
+@pytest.mark.parametrize("name", ["pairs-diffuse", "pairs-glossy"])
+def test_subnormal_numbers_read_as_0(kit, tmp_path, name, chained):
+    """NVIDIA's float32 arithmetic reads numbers below 2^-126 as 0, and writes 0 for them."""
+    save_literal(kit, tmp_path, name, "pairs", lambda _, array: np.where(np.abs(array) < 2.0**-126, 0, array))
+    assert check_output(kit, tmp_path, Asked(chained=chained, cases=(name,))).exit_code == ALL_WITHIN
+
+
+@pytest.mark.parametrize("stage", ["search.means", "penumbra.means"])
+@pytest.mark.parametrize("name", ["val-csm", "val-empty", "val-rim"])
+def test_coordinates_of_textures(kit, tmp_path, name, stage):
+    """Places on a map as shares of it in float32, and texels' places from them by a fused operation, as GPUs do."""
+    side = next(kit.array(one, "basis.0").shape[-1] for one in kit.cases(Asked(cases=(name,))))
+
+    def read(array_name, array):
+        if not array_name.endswith(".region"):
+            return array
+        share = single(0.5 * array[:, :2] + 0.5).astype(np.float64)
+        place = single(share * side - 0.5)
+        return np.concatenate([(place.astype(np.float64) + 0.5) / (0.5 * side) - 1, array[:, 2:]], axis=1)
+
+    save_literal(kit, tmp_path, name, stage, read)
+    assert check_output(kit, tmp_path, Asked(stages=(stage,), cases=(name,))).exit_code == ALL_WITHIN
+
+
+def save_literal(kit, folder, name, stage, read):
+    """Write what a stage's literal text makes in float64 of arrays as `read(name, array)` returns them."""
+    step = next(one for one in kit_cases("quick")[name]().stages if one.name == stage)
+    case = next(one for one in kit.cases(Asked(cases=(name,))) if one.id == name)
+    arrays = {one: read(one, array) for one, array in as_read({one: kit.array(case, one) for one in step.reads},
+                                                              step.reads, np.float64).items()}
+    (folder / name).mkdir()
+    for one, array in written(step, arrays).items():
+        np.save(folder / name / f"{one}.npy", read(one, array))

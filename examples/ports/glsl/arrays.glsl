@@ -1,13 +1,17 @@
 // Arrays as storage buffers: planes of one component each, as the kit's .npy files hold them.
 // STORED arrays are half floats, two to a word, where HALF is defined; places stay float32 unless HALF_PLACES is.
+// WRITTEN arrays hold what ROUNDED makes, a half float alone in its word: unpacked again at once it would be no rounding,
+// as a driver may take both steps for none.
 
 #ifdef HALF
 #define STORED uint
 #define AT(array, i) (((i) & 1u) == 0u ? unpackHalf2x16(array[(i) >> 1]).x : unpackHalf2x16(array[(i) >> 1]).y)
-#define ROUNDED(v) unpackHalf2x16(packHalf2x16(vec2(v, 0.0))).x
+#define WRITTEN uint
+#define ROUNDED(v) packHalf2x16(vec2(v, 0.0))
 #else
 #define STORED float
 #define AT(array, i) array[i]
+#define WRITTEN float
 #define ROUNDED(v) (v)
 #endif
 

@@ -5,7 +5,7 @@ layout(local_size_x = 64) in;
 #include "turns.glsl"
 
 layout(std430, binding = 0) readonly buffer Depths { float maps_t[]; };
-layout(std430, binding = 1) writeonly buffer Basis { float basis[]; };
+layout(std430, binding = 1) writeonly buffer Basis { WRITTEN basis[]; };
 uniform int maps, texels, terms;
 
 void main() {

@@ -1,13 +1,12 @@
 // Stages search.means and penumbra.means: means of a map's channels over a disc, by a trilinear read of the level whose
 // texels are half the disc's diameter wide: level max(0, log2(radius side) - 1), the radius in units of [-1, 1].
 layout(local_size_x = 64) in;
-#include "elementary.glsl"
 #include "arrays.glsl"
 
 layout(std430, binding = 0) readonly buffer Asked { int asked[]; };
 layout(std430, binding = 1) readonly buffer Regions { float region[]; };  // s, t, radius of each map
 layout(std430, binding = 2) readonly buffer Chain { STORED chain[]; };    // all levels, the finest first
-layout(std430, binding = 3) writeonly buffer Means { float means[]; };
+layout(std430, binding = 3) writeonly buffer Means { WRITTEN means[]; };
 uniform int maps, pixels, levels, stored_channels, channels, side;
 
 float texel(int first, int level_side, int plane, ivec2 place) {

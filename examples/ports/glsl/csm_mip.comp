@@ -3,7 +3,7 @@ layout(local_size_x = 64) in;
 #include "arrays.glsl"
 
 layout(std430, binding = 0) readonly buffer Finer { STORED finer[]; };
-layout(std430, binding = 1) writeonly buffer Coarser { float coarser[]; };
+layout(std430, binding = 1) writeonly buffer Coarser { WRITTEN coarser[]; };
 uniform int planes, side;  // of the finer level
 
 float texel(int plane, ivec2 place) {

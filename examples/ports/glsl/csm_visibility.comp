@@ -9,7 +9,7 @@ layout(std430, binding = 1) readonly buffer Depths { float penumbra_t[]; };
 layout(std430, binding = 2) readonly buffer Means { STORED means[]; };
 layout(std430, binding = 3) readonly buffer Weights { float weight[]; };
 layout(std430, binding = 4) readonly buffer Otherwise { STORED otherwise[]; };
-layout(std430, binding = 5) writeonly buffer Shares { float share[]; };
+layout(std430, binding = 5) writeonly buffer Shares { WRITTEN share[]; };
 uniform int maps, pixels, terms;
 uniform float bias, gain;
 

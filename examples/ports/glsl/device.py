@@ -70,11 +70,12 @@ class Gpu:
         """Return a buffer of floats to be written."""
         return self.context.buffer(reserve=4 * max(1, count))
 
-    def read(self, buffer: moderngl.Buffer) -> np.ndarray:
-        """Return a buffer of floats and release it."""
-        array = np.frombuffer(buffer.read(), np.float32)
+    def read(self, buffer: moderngl.Buffer, whole: bool = False) -> np.ndarray:
+        """Return a buffer of floats as the shaders' variant writes them, or of `whole` ones, and release it."""
+        words = np.frombuffer(buffer.read(), np.uint32)
         buffer.release()
-        return array
+        half = "HALF" in self.variant and not whole
+        return words.astype(np.uint16).view(np.float16) if half else words.view(np.float32)
 
     def stored(self, array: np.ndarray, place: bool = False) -> np.ndarray:
         """Return floats as the shaders' variant stores them."""

@@ -13,7 +13,7 @@ layout(std430, binding = 2) readonly buffer Radiances { STORED radiance[]; };
 layout(std430, binding = 3) readonly buffer Surfaces { STORED area[]; };
 layout(std430, binding = 4) readonly buffer Offsets { ivec2 offsets[]; };  // right, down
 layout(std430, binding = 5) readonly buffer Counts { STORED weight[]; };   // texels that a sample stands for
-layout(std430, binding = 6) writeonly buffer Irradiance { float irradiance[]; };
+layout(std430, binding = 6) writeonly buffer Irradiance { WRITTEN irradiance[]; };
 uniform ivec2 size, tile, weight_tile;  // columns, rows
 uniform int samples;
 

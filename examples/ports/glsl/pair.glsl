@@ -22,7 +22,7 @@ layout(std430, binding = 9) readonly buffer LobePeaks { float lobe_peak[]; };  /
 #ifdef DISC
 layout(std430, binding = 10) readonly buffer Areas { STORED lights_area[]; };
 #endif
-layout(std430, binding = 11) writeonly buffer Irradiance { float irradiance[]; };
+layout(std430, binding = 11) writeonly buffer Irradiance { WRITTEN irradiance[]; };
 uniform uint light_count, receiver_count;
 
 struct Receiver {

@@ -58,7 +58,7 @@ def footprints(gpu: Gpu, arrays: Arrays, _: str) -> None:
                                         6: arrays[f"rsm{k}.weight"], 7: areas}, lights,
                 light_count=lights, chosen_count=len(chosen), map=k, near=int(near),
                 lamp=tuple(arrays[f"light{k}.{'position' if near else 'direction'}"].tolist()))
-    arrays.write("lights.area", gpu.read(areas))
+    arrays.write("lights.area", gpu.read(areas, whole=True))
 
 
 def gather(gpu: Gpu, arrays: Arrays, stage: str) -> None:

@@ -29,6 +29,8 @@ def _pairs(id: str, what: str, *, glossy: bool) -> Case:
     random = np.random.default_rng(11)
     place, toward = random.normal(size=(3, COUNT)), _unit(random.normal(size=(3, COUNT)))
     apart = 10.0 ** random.uniform(-3, 3, COUNT)
+    subnormal = np.s_[74:78]  # lights of such a flux, at distances that do not make it more: GPUs read it as 0
+    apart[subnormal] = np.maximum(apart[subnormal], 10.0)
     receiver = place + apart * toward
     normal = _unit(0.4 * random.normal(size=(3, COUNT)) + toward)
     facing = _unit(0.4 * random.normal(size=(3, COUNT)) - toward)
@@ -40,7 +42,7 @@ def _pairs(id: str, what: str, *, glossy: bool) -> Case:
     normal[:, 52:64] *= -1  # behind the light
     facing[:, 64:70], normal[:, 64:70] = -facing[:, 64:70], -normal[:, 64:70]  # both
     flux[:, 70:74] = 0.0
-    flux[:, 74:78] = 1e-40  # subnormal in float32
+    flux[:, subnormal] = 1e-40
     lights = {"lights.position": place, "lights.normal": _unit(normal), "lights.flux": flux}
     if glossy:
         lobe = 10.0 ** random.uniform(-4, 2, (3, COUNT))

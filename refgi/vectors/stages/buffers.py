@@ -86,15 +86,15 @@ def add_rsm(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
     sheet = "row, column"
     writes = {f"{name}.solid_angle": Spec(sheet, "m^2" if isinstance(light, DirectionalLight) else "sr",
                                           "solid angle of the whole texel; directional: area across the light",
-                                          paper="Phi_t = albedo I(w) Omega_t, calibrated"),
+                                          paper="Phi_t = albedo int_t I dw: docs/rasterizer, flux"),
               f"{name}.flux": Spec(f"rgb, {sheet}", "W", "flux that the diffuse part of the surface reflects",
                                    "linear RGB", "SII Sec. 3.1, calibrated")}
     if glossy:
         writes |= {f"{name}.lobe_flux": Spec(f"rgb, {sheet}", "W", "flux that the lobe reflects", "linear RGB",
                                              "SII Eq. 3"),
-                   f"{name}.lobe_axis": Spec(f"xyz, {sheet}", VECTOR, "mirror direction; 0 without a lobe", "world",
-                                             "r = d - 2 (n . d) n"),
-                   f"{name}.lobe_exponent": Spec(sheet, "1", "Phong exponent; 0 without a lobe")}
+                   f"{name}.lobe_axis": Spec(f"xyz, {sheet}", VECTOR, "mirror direction; 0 without lobe or light",
+                                             "world", "r = d - 2 (n . d) n"),
+                   f"{name}.lobe_exponent": Spec(sheet, "1", "Phong exponent; 0 without lobe or light")}
     # a spot's flux is an integral over each texel, which refgi takes in float64 in any run
     summed = writing(flux, **{f"{name}__flux": lambda a: (a * (1.0 + QUADRATURE * ROUNDING)).astype(a.dtype)})
     if COLOURS in recipe.specs:

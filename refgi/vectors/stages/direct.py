@@ -93,7 +93,7 @@ def _add_map(recipe: Recipe, scene: Scene, index: int, resolution: int) -> None:
     variants = () if smooth else (form,)
     recipe.add(f"shadow{index}", "the nearest texel's point does not lie above the receiver's own plane", test,
                (*points, *_map_names(name), *depths), {f"shadow{index}.visible": _visible_spec()},
-               paper="docs/rasterizer: receiver-plane bias", exact=(*points[:2], *depths),
+               paper="docs/rasterizer, receiver-plane bias", exact=(*points[:2], *depths),
                bugs=form.bugs("shadow_map", *lists), variants=variants)
 
 

@@ -31,5 +31,5 @@ def add_facing(recipe: Recipe, scene: Scene) -> None:
     recipe.add("facing", "normals of the triangles that pixels see, on the side of the interpolated ones", run,
                ("gbuffer.normal", "gbuffer.triangle_id", *source),
                {FACING: Spec("xyz, row, column", VECTOR, "plane of what a pixel sees; 0 without surface", "world")},
-               paper="A.6 P4: receiver's plane", bugs=form.bugs("facing/smooth" if smooth else "facing/flat"),
-               variants=(form,))
+               paper="E-VAL-14; docs/conventions: which normal serves what",
+               bugs=form.bugs("facing/smooth" if smooth else "facing/flat"), variants=(form,))

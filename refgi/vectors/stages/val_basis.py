@@ -51,7 +51,8 @@ def _add_series_depths(recipe: Recipe, csm: Csm) -> None:
                 ("maps.t",), {"logarithmic": logs, "mirrored": mirrored})
     lists = ("map_depths/log_map" if logs else "map_depths/linear", *(("map_depths/mirrored",) if mirrored else ()))
     recipe.add("maps.t", "depths of the series: log2(z / origin) slope, 0 to the range" + (
-        "; beyond the disc the texel at (s, t) / (s^2 + t^2)" if mirrored else ""), run, ("maps.depth", *SCALE),
+        "; beyond the disc the texel at (s, t) min(1 / r, 1 - 1.5 / n) / r" if mirrored else ""), run,
+        ("maps.depth", *SCALE),
         {"maps.t": Spec(SHEET, "1", "depth; the range where nothing is; 0 on empty maps", paper="E-VAL-05")},
         paper="E-VAL-05", exact=("maps.depth",), bugs=form.bugs("map_depths", *lists), variants=(form,))
 

@@ -80,7 +80,7 @@ def add_kmeans(recipe: Recipe, settings: Clusters, total: int) -> None:
     form = Form(literal.kmeans, {**READS, "illuminated": "extents.illuminated", "center": last[0], "axis": last[1]},
                 tuple(_clusters()), {**_metric(settings), "rounds": settings.rounds - ROUNDS})
     recipe.add("kmeans", "further rounds until no light changes its cluster", run,
-               (*LIGHTS, "extents.illuminated", *last), _clusters(), paper="VAL Sec. 5.1; A.6 P5",
+               (*LIGHTS, "extents.illuminated", *last), _clusters(), paper="VAL Sec. 5.1; docs/methods/val",
                exact=(*LIGHTS, *last), bugs=form.bugs("kmeans"), variants=(form,))
 
 
@@ -112,7 +112,7 @@ def _add_start(recipe: Recipe, count: int, total: int) -> None:
 
     form = Form(literal.kmeans_start, READS, tuple(_centers(0)), {"count": count})
     recipe.add("kmeans.start", "cluster k begins at light floor(k N / M)", run, LIGHTS, _centers(0),
-               paper="VAL Sec. 5.1; A.6 P5", exact=LIGHTS, bugs=form.bugs("kmeans_start"), variants=(form,))
+               paper="VAL Sec. 5.1; docs/methods/val", exact=LIGHTS, bugs=form.bugs("kmeans_start"), variants=(form,))
 
 
 def _centers(number: int) -> dict[str, Spec]:
@@ -164,7 +164,7 @@ def _add_means(recipe: Recipe, number: int) -> None:
 
     form = Form(literal.kmeans_means, {**READS, "of": of, "center": before[0], "axis": before[1]}, after)
     recipe.add(f"kmeans.means{number + 1}", "means of each cluster's lights; without lights a cluster stays", run,
-               (*LIGHTS, of, *before), _centers(number + 1), paper="VAL Sec. 5.1; A.6 P5", exact=before,
+               (*LIGHTS, of, *before), _centers(number + 1), paper="VAL Sec. 5.1; docs/methods/val", exact=before,
                bugs=form.bugs("kmeans_means"), variants=(form,))
 
 

@@ -62,7 +62,8 @@ def add_csm(recipe: Recipe, settings: ValSettings, csm: Csm) -> None:
 
     recipe.add("penumbra", "mean depth of the blockers in the search disc, and the disc of the penumbra", penumbra,
                (*PIXELS, *LIGHT, *SCALE, "series.weight", "series.bias", "search.pending", "search.means"),
-               {**penumbra_specs(), "penumbra.t": Spec(PLACE, "1", "depth of the pixel on the series' scale")},
+               {**penumbra_specs(),
+                "penumbra.t": Spec(PLACE, "1", "depth on the scale of the series, of all pending pixels")},
                paper="VAL Sec. 4.1, E-VAL-02, 04, 07", exact=("maps.center",),
                variants=(form,), bugs=(*form.bugs("penumbra", "region", *exact, of="val_visibility"),
                                              *form.bugs(*(("csm_penumbra", "shade") if exact else ()))))
@@ -111,13 +112,19 @@ def _add_means(recipe: Recipe, settings: ValSettings, csm: Csm, name: str, flag:
             made[k].reshape(channels, -1)[:, asked] = means[:channels, asked]
         return {f"{name}.means": made}
 
+    def by_shares(arrays: Arrays, _: Any) -> Arrays:  # coordinates of textures: rounded as numbers in [0, 1] are
+        region = np.array(arrays[f"{name}.region"], np.float64)
+        region[:, :2] = 2.0 * np.float32(0.5 * region[:, :2] + 0.5) - 1.0
+        return run({**arrays, f"{name}.region": region}, np.float64)
+
     read = "8 texels of two levels" if by_mips else "all texels"
     recipe.facts["mip"] = {"level": "max(0, log2(radius * texels a side) - 1)" if by_mips else "none"}
     recipe.add(f"{name}.means", f"means of the channels over the disc, by {read}", run,
                (flag, f"{name}.region", *levels),
                {f"{name}.means": Spec("area light, channel, row, column", "1",
                                       "means of the channels of basis.0 over the disc; 0 where none is asked for")},
-               paper="VAL Sec. 6", variants=(form,), bugs=form.bugs("means", mean.__name__))
+               paper="VAL Sec. 6", variants=(*((by_shares,) if by_mips else ()), form),
+               bugs=form.bugs("means", mean.__name__))
 
 
 def _chain(arrays: Arrays, csm: Csm, real: Any) -> tuple[Array, Series]:

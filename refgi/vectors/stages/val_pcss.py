@@ -1,4 +1,4 @@
-"""Stages of depth tests at pixels: blockers texel by texel, V by PCSS, PCF and the hard test (VAL Sec. 4.1; A.6 P4)."""
+"""Stages of depth tests at pixels: blockers texel by texel, V by PCSS, PCF and the hard test (VAL Sec. 4.1)."""
 
 from typing import Any
 
@@ -61,7 +61,7 @@ def add_pcss(recipe: Recipe, settings: ValSettings, pcss: Pcss) -> None:
     recipe.add("penumbra", "mean depth of the texels in the search disc that lie before the pixel's plane and within "
                "the cone from it to the light, and the disc of the penumbra", penumbra,
                (*PIXELS, *LIGHT, *own, "search.pending", "search.region"), penumbra_specs(),
-               paper="A.6 P4, E-VAL-14", variants=(form,), bugs=form.bugs(
+               paper="E-VAL-14; docs/methods/val_visibility", variants=(form,), bugs=form.bugs(
                    "pcss_penumbra", "penumbra", "region", *(("cone",) if by_default(settings) else ())))
     hard = ("hard.share",) if "hard.share" in recipe.specs else ()
 
@@ -81,7 +81,7 @@ def add_pcss(recipe: Recipe, settings: ValSettings, pcss: Pcss) -> None:
 
     recipe.add("visibility", "V: share of the texels of the penumbra's disc that do not hide the pixel, where shaded",
                share, (*PIXELS, *LIGHT, *own, "penumbra.shaded", "penumbra.region", *hard),
-               {"visibility.share": share_spec()}, paper="A.6 P4, E-VAL-14", variants=(final,),
+               {"visibility.share": share_spec()}, paper="E-VAL-14; docs/methods/val_visibility", variants=(final,),
                bugs=final.bugs("pcss"))
 
 
@@ -108,6 +108,6 @@ def add_binary(recipe: Recipe, name: str, texels: int) -> None:
     recipe.add(name, "V by one depth test, of area lights without extent; 1 elsewhere" if name == "hard" else
                f"V: share of {texels} x {texels} texels that do not hide the pixel; of one for lights without extent",
                of_both(run, share) if second else run, (*PIXELS, FACING, "maps.depth", *LIGHT, *second.values()),
-               {share: share_spec()}, paper="VAL-03; A.6 P4: receiver's plane, E-VAL-14", variants=(form,),
+               {share: share_spec()}, paper="E-VAL-14; docs/methods/val_visibility: PCF", variants=(form,),
                bugs=form.bugs("depth_tests", *(("kernel", f"kernel {texels}") if texels > 1 else ("texel",)),
                               *(("two_maps",) if second else ()), *(("hard",) if name == "hard" else ())))

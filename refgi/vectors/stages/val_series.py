@@ -56,7 +56,7 @@ def add_scale(recipe: Recipe, csm: Csm) -> None:
                                        "end": "series.range"}, SCALE[:2], {"kind": kind})
     others = (f"depth_scale/not {one}" for one in ("log_map", "map", "scene") if one != kind)
     unit = "depths per octave" if csm.depth_scale == "log_map" else "1/m"
-    recipe.add("scale", "scale on which the depths of each map are compared", run,
+    recipe.add("scale", "scale on which the depths of each map are compared; far / near counts as at least 1.05", run,
                ("maps.near", "maps.far", "maps.scene_far", "series.range"),
                {"scale.origin": Spec("area light", "m", "distance of depth 0; 0 for empty maps"),
                 "scale.slope": Spec("area light", unit, "depths per octave of distance or per metre; 0 on empty maps")},

@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # a file's tests run in one process, so that few kernels are compiled twice
 PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --durations 25 --durations-min 5
 
-.PHONY: demo test quick test-all check evidence bench stress mutate kit-score docs clean
+.PHONY: demo test quick test-for test-all check evidence bench stress mutate kit-score docs clean
 
 demo: $(VENV)/run.stamp
 	$(BIN)/refgi compare cornell_box --methods sii,multires,val,hssil --out out/
@@ -16,6 +16,9 @@ test: $(VENV)/dev.stamp
 
 quick: $(VENV)/dev.stamp
 	$(PYTEST) -m quick
+
+test-for: $(VENV)/dev.stamp
+	$(PYTEST) $$($(BIN)/python -m benchmarks.mutate.selection $(FILE))
 
 test-all: $(VENV)/dev.stamp
 	$(PYTEST) --all

@@ -1,10 +1,11 @@
-"""Which tests belong to a file of the sources."""
+"""Which tests belong to a file of the sources: `python -m benchmarks.mutate.selection FILE`, or `make test-for`."""
 
 import ast
+import sys
 from functools import cache
 from pathlib import Path, PurePosixPath
 
-from benchmarks.mutate.project import Project
+from benchmarks.mutate.project import REFGI, Project
 
 DOCTEST = ">>> "
 
@@ -72,3 +73,7 @@ def _is_of_method(project: Project, file: str, test: str) -> bool:
     method = project.method_of(file)
     methods = {name for name in project.methods.values() if _names(name, test)}
     return not method or not methods or method in methods
+
+
+if __name__ == "__main__":
+    print(*(test for file in sys.argv[1:] for test in tests_of(REFGI, file)))

@@ -11,8 +11,9 @@ from refgi.cli.session import Session, progress, say, table
 from refgi.cli.settings import preset
 
 if TYPE_CHECKING:
-    from refgi.vectors.manifest import KitManifest, Result, StageVerdict
+    from refgi.vectors.manifest import KitManifest
 
+LAYOUTS = ("planes", "rgba")
 SMALL, MAP = (64, 48), 64  # size of a picture and side of a light's map, where nothing is said
 
 
@@ -93,100 +94,61 @@ def _of_scene(options: dict[str, Any], out: Path, tell: Any) -> "KitManifest":
 @click.option("--chained", is_flag=True, help="The port has read its own outputs, not the kit's.")
 @click.option("--stage", "stages", multiple=True, metavar="NAME", help="Only stages whose name begins so; repeatable.")
 @click.option("--case", "cases", multiple=True, metavar="ID", help="Only cases whose id begins so; repeatable.")
-@click.option("--tier", "tiers", multiple=True, metavar="[STAGE=]TIER",
-              help="T0 equal, T1 float32 rounding, T2 storage in half floats, T2B in 8 bits; repeatable.")
+@click.option("--tier", "tiers", multiple=True, metavar="[NAME=]TIER",
+              help="Of a stage or an array: T0 equal, T1 float32 rounding, T2 storage in half floats, T2B in 8 bits, "
+                   "R11G11B10F, RGB9E5; repeatable.")
+@click.option("--depth", "depths", multiple=True, metavar="[ARRAY=]KIND:NEAR:FAR[:BITS]",
+              help="How depth is stored: linear, ndc (a depth buffer), gl (-1 to 1) or reversed, in 16, 24 or 32 (a "
+                   "float) bits  [24]; repeatable.")
+@click.option("--layout", type=click.Choice(LAYOUTS), default=LAYOUTS[0], show_default=True,
+              help="rgba: texels of up to four components, (h, w, 4) or (4, h, w), are taken too.")
+@click.option("--unordered", multiple=True, metavar="NAME",
+              help="Stages whose lists are in another order, such as lights; repeatable.")
+@click.option("--expect", "expect_file", metavar="FILE", help="Stages that may fail, [CASE/]STAGE a line.")
+@click.option("--require", multiple=True, metavar="NAME",
+              help="Cases, stages or CASE/STAGE that must have run, by their beginning, or all; repeatable.")
+@click.option("--fail-fast", is_flag=True, help="Stop at the first wrong stage.")
 @click.option("--search", "seconds", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
               help="Try single changes of the first wrong stage's literal text, for so long.")
+@click.option("--format", "form", type=click.Choice(["text", "github"]), default="text", show_default=True,
+              help="github: annotations of GitHub Actions.")
 @click.option("--json", "json_file", metavar="FILE", help="Write the verdicts as JSON.")
+@click.option("--junit", "junit_file", metavar="FILE", help="Write the verdicts as JUnit XML.")
 @click.option("--html", "html_file", metavar="FILE", help="Write a page with the arrays side by side.")
-def _check(
-    kit: str, output: str, chained: bool, stages: tuple[str, ...], cases: tuple[str, ...], tiers: tuple[str, ...],
-    seconds: float | None, json_file: str | None, html_file: str | None,
-) -> int:
+def _check(kit: str, output: str, **options: Any) -> int:
     """Judge the arrays in OUTPUT by KIT: the first wrong stage, its worst element, likely causes.
 
-    OUTPUT holds <case>/<array>.npy. Stages without arrays are not run and do not count, unless --stage asks for them.
+    OUTPUT holds <case>/<array>.npy. Stages without arrays are not run and do not count, unless --stage or --require
+    asks for them.
 
-    Exit codes: 0 all within their bounds, 1 a stage is out, 4 not comparable, 5 kit or output damaged.
+    Exit codes: 0 all within their bounds, 1 a stage is out, 2 a wrong option or no such OUTPUT, 4 not comparable (a
+    missing array, a wrong shape or type, an empty OUTPUT), 5 kit or output damaged.
     """
-    from refgi.vectors.check import DAMAGED, Asked, DamagedError, Kit, check_output
+    from refgi.vectors.check import DAMAGED, DamagedError, Kit, asked_from, check_output
+    from refgi.vectors.report import github, report, write_junit
 
-    asked = Asked(chained, stages, cases, tiers_of(tiers))
+    asked = asked_from(options)
     try:
         opened = Kit(Path(kit))
         result = check_output(opened, Path(output), asked)
-        if seconds is not None:
+        if options["seconds"] is not None:
             from refgi.vectors.search import searched
 
             with progress() as tell:
-                result = searched(opened, Path(output), asked, result, seconds=seconds, tell=tell)
-        if json_file is not None:
+                result = searched(opened, Path(output), asked, result, seconds=options["seconds"], tell=tell)
+        if options["json_file"] is not None:
             from refgi.image.whole import write_text
             from refgi.vectors.manifest import text_of
 
-            write_text(json_file, text_of(result))
-        if html_file is not None:
+            write_text(options["json_file"], text_of(result))
+        if options["junit_file"] is not None:
+            write_junit(options["junit_file"], result)
+        if options["html_file"] is not None:
             from refgi.vectors.page import write_page
 
-            write_page(html_file, opened, Path(output), result)
+            write_page(options["html_file"], opened, Path(output), result, asked)
     except DamagedError as error:
         say(str(error))
         return DAMAGED
-    click.echo(report(result))
+    click.echo(github(result) if options["form"] == "github" else report(result))
     return result.exit_code
-
-
-def tiers_of(texts: tuple[str, ...]) -> dict[str, str]:
-    """Return tiers by the beginning of stages' names, "" for all, from texts such as "T2" and "rsm=T2".
-
-    Raises
-    ------
-    UsageError
-        If a tier is none.
-    """
-    from refgi.vectors.check import TIERS
-
-    found = {}
-    for text in texts:
-        start, _, tier = text.rpartition("=")
-        if tier.upper() not in TIERS:
-            raise click.UsageError(f"--tier: expected [STAGE=]TIER with a tier of {', '.join(TIERS)}, got {text!r}")
-        found[start] = tier.upper()
-    return found
-
-
-def report(result: "Result") -> str:
-    """Return what people read: one line a stage that ran, then what is wrong, by kinds of stages."""
-    from refgi.vectors.words import stories
-
-    ran = [one for one in result.stages if one.verdict != "not-run"]
-    rows = [("case", "stage", "verdict", "worst / bound", "")]
-    rows += [(one.case, one.stage, one.verdict, _worst(one), _remark(one)) for one in ran]
-    lines = [table(rows)] if ran else []
-    for one in stories(result):
-        lines += ["", *one]
-    lines += ["", *(f"unknown: {one}" for one in result.unknown)] if result.unknown else []
-    if not ran:
-        lines.append("OUTPUT/<case>/<array>.npy is where arrays are looked for")
-    idle = len(result.stages) - len(ran)
-    tally = {kind: sum(one.verdict == kind for one in ran) for kind in ("exact", "within", "out", "invalid")}
-    counts = ", ".join(f"{count} {kind}" for kind, count in tally.items() if count)
-    lines += ["", f"{result.mode}: {counts or 'nothing to check'}" + (f"; {idle} stages not run" if idle else "")]
-    if result.first is not None:
-        lines.append(f"first wrong stage: {result.first[1]} of {result.first[0]}")
-    return "\n".join(lines)
-
-
-def _worst(stage: "StageVerdict") -> str:
-    ratios = [one.worst for one in stage.arrays if one.worst is not None]
-    if stage.verdict == "invalid" or (stage.verdict == "out" and not any(ratios)):
-        return ""
-    return f"{max(ratios):.3g}" if ratios else ""
-
-
-def _remark(stage: "StageVerdict") -> str:
-    masked = sum(one.masked for one in stage.arrays)
-    remarks = [f"{masked} edge elements differ"] if masked else []
-    remarks += ["made from wrong inputs"] if stage.upstream == "dirty" else []
-    remarks += [stage.causes[0].cause] if stage.causes else []
-    return "; ".join(remarks)

@@ -27,8 +27,8 @@ def table(rows: Sequence[tuple[str, ...]], *, right: frozenset[int] = frozenset(
     return "\n".join("  ".join(row).rstrip() for row in cells)
 
 
-def annotation(title: str, text: str) -> str:
-    r"""Return an error as GitHub Actions shows it beside a change.
+def annotation(title: str, text: str, kind: str = "error") -> str:
+    r"""Return an error or a warning as GitHub Actions shows it beside a change.
 
     Parameters
     ----------
@@ -36,6 +36,8 @@ def annotation(title: str, text: str) -> str:
         Its headline.
     text : str
         What is wrong.
+    kind : {"error", "warning"}
+        How bad it is.
 
     Returns
     -------
@@ -47,7 +49,7 @@ def annotation(title: str, text: str) -> str:
     >>> annotation("a: b", "50 %\nand more")
     '::error title=a%3A b::50 %25%0Aand more'
     """
-    return f"::error title={_escaped(title, ESCAPES | IN_TITLES)}::{_escaped(text, ESCAPES)}"
+    return f"::{kind} title={_escaped(title, ESCAPES | IN_TITLES)}::{_escaped(text, ESCAPES)}"
 
 
 def _escaped(text: str, escapes: dict[str, str]) -> str:

@@ -1,5 +1,6 @@
 """`refgi vectors`: stage-by-stage test vectors for ports, and the check of a port's arrays against them."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,11 +10,11 @@ from click.core import ParameterSource
 from refgi.cli.options import seen, shadows, speech
 from refgi.cli.session import Session, progress, say, table
 from refgi.cli.settings import preset
+from refgi.vectors.options import OPTIONS
 
 if TYPE_CHECKING:
     from refgi.vectors.manifest import KitManifest
 
-LAYOUTS = ("planes", "rgba")
 SMALL, MAP = (64, 48), 64  # size of a picture and side of a light's map, where nothing is said
 
 
@@ -88,32 +89,27 @@ def _of_scene(options: dict[str, Any], out: Path, tell: Any) -> "KitManifest":
     return export_case(case, out, tell, options["most"] * 1e6)
 
 
+def _shared(function: Callable[..., int]) -> Callable[..., int]:
+    """Add the options that a kit's check.py has too."""
+    for one in reversed(OPTIONS):
+        if not one.metavar:
+            add = click.option(one.flag, one.key, is_flag=True, help=one.help)
+        elif "|" in one.metavar:
+            choices = one.metavar.split("|")
+            add = click.option(one.flag, one.key, type=click.Choice(choices), default=choices[0], show_default=True,
+                               help=one.help)
+        else:
+            add = click.option(one.flag, one.key, multiple=one.many, metavar=one.metavar, help=one.help)
+        function = add(function)
+    return function
+
+
 @command.command("check")
 @click.argument("kit")
 @click.argument("output")
-@click.option("--chained", is_flag=True, help="The port has read its own outputs, not the kit's.")
-@click.option("--stage", "stages", multiple=True, metavar="NAME", help="Only stages whose name begins so; repeatable.")
-@click.option("--case", "cases", multiple=True, metavar="ID", help="Only cases whose id begins so; repeatable.")
-@click.option("--tier", "tiers", multiple=True, metavar="[NAME=]TIER",
-              help="Of a stage or an array: T0 equal, T1 float32 rounding, T2 storage in half floats, T2B in 8 bits, "
-                   "R11G11B10F, RGB9E5; repeatable.")
-@click.option("--depth", "depths", multiple=True, metavar="[ARRAY=]KIND:NEAR:FAR[:BITS]",
-              help="How depth is stored: linear, ndc (a depth buffer), gl (-1 to 1) or reversed, in 16, 24 or 32 (a "
-                   "float) bits  [24]; repeatable.")
-@click.option("--layout", type=click.Choice(LAYOUTS), default=LAYOUTS[0], show_default=True,
-              help="rgba: texels of up to four components, (h, w, 4) or (4, h, w), are taken too.")
-@click.option("--unordered", multiple=True, metavar="NAME",
-              help="Stages whose lists are in another order, such as lights; repeatable.")
-@click.option("--expect", "expect_file", metavar="FILE", help="Stages that may fail, [CASE/]STAGE a line.")
-@click.option("--require", multiple=True, metavar="NAME",
-              help="Cases, stages or CASE/STAGE that must have run, by their beginning, or all; repeatable.")
-@click.option("--fail-fast", is_flag=True, help="Stop at the first wrong stage.")
+@_shared
 @click.option("--search", "seconds", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
               help="Try single changes of the first wrong stage's literal text, for so long.")
-@click.option("--format", "form", type=click.Choice(["text", "github"]), default="text", show_default=True,
-              help="github: annotations of GitHub Actions.")
-@click.option("--json", "json_file", metavar="FILE", help="Write the verdicts as JSON.")
-@click.option("--junit", "junit_file", metavar="FILE", help="Write the verdicts as JUnit XML.")
 @click.option("--html", "html_file", metavar="FILE", help="Write a page with the arrays side by side.")
 def _check(kit: str, output: str, **options: Any) -> int:
     """Judge the arrays in OUTPUT by KIT: the first wrong stage, its worst element, likely causes.

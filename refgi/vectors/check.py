@@ -93,7 +93,7 @@ def asked_from(options: Mapping[str, Any]) -> Asked:
         tiers[start] = tier.upper()
     return Asked(options["chained"], tuple(options["stages"]), tuple(options["cases"]), tiers, options["layout"],
                  dict(map(depth_from, options["depths"])), tuple(options["unordered"]),
-                 lines_of(options["expect_file"]) if options["expect_file"] else (),
+                 lines_of(options["expect"]) if options["expect"] else (),
                  tuple("" if name == "all" else name for name in options["require"]), options["fail_fast"])
 
 

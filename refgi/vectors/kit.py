@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from refgi.errors import InputError, shortened
-from refgi.vectors.bugfile import FILE as BUGS
-from refgi.vectors.bugfile import Bugs
+from refgi.vectors.bugfile import BUGS, Bugs
 from refgi.vectors.manifest import KIT, CaseManifest, KitManifest, read_model
 from refgi.vectors.spec import Array
 from refgi.vectors.storage import Depth
@@ -33,7 +32,7 @@ class Asked:
     cases: tuple[str, ...] = ()  # the same of ids
     tiers: Mapping[str, str] = field(default_factory=dict)  # stage or array, or its beginning -> tier; "" is for all
     layout: str = "planes"  # or "rgba": texels of up to four components are taken too
-    depth: Mapping[str, Depth] = field(default_factory=dict)  # array or its beginning -> its storage; "": all depths
+    depth: Mapping[str, Depth] = field(default_factory=dict)  # array or beginning of NAME.depth -> its storage
     unordered: tuple[str, ...] = ()  # stages whose lists may be in another order
     expect: tuple[str, ...] = ()  # [CASE/]STAGE of those that may fail, with wildcards
     require: tuple[str, ...] = ()  # starts of CASE/STAGE or of stages' names that must have run; "" is for all
@@ -50,7 +49,8 @@ class Asked:
 
     def depth_of(self, array: str) -> Depth | None:
         """Return how a port stores the depth of an array; None where it is depth in m, or none."""
-        fitting = [start for start in self.depth if (fits(array, (start,)) if start else array.endswith(".depth"))]
+        named = array.endswith(".depth")
+        fitting = [start for start in self.depth if array == start or (named and fits(array, (start,)))]
         return self.depth[max(fitting, key=len)] if fitting else None
 
 

@@ -15,7 +15,7 @@ def report(result: Result) -> str:
     """Return what people read: one line a stage that ran, then what is wrong, by kinds of stages."""
     ran = [one for one in result.stages if one.verdict != "not-run"]
     rows = [("case", "stage", "verdict", "worst / bound", "")]
-    rows += [(one.case, one.stage, one.verdict, _worst(one), _remark(one)) for one in ran]
+    rows += [(one.case, one.stage, one.verdict, _largest(one), _remark(one)) for one in ran]
     lines = [table(rows)] if ran else []
     for one in stories(result):
         lines += ["", *one]
@@ -58,7 +58,7 @@ def github(result: Result) -> str:
     lines = [annotation(f"refgi: {one[0]}", "\n".join(one[1:])) for one in stories(result)]
     if result.missing:
         lines.append(annotation("refgi: required and not run", "\n".join(result.missing)))
-    lines += [annotation("refgi: expected to fail and does not", line) for line in result.passing]
+    lines += [annotation("refgi: expected to fail and does not", line, "warning") for line in result.passing]
     return "\n".join([*lines, *counts(result)])
 
 
@@ -104,7 +104,7 @@ def _test(stage: StageVerdict, required: set[str]) -> ElementTree.Element:
     return test
 
 
-def _worst(stage: StageVerdict) -> str:
+def _largest(stage: StageVerdict) -> str:
     ratios = [one.worst for one in stage.arrays if one.worst is not None]
     if stage.verdict == "invalid" or (stage.verdict == "out" and not any(ratios)):
         return ""

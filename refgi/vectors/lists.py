@@ -4,6 +4,7 @@ Elements are matched by their whole numbers (texel and map, cell of a subsplat),
 without any, by the nearest position and then the nearest values.
 """
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -58,7 +59,7 @@ def reordered(case: CaseManifest, name: str, array: Array, axis: str, order: Arr
 def _elements(case: CaseManifest, name: str, array: Array, axis: str) -> Array:
     """Return an array as (elements, numbers of each)."""
     rows = np.moveaxis(array, axes_of(case.arrays[name].axes).index(axis), 0)
-    return np.nan_to_num(rows.reshape(len(rows), -1).astype(np.float64))
+    return np.nan_to_num(rows.reshape(len(rows), math.prod(rows.shape[1:])).astype(np.float64))
 
 
 def _by_key(rows: Mapping[str, Array], whole: list[str], count: int) -> dict[tuple[float, ...], list[int]]:

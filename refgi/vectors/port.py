@@ -15,7 +15,7 @@ from refgi.vectors.kit import Asked, DamagedError, Kit, find_array, fits, read_a
 from refgi.vectors.lists import order_of, reordered
 from refgi.vectors.manifest import CaseManifest, StageEntry
 from refgi.vectors.spec import Array
-from refgi.vectors.storage import PACKED, can_pack, packed_steps, planes_of
+from refgi.vectors.storage import PACKED, PACKED_ROUNDING, can_pack, packed_steps, planes_of
 
 IN_ORDER = "its elements matched with those of the kit, as --unordered says"
 
@@ -103,15 +103,16 @@ class Port:
 
     def _note_storage(self, step: StageEntry, name: str, expected: Array) -> None:
         """Note what storage in few bits allows of an array, its own and that of what its stage reads."""
-        entry, size, steps = self.case.arrays[name], np.zeros(expected.shape), np.zeros(expected.shape)
+        entry, size, own, steps = self.case.arrays[name], np.zeros(expected.shape), 0.0, np.zeros(expected.shape)
         tier, depth = self.asked.tier_of(step.name, name), self.asked.depth_of(name)
         if entry.dtype == "<f4":
-            size = np.where(np.isfinite(expected), np.abs(expected), 0.0) + large_value(expected)
+            size = np.where(np.isfinite(expected), np.abs(expected), 0.0)
             if tier in PACKED and can_pack(entry):
-                steps = packed_steps(tier, entry, expected)
+                own, steps = PACKED_ROUNDING[tier], packed_steps(tier, entry, expected)
             elif depth is not None:
                 steps = depth.steps(expected)
-        own = float(np.divide(0.5 * steps, size, out=np.zeros(size.shape), where=size > 0).max(initial=0.0))
+                own = float((0.5 * steps[size > 0] / size[size > 0]).max(initial=0.0))
+            size = size + large_value(expected)
         read = max((self._rounding.get(one, 0.0) for one in step.reads if one not in step.exact), default=0.0)
         ratio = 0.0 if entry.half is None else read / HALF_ROUNDING
         changed = 0.0 if entry.half is None else max(entry.half.relative - (SAFETY - 1) * HALF_ROUNDING, 0.0)

@@ -196,3 +196,9 @@ def test_a_list_of_another_length_is_told_as_before(port):
 def test_names_that_nothing_has_are_refused(port, asked, said):
     with pytest.raises(InputError, match=said):
         port.check(**asked)
+
+
+def test_an_empty_list_has_no_order(kit, tmp_path):
+    port = Port(kit, "vpl-no-flux", tmp_path)
+    assert port.arrays["lights.position"].size == 0
+    assert port.check(unordered=("lights",)).verdict == "exact"

@@ -45,7 +45,7 @@ def write_page(file: str, kit: Kit, output: Path, result: Result, asked: Asked) 
     ran = [one for one in result.stages if one.verdict != "not-run"]
     size = 12 * sum(int(np.prod(manifests[one.case].arrays[array.name].shape)) for one in ran for array in one.arrays)
     shown = {"out"} if size > MOST_BYTES else {"out", "within", "exact"}
-    stages = {}
+    stages: dict[str, Any] = {}
     for case in manifests.values():
         port = Port(kit, case, output, asked)
         got = {step.name: port.read(step) for step in case.stages}

@@ -78,8 +78,8 @@ def write_junit(file: str, result: Result) -> None:
     for case in dict.fromkeys(one.case for one in result.stages):
         tests = [_test(one, required) for one in result.stages if one.case == case]
         kinds = {"failures": "failure", "errors": "error", "skipped": "skipped"}
-        suite = ElementTree.SubElement(root, "testsuite", name=case, tests=str(len(tests)), **{
-            key: str(sum(test.find(tag) is not None for test in tests)) for key, tag in kinds.items()})
+        found = {key: str(sum(test.find(tag) is not None for test in tests)) for key, tag in kinds.items()}
+        suite = ElementTree.SubElement(root, "testsuite", {"name": case, "tests": str(len(tests))} | found)
         suite.extend(tests)
     ElementTree.indent(root)
     try:

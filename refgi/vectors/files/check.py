@@ -8,6 +8,7 @@ output damaged.
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 from refgi.errors import InputError
 from refgi.vectors.check import DAMAGED, asked_from, check_output
@@ -29,7 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
             choices = one.metavar.split("|")
             parser.add_argument(one.flag, dest=one.key, help=one.help, choices=choices, default=choices[0])
         else:
-            how = {"action": "append", "default": []} if one.many else {}
+            how: dict[str, Any] = {"action": "append", "default": []} if one.many else {}
             parser.add_argument(one.flag, dest=one.key, help=one.help, metavar=one.metavar, **how)
     options = vars(parser.parse_args(arguments))
     try:

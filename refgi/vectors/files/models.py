@@ -1,11 +1,10 @@
 """As much of pydantic as the check needs: JSON to classes and back, unknown and missing keys refused."""
 
-import functools
 import json
 import types
 import typing
 
-_hints = functools.cache(typing.get_type_hints)
+HINTS: dict[typing.Any, dict[str, typing.Any]] = {}  # types of fields, by class
 
 
 class ValidationError(ValueError):
@@ -53,6 +52,12 @@ class BaseModel:
         """Return what differs from the defaults, as JSON has it."""
         return {name: _to_json(one) for name, one in vars(self).items()
                 if not hasattr(type(self), name) or getattr(type(self), name) != one}
+
+
+def _hints(cls: typing.Any) -> dict[str, typing.Any]:
+    if cls not in HINTS:
+        HINTS[cls] = typing.get_type_hints(cls)
+    return HINTS[cls]
 
 
 def _to_json(value: typing.Any) -> typing.Any:

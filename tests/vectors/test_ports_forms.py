@@ -170,6 +170,25 @@ def test_a_list_without_numbers_is_matched_by_the_nearest_position(port):
     assert {one.verdict for one in port.first(unordered=("lights",)).arrays} <= {"exact", "within", "invalid"}
 
 
+def test_a_wrong_value_does_not_move_an_element_of_a_list_without_numbers(port):
+    order = shuffled(port, LIST)
+    flux = port.arrays["lights.flux"].copy()
+    flux[:, 7] += 1e6
+    port.write("lights.flux", flux[:, order])
+    for name in ("lights.texel", "lights.map"):
+        port.remove(name)
+    verdicts = {one.name: (one.verdict, one.outside) for one in port.first(unordered=("lights",)).arrays}
+    assert verdicts["lights.flux"] == ("out", 3)
+    assert verdicts["lights.position"] == verdicts["lights.normal"] == ("exact", 0)
+
+
+def test_inputs_that_must_be_exact_widen_nothing(port):
+    step = next(one for one in port.case.stages if one.name == "sum")
+    assert "lights.position" in step.exact
+    port.write("sum.irradiance", 1.001 * port.arrays["sum.irradiance"])
+    assert port.check(tiers={"lights.position": "RGB9E5"}).first == ("sii-warp-a", "sum")
+
+
 def test_subsplats_in_another_order_and_all_made_of_them(kit, tmp_path):
     port = Port(kit, "multires-edge", tmp_path)
     order = np.random.default_rng(1).permutation(port.arrays["multires.level"].size)

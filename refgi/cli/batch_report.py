@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from refgi.cli.session import DONE, FAILED, Session, say
+from refgi.texts import annotation
 
 if TYPE_CHECKING:
     from refgi.batch.jobs import Job
@@ -12,9 +13,6 @@ if TYPE_CHECKING:
     from refgi.batch.thresholds import Finding
     from refgi.bench.results import Result
     from refgi.cli.session import Tell
-
-ESCAPES = {"%": "%25", "\r": "%0D", "\n": "%0A"}  # of GitHub's workflow commands
-IN_TITLES = {":": "%3A", ",": "%2C"}
 
 
 class Done(NamedTuple):
@@ -63,29 +61,6 @@ def say_done(session: Session, done: Done, form: str) -> int:
     lines += [] if github else [f"refgi report {done.out} shows times, errors and pictures"]
     session.result("\n".join(lines), content)
     return FAILED if done.failures or done.findings else DONE
-
-
-def annotation(title: str, text: str) -> str:
-    r"""Return an error as GitHub Actions shows it beside a change.
-
-    Parameters
-    ----------
-    title : str
-        Its headline.
-    text : str
-        What is wrong.
-
-    Returns
-    -------
-    str
-        A workflow command.
-
-    Examples
-    --------
-    >>> annotation("a: b", "50 %\nand more")
-    '::error title=a%3A b::50 %25%0Aand more'
-    """
-    return f"::error title={_escaped(title, ESCAPES | IN_TITLES)}::{_escaped(text, ESCAPES)}"
 
 
 def say_what_would_be(
@@ -221,7 +196,3 @@ def failures_of(result: "Result") -> dict[str, str]:
 def folder_of(baseline: str | None) -> str:
     """Return where the pictures of a baseline lie."""
     return str(Path(baseline).parent) if baseline else ""
-
-
-def _escaped(text: str, escapes: dict[str, Any]) -> str:
-    return "".join(escapes.get(character, character) for character in text)

@@ -9,11 +9,13 @@ import json
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import click
+
+from refgi.texts import table as table  # of the commands
 
 DONE, FAILED, USAGE, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 PERCENTAGE = re.compile(r"\d+(?= %)")
@@ -104,27 +106,6 @@ def say(text: str) -> None:
     """
     with contextlib.suppress(OSError):
         click.echo(f"refgi: {text}", file=sys.stderr)
-
-
-def table(rows: Sequence[tuple[str, ...]], *, right: frozenset[int] = frozenset()) -> str:
-    """Lay rows out as lines of aligned columns.
-
-    Parameters
-    ----------
-    rows : sequence of tuple of str
-        Equally many cells in each.
-    right : frozenset of int
-        Columns that are flush right.
-
-    Returns
-    -------
-    str
-        One line a row.
-    """
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    cells = ((cell.rjust(width) if i in right else cell.ljust(width)
-              for i, (cell, width) in enumerate(zip(row, widths, strict=True))) for row in rows)
-    return "\n".join("  ".join(row).rstrip() for row in cells)
 
 
 @contextmanager

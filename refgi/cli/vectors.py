@@ -1,5 +1,6 @@
 """`refgi vectors`: stage-by-stage test vectors for ports, and the check of a port's arrays against them."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,9 +10,10 @@ from click.core import ParameterSource
 from refgi.cli.options import seen, shadows, speech
 from refgi.cli.session import Session, progress, say, table
 from refgi.cli.settings import preset
+from refgi.vectors.options import OPTIONS
 
 if TYPE_CHECKING:
-    from refgi.vectors.manifest import KitManifest, Result, StageVerdict
+    from refgi.vectors.manifest import KitManifest
 
 SMALL, MAP = (64, 48), 64  # size of a picture and side of a light's map, where nothing is said
 
@@ -87,106 +89,62 @@ def _of_scene(options: dict[str, Any], out: Path, tell: Any) -> "KitManifest":
     return export_case(case, out, tell, options["most"] * 1e6)
 
 
+def _shared(function: Callable[..., int]) -> Callable[..., int]:
+    """Add the options that a kit's check.py has too."""
+    for one in reversed(OPTIONS):
+        if not one.metavar:
+            add = click.option(one.flag, one.key, is_flag=True, help=one.help)
+        elif "|" in one.metavar:
+            choices = one.metavar.split("|")
+            add = click.option(one.flag, one.key, type=click.Choice(choices), default=choices[0], show_default=True,
+                               help=one.help)
+        else:
+            add = click.option(one.flag, one.key, multiple=one.many, metavar=one.metavar, help=one.help)
+        function = add(function)
+    return function
+
+
 @command.command("check")
 @click.argument("kit")
 @click.argument("output")
-@click.option("--chained", is_flag=True, help="The port has read its own outputs, not the kit's.")
-@click.option("--stage", "stages", multiple=True, metavar="NAME", help="Only stages whose name begins so; repeatable.")
-@click.option("--case", "cases", multiple=True, metavar="ID", help="Only cases whose id begins so; repeatable.")
-@click.option("--tier", "tiers", multiple=True, metavar="[STAGE=]TIER",
-              help="T0 equal, T1 float32 rounding, T2 storage in half floats, T2B in 8 bits; repeatable.")
+@_shared
 @click.option("--search", "seconds", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
               help="Try single changes of the first wrong stage's literal text, for so long.")
-@click.option("--json", "json_file", metavar="FILE", help="Write the verdicts as JSON.")
 @click.option("--html", "html_file", metavar="FILE", help="Write a page with the arrays side by side.")
-def _check(
-    kit: str, output: str, chained: bool, stages: tuple[str, ...], cases: tuple[str, ...], tiers: tuple[str, ...],
-    seconds: float | None, json_file: str | None, html_file: str | None,
-) -> int:
+def _check(kit: str, output: str, **options: Any) -> int:
     """Judge the arrays in OUTPUT by KIT: the first wrong stage, its worst element, likely causes.
 
-    OUTPUT holds <case>/<array>.npy. Stages without arrays are not run and do not count, unless --stage asks for them.
+    OUTPUT holds <case>/<array>.npy. Stages without arrays are not run and do not count, unless --stage or --require
+    asks for them.
 
-    Exit codes: 0 all within their bounds, 1 a stage is out, 4 not comparable, 5 kit or output damaged.
+    Exit codes: 0 all within their bounds, 1 a stage is out, 2 a wrong option or no such OUTPUT, 4 not comparable (a
+    missing array, a wrong shape or type, an empty OUTPUT), 5 kit or output damaged.
     """
-    from refgi.vectors.check import DAMAGED, Asked, DamagedError, Kit, check_output
+    from refgi.vectors.check import DAMAGED, DamagedError, Kit, asked_from, check_output
+    from refgi.vectors.report import github, report, write_junit
 
-    asked = Asked(chained, stages, cases, tiers_of(tiers))
+    asked = asked_from(options)
     try:
         opened = Kit(Path(kit))
         result = check_output(opened, Path(output), asked)
-        if seconds is not None:
+        if options["seconds"] is not None:
             from refgi.vectors.search import searched
 
             with progress() as tell:
-                result = searched(opened, Path(output), asked, result, seconds=seconds, tell=tell)
-        if json_file is not None:
+                result = searched(opened, Path(output), asked, result, seconds=options["seconds"], tell=tell)
+        if options["json_file"] is not None:
             from refgi.image.whole import write_text
             from refgi.vectors.manifest import text_of
 
-            write_text(json_file, text_of(result))
-        if html_file is not None:
+            write_text(options["json_file"], text_of(result))
+        if options["junit_file"] is not None:
+            write_junit(options["junit_file"], result)
+        if options["html_file"] is not None:
             from refgi.vectors.page import write_page
 
-            write_page(html_file, opened, Path(output), result)
+            write_page(options["html_file"], opened, Path(output), result, asked)
     except DamagedError as error:
         say(str(error))
         return DAMAGED
-    click.echo(report(result))
+    click.echo(github(result) if options["form"] == "github" else report(result))
     return result.exit_code
-
-
-def tiers_of(texts: tuple[str, ...]) -> dict[str, str]:
-    """Return tiers by the beginning of stages' names, "" for all, from texts such as "T2" and "rsm=T2".
-
-    Raises
-    ------
-    UsageError
-        If a tier is none.
-    """
-    from refgi.vectors.check import TIERS
-
-    found = {}
-    for text in texts:
-        start, _, tier = text.rpartition("=")
-        if tier.upper() not in TIERS:
-            raise click.UsageError(f"--tier: expected [STAGE=]TIER with a tier of {', '.join(TIERS)}, got {text!r}")
-        found[start] = tier.upper()
-    return found
-
-
-def report(result: "Result") -> str:
-    """Return what people read: one line a stage that ran, then what is wrong, by kinds of stages."""
-    from refgi.vectors.words import stories
-
-    ran = [one for one in result.stages if one.verdict != "not-run"]
-    rows = [("case", "stage", "verdict", "worst / bound", "")]
-    rows += [(one.case, one.stage, one.verdict, _worst(one), _remark(one)) for one in ran]
-    lines = [table(rows)] if ran else []
-    for one in stories(result):
-        lines += ["", *one]
-    lines += ["", *(f"unknown: {one}" for one in result.unknown)] if result.unknown else []
-    if not ran:
-        lines.append("OUTPUT/<case>/<array>.npy is where arrays are looked for")
-    idle = len(result.stages) - len(ran)
-    tally = {kind: sum(one.verdict == kind for one in ran) for kind in ("exact", "within", "out", "invalid")}
-    counts = ", ".join(f"{count} {kind}" for kind, count in tally.items() if count)
-    lines += ["", f"{result.mode}: {counts or 'nothing to check'}" + (f"; {idle} stages not run" if idle else "")]
-    if result.first is not None:
-        lines.append(f"first wrong stage: {result.first[1]} of {result.first[0]}")
-    return "\n".join(lines)
-
-
-def _worst(stage: "StageVerdict") -> str:
-    ratios = [one.worst for one in stage.arrays if one.worst is not None]
-    if stage.verdict == "invalid" or (stage.verdict == "out" and not any(ratios)):
-        return ""
-    return f"{max(ratios):.3g}" if ratios else ""
-
-
-def _remark(stage: "StageVerdict") -> str:
-    masked = sum(one.masked for one in stage.arrays)
-    remarks = [f"{masked} edge elements differ"] if masked else []
-    remarks += ["made from wrong inputs"] if stage.upstream == "dirty" else []
-    remarks += [stage.causes[0].cause] if stage.causes else []
-    return "; ".join(remarks)

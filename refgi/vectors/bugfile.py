@@ -15,7 +15,7 @@ import pydantic
 
 from refgi.vectors.spec import Array
 
-FILE = "bugs.npz"
+BUGS = "bugs.npz"
 
 
 class Piece(pydantic.BaseModel):

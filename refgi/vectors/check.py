@@ -7,23 +7,32 @@ chained, from its own outputs, and the bounds are those of a chain.
 import itertools
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from refgi.errors import InputError
+from refgi.vectors.bounds import large_value
 from refgi.vectors.causes import EXPLAINED, Difference, explain, explained, places_of
+from refgi.vectors.expected import is_line_of, is_required, lines_of, passing_lines, require_lines_known
 from refgi.vectors.findings import CAUSES, findings
 from refgi.vectors.judge import Judged, judge, judge_estimate, unlike
-from refgi.vectors.kit import Asked, DamagedError, Kit, find_array, fits, places_of_case, read_array
+from refgi.vectors.kit import Asked, DamagedError, Kit, fits, places_of_case
+from refgi.vectors.lists import list_axis
 from refgi.vectors.manifest import ArrayVerdict, CaseManifest, Cause, Result, StageEntry, StageVerdict, Verdict
+from refgi.vectors.port import IN_ORDER, Got, Port
 from refgi.vectors.spec import Array
+from refgi.vectors.storage import PACKED, can_pack, depth_from, planes_of
 from refgi.vectors.words import did_you_mean
 
-__all__ = ["ALL_WITHIN", "DAMAGED", "NOT_COMPARABLE", "OUT", "TIERS", "Asked", "DamagedError", "Kit", "check_output",
-           "stage_of_array"]
+__all__ = ["ALL_WITHIN", "DAMAGED", "NOT_COMPARABLE", "OUT", "TIERS", "Asked", "DamagedError", "Kit", "asked_from",
+           "check_output", "stage_of_array"]
 
 ALL_WITHIN, OUT, NOT_COMPARABLE, DAMAGED = 0, 1, 4, 5
 TIERS = ("T0", "T1", "T2", "T2B")
+FORMATS = (*TIERS, *PACKED)
+WRONG = ("out", "invalid")
+FOLLOWS = "made from stages that are expected to fail"
 OF_A_KIT = ("cases", "scenes", "schema")  # folders beside the cases where a kit itself is checked
 ORDER: tuple[Verdict, ...] = ("out", "invalid", "within", "exact", "not-run")
 
@@ -55,34 +64,92 @@ def check_output(kit: Kit, output: Path, asked: Asked) -> Result:
     if not output.is_dir():
         raise InputError(f"{output}: expected a folder of a port's arrays, got none", file=str(output))
     cases = list(kit.cases(asked))
-    _require_known(kit, asked, {step.name for case in cases for step in case.stages})
+    _require_known(kit, asked, cases)
     verdicts: list[StageVerdict] = []
+    total = sum(asked.fits(step.name) for case in cases for step in case.stages)
     for case in cases:
-        wrong: set[str] = set()  # chained: arrays that are out, or made from such
-        for step in (step for step in case.stages if asked.fits(step.name)):
-            dirty = bool(wrong & set(step.reads))
-            verdict = check_stage(kit, case, step, output, asked, dirty=dirty)
-            if asked.chained and (dirty or verdict.verdict in ("out", "invalid")):
-                wrong.update(step.writes)
-            verdicts.append(verdict)
+        verdicts += _of_case(kit, case, output, asked)
+        if asked.fail_fast and any(map(_counts, verdicts)):
+            break
     if not verdicts:
         raise DamagedError(f"{kit.folder}: expected cases with stages, got none", file=str(kit.folder))
-    return _summed(kit, asked, cases, verdicts, output, _unknown(kit, cases, output))
+    result = _summed(kit, asked, cases, verdicts, output, _unknown(kit, cases, output))
+    return result.model_copy(update={"left": total - len(verdicts)})
 
 
-def _require_known(kit: Kit, asked: Asked, stages: set[str]) -> None:
-    """Refuse names of cases, stages and tiers that nothing has, with the nearest that there are."""
+def asked_from(options: Mapping[str, Any]) -> Asked:
+    """Return what the options of a command line ask for.
+
+    Raises
+    ------
+    InputError
+        If a tier or a depth is none, or the file of expected failures cannot be read.
+    """
+    tiers = {}
+    for text in options["tiers"]:
+        start, _, tier = text.rpartition("=")
+        if tier.upper() not in FORMATS:
+            raise InputError(f"--tier: expected [NAME=]TIER with a tier of {', '.join(FORMATS)}, got {text!r}")
+        tiers[start] = tier.upper()
+    return Asked(options["chained"], tuple(options["stages"]), tuple(options["cases"]), tiers, options["layout"],
+                 dict(map(depth_from, options["depths"])), tuple(options["unordered"]),
+                 lines_of(options["expect"]) if options["expect"] else (),
+                 tuple("" if name == "all" else name for name in options["require"]), options["fail_fast"])
+
+
+def _of_case(kit: Kit, case: CaseManifest, output: Path, asked: Asked) -> list[StageVerdict]:
+    """Judge the stages of a case that are asked for; until one is wrong where no more is asked for."""
+    port, verdicts = Port(kit, case, output, asked), []
+    wrong: dict[str, bool] = {}  # chained: arrays that are out, or made from such; whether that is expected
+    for step in case.stages:
+        if not asked.fits(step.name):
+            port.read(step)
+            continue
+        upstream = [wrong[name] for name in step.reads if name in wrong]
+        verdict = check_stage(port, step, dirty=bool(upstream))
+        if verdict.verdict in WRONG:
+            why = [f"expected to fail: {line}" for line in asked.expect if is_line_of(line, case.id, step.name)]
+            why += [FOLLOWS] if upstream and all(upstream) else []
+            verdict = verdict.model_copy(update={"excused": next(iter(why), "")})
+        if asked.chained and (upstream or verdict.verdict in WRONG):
+            wrong.update(dict.fromkeys(step.writes, bool(verdict.excused) or bool(upstream and all(upstream))))
+        verdicts.append(verdict)
+        if asked.fail_fast and _counts(verdict):
+            break
+    return verdicts
+
+
+def _counts(verdict: StageVerdict) -> bool:
+    """Return whether a stage is wrong and not expected to be."""
+    return verdict.verdict in WRONG and not verdict.excused
+
+
+def _require_known(kit: Kit, asked: Asked, cases: list[CaseManifest]) -> None:
+    """Refuse names of cases, stages and arrays that nothing has, with the nearest that there are."""
     ids = [entry.id for entry in kit.manifest.cases]
-    parts = {part for stage in stages for part in stage.split(".")}
+    stages = {step.name for case in cases for step in case.stages}
+    arrays = {name for case in cases for step in case.stages for name in step.writes}
+    packable = {one for case in cases for step in case.stages for name in step.writes if can_pack(case.arrays[name])
+                for one in (name, step.name)}
+    lists = {step.name for case in cases for step in case.stages if list_axis(case, step) is not None}
     for case in asked.cases:
         if not any(one.startswith(case) for one in ids):
             raise InputError(f"--case: expected the start of a case's id, got {case!r}{did_you_mean(case, ids)}")
-    for option, names in (("--stage", asked.stages), ("--tier", tuple(name for name in asked.tiers if name))):
+    where = f" of {', '.join(asked.cases)}" if asked.cases else ""
+    packed = [name for name, tier in asked.tiers.items() if tier in PACKED]
+    for option, what, names, known in (
+        ("--stage", "a stage's name", asked.stages, stages),
+        ("--tier", "a stage's or an array's name", [*asked.tiers], stages | arrays),
+        ("--tier", "the name of an array of three floats", packed, packable),
+        ("--depth", "an array's name", [*asked.depth], arrays),
+        ("--unordered", "the name of a stage that writes a list", asked.unordered, lists),
+    ):
         for name in names:
-            if not any(fits(stage, (name,)) for stage in stages):
-                where = f" of {', '.join(asked.cases)}" if asked.cases else ""
-                raise InputError(f"{option}: expected the start of a stage's name{where}, got {name!r}"
-                                 f"{did_you_mean(name, sorted(stages | parts))}")
+            if name and not any(fits(one, (name,)) for one in known):
+                parts = {part for one in known for part in one.split(".")}
+                raise InputError(f"{option}: expected the start of {what}{where}, got {name!r}"
+                                 f"{did_you_mean(name, sorted(known | parts))}")
+    require_lines_known(kit, asked)
 
 
 def _unknown(kit: Kit, cases: list[CaseManifest], output: Path) -> tuple[str, ...]:
@@ -101,48 +168,42 @@ def _summed(
     kit: Kit, asked: Asked, cases: list[CaseManifest], verdicts: list[StageVerdict], output: Path,
     unknown: tuple[str, ...],
 ) -> Result:
-    found = {one.verdict for one in verdicts}
+    counted = [one for one in verdicts if not one.excused]
+    found = {one.verdict for one in counted}
     begun = {one.case for one in verdicts if any(place.is_dir() for place in places_of_case(output, one.case))}
-    missing = asked.stages and any(one.verdict == "not-run" and one.case in begun for one in verdicts)
-    damaged = any(array.damaged for one in verdicts for array in one.arrays)
-    ran = found - {"not-run"}
-    incomparable = "invalid" in found or missing or not ran
+    absent = [one for one in verdicts if one.verdict == "not-run"]
+    missing = tuple(f"{one.case}/{one.stage}" for one in absent if is_required(asked.require, one.case, one.stage)
+                    or (asked.stages and one.case in begun))
+    damaged = any(array.damaged for one in counted for array in one.arrays)
+    incomparable = "invalid" in found or missing or len(absent) == len(verdicts)
     code = DAMAGED if damaged else OUT if "out" in found else NOT_COMPARABLE if incomparable else ALL_WITHIN
-    worst = next(verdict for verdict in ORDER if verdict in found)
+    worst: Verdict = next((verdict for verdict in ORDER if verdict in found), "within")
     manifests = {case.id: case for case in cases}
 
     def tried(verdict: StageVerdict) -> set[str]:
         return {bug.cause for bug in kit.bugs(manifests[verdict.case]).of(verdict.stage) if not bug.blind}
 
-    wrong = findings(verdicts, tried)
+    wrong = findings(counted, tried)
     return Result(kit=kit.manifest.kit, vectors=kit.manifest.vectors, mode="chained" if asked.chained else "isolated",
                   verdict=worst, exit_code=code, first=wrong[0].first if wrong else None, findings=wrong,
                   stages=tuple(one.model_copy(update={"causes": one.causes[:CAUSES]}) for one in verdicts),
-                  unknown=unknown)
+                  unknown=unknown, missing=missing, passing=passing_lines(asked.expect, verdicts))
 
 
-def check_stage(
-    kit: Kit, case: CaseManifest, step: StageEntry, output: Path, asked: Asked, *, dirty: bool
-) -> StageVerdict:
+def check_stage(port: Port, step: StageEntry, *, dirty: bool) -> StageVerdict:
     """Judge what a port has of one stage, with every cause; `dirty`: what it read is wrong already."""
-    got = {name: file for name in step.writes if (file := find_array(output, case.id, name)) is not None}
-    tier = asked.tier_of(step.name)
-    judged: dict[str, Judged] = {}
-    arrays: dict[str, Array] = {}
-    for name, file in got.items():
-        try:
-            arrays[name] = read_array(file)
-        except DamagedError as error:
-            fault = ArrayVerdict(name=name, verdict="invalid", tier=tier, said=str(error), damaged=True)
-            judged[name] = Judged(fault)
-    for name in arrays:
-        judged[name] = _judged(kit, case, name, arrays, tier, asked)
-    verdicts = [judged[name].verdict if name in judged else _not_run(name, tier, bool(got)) for name in step.writes]
+    got, asked = port.read(step), port.asked
+    tiers = {name: asked.tier_of(step.name, name) for name in step.writes}
+    judged = {name: Judged(ArrayVerdict(name=name, verdict="invalid", tier=tiers[name], said=why, damaged=True))
+              for name, why in got.damaged.items()}
+    judged |= {name: _judged(port, name, got, tiers[name]) for name in got.arrays}
+    verdicts = [judged[name].verdict if name in judged else _not_run(name, tiers[name], bool(judged))
+                for name in step.writes]
     kinds = {one.verdict for one in verdicts}
     verdict: Verdict = next(one for one in ORDER if one in kinds)
-    causes = _causes(kit, case, step, judged, arrays) if verdict in ("out", "invalid") and not dirty else []
+    causes = _causes(port, step, judged, got.arrays) if verdict in WRONG and not dirty else []
     upstream = ("dirty" if dirty else "clean") if asked.chained else "isolated"
-    return StageVerdict(case=case.id, stage=step.name, verdict=verdict, upstream=upstream,  # type: ignore[arg-type]
+    return StageVerdict(case=port.case.id, stage=step.name, verdict=verdict, upstream=upstream,  # type: ignore[arg-type]
                         arrays=tuple(verdicts), causes=tuple(causes))
 
 
@@ -165,7 +226,7 @@ def stage_of_array(kit: Kit, case: str, name: str, got: Array, tier: str = "T1")
         Name of an array that a stage of it writes.
     got : ndarray
         What the port has.
-    tier : {"T0", "T1", "T2", "T2B"}
+    tier : {"T0", "T1", "T2", "T2B", "R11G11B10F", "RGB9E5"}
         How near it must be.
 
     Returns
@@ -185,10 +246,12 @@ def stage_of_array(kit: Kit, case: str, name: str, got: Array, tier: str = "T1")
     if step is None:
         written = ", ".join(array for one in manifest.stages for array in one.writes)
         raise InputError(f"array: expected one of {written}, got {name!r}")
-    if tier not in TIERS:
-        raise InputError(f"tier: expected one of {', '.join(TIERS)}, got {tier!r}")
-    judged = _judged(kit, manifest, name, {name: got}, tier, Asked())
-    causes = _causes(kit, manifest, step, {name: judged}, {name: got}) if judged.verdict.verdict == "out" else []
+    if tier not in FORMATS:
+        raise InputError(f"tier: expected one of {', '.join(FORMATS)}, got {tier!r}")
+    port = Port(kit, manifest, Path(), Asked(tiers={name: tier}))
+    port.note_storage(step)
+    judged = _judged(port, name, Got({name: got}, {}, {}), tier)
+    causes = _causes(port, step, {name: judged}, {name: got}) if judged.verdict.verdict == "out" else []
     return StageVerdict(case=case, stage=step.name, verdict=judged.verdict.verdict, upstream="isolated",
                         arrays=(judged.verdict,), causes=tuple(causes[:CAUSES]))
 
@@ -204,9 +267,7 @@ def _ratios(kit: Kit, case: CaseManifest) -> dict[str, float]:
     return found
 
 
-def differences_of(
-    kit: Kit, case: CaseManifest, step: StageEntry, output: Path, asked: Asked
-) -> dict[str, Difference]:
+def differences_of(port: Port, step: StageEntry) -> dict[str, Difference]:
     """Return what is out of the arrays that a port has of one stage, by name.
 
     Raises
@@ -214,10 +275,11 @@ def differences_of(
     DamagedError
         If one cannot be read.
     """
-    files = {name: file for name in step.writes if (file := find_array(output, case.id, name)) is not None}
-    arrays = {name: read_array(file) for name, file in files.items()}
-    judged = {name: _judged(kit, case, name, arrays, asked.tier_of(step.name), asked) for name in arrays}
-    return _differing(kit, case, judged, arrays)
+    got = port.read_up_to(step)
+    for why in got.damaged.values():
+        raise DamagedError(why)
+    judged = {name: _judged(port, name, got, port.asked.tier_of(step.name, name)) for name in got.arrays}
+    return _differing(port.kit, port.case, judged, got.arrays)
 
 
 def _differing(
@@ -228,13 +290,33 @@ def _differing(
             and one.limit is not None}
 
 
-def _judged(
-    kit: Kit, case: CaseManifest, name: str, arrays: Mapping[str, Array], tier: str, asked: Asked
-) -> Judged:
+def _judged(port: Port, name: str, got: Got, tier: str) -> Judged:
+    """Judge an array; in isolated mode in its own order, or in that of a list that its stage reads."""
+    judged = _of_array(port, name, got.arrays, tier)
+    if judged.verdict.verdict == "out" and IN_ORDER not in got.read.get(name, ""):
+        array = port.in_order_of_lists(name, got.arrays[name])
+        other = judged if array is None else _of_array(port, name, {**got.arrays, name: array}, tier)
+        if array is not None and other.verdict.verdict != "out":
+            judged, got.arrays[name], got.read[name] = other, array, IN_ORDER
+    more = {"read": got.read[name]} if name in got.read else {}
+    if judged.verdict.verdict == "out" and _may_be_buffer(port, name, got.arrays[name]):
+        more["said"] = "a depth buffer? --depth says how it is stored"
+    return judged._replace(verdict=judged.verdict.model_copy(update=more))
+
+
+def _may_be_buffer(port: Port, name: str, got: Array) -> bool:
+    """Return whether an array that should hold depth in m holds numbers of a depth buffer."""
+    return (name.endswith(".depth") and port.asked.depth_of(name) is None and bool((np.abs(got) <= 1.0).all())
+            and large_value(port.kit.array(port.case, name)) > 1.0)
+
+
+def _of_array(port: Port, name: str, arrays: Mapping[str, Array], tier: str) -> Judged:
+    kit, case, asked = port.kit, port.case, port.asked
     entry, got = case.arrays[name], arrays[name]
     fault = unlike(name, tier, entry, got)
     if fault is not None:
-        return Judged(fault)
+        hint = "; --layout rgba takes it" if planes_of(entry, got)[1] else ""
+        return Judged(fault.model_copy(update={"said": fault.said + hint}))
     expected = kit.array(case, name)
     if entry.dtype == "|b1":
         got = got.astype(np.bool_)
@@ -247,7 +329,17 @@ def _judged(
         tolerance = few_bits.model_copy(update={"outliers": outliers})
     limit = kit.extra(case, entry.bound) if entry.bound is not None else None
     masked = kit.extra(case, entry.masked) if entry.masked is not None else None
-    return judge(name, expected, got, "T0" if entry.tier == "T0" else tier, limit, masked, tolerance)
+    base, few = "T0" if entry.tier == "T0" else tier, port.few.get(name)
+    if few is None:
+        return judge(name, expected, got, base, limit, masked, tolerance)
+    outliers = few.outliers
+    if tolerance is not None:
+        size = np.where(np.isfinite(expected), np.abs(expected), 0.0) + tolerance.large
+        limit, masked, outliers = tolerance.relative * size, None, outliers + tolerance.outliers
+    judged = judge(name, expected, got, base, few.more + (0.0 if limit is None else limit), masked, None)
+    if judged.verdict.verdict == "out" and judged.verdict.outside <= outliers * expected.size:
+        return judged._replace(verdict=judged.verdict.model_copy(update={"verdict": "within"}))
+    return judged
 
 
 def _judged_estimate(kit: Kit, case: CaseManifest, name: str, arrays: Mapping[str, Array], expected: Array) -> Judged:
@@ -261,9 +353,10 @@ def _judged_estimate(kit: Kit, case: CaseManifest, name: str, arrays: Mapping[st
 
 
 def _causes(
-    kit: Kit, case: CaseManifest, step: StageEntry, judged: Mapping[str, Judged], arrays: Mapping[str, Array]
+    port: Port, step: StageEntry, judged: Mapping[str, Judged], arrays: Mapping[str, Array]
 ) -> list[Cause]:
     """Return the causes that explain a stage's difference: the stage's own likely bugs first, then any array's."""
+    kit, case = port.kit, port.case
     differing = _differing(kit, case, judged, arrays)
     shapes = {name: array.shape for name, array in arrays.items()}
     found, bugs = [], kit.bugs(case)

@@ -18,8 +18,7 @@ import numpy as np
 
 from refgi.errors import InputError, expect
 from refgi.vectors.bounds import Bound, Budget, chained_budgets, distance, isolated_bounds, stored_budgets
-from refgi.vectors.bugfile import FILE as BUGS
-from refgi.vectors.bugfile import BugEntry, BugWriter, Told
+from refgi.vectors.bugfile import BUGS, BugEntry, BugWriter, Told
 from refgi.vectors.cases import kit_cases
 from refgi.vectors.manifest import (
     CASE,
@@ -37,6 +36,7 @@ from refgi.vectors.manifest import (
 )
 from refgi.vectors.scenefile import is_plain, write_scene
 from refgi.vectors.spec import Array, Arrays, Bug, Case, Stage, expected_of, kind_of, outputs_of, stored
+from refgi.vectors.standalone import standalone_text
 
 SEED = 20090101  # of the changes that bounds are measured by
 TOLD_BY, BESIDE = 96, 32  # elements of a likely bug that are kept: those that tell it, and others
@@ -284,3 +284,4 @@ def _write_frame(folder: Path, made: KitManifest) -> None:
     (folder / KIT).write_text(text_of(made), encoding="utf-8", newline="\n")
     for name in ("README.md", "CHANGES.md"):
         (folder / name).write_bytes(resources.files("refgi.vectors").joinpath("files", name).read_bytes())
+    (folder / "check.py").write_text(standalone_text(), encoding="utf-8", newline="\n")

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from refgi.errors import InputError, shortened
-from refgi.vectors.bugfile import FILE as BUGS
-from refgi.vectors.bugfile import Bugs
+from refgi.vectors.bugfile import BUGS, Bugs
 from refgi.vectors.manifest import KIT, CaseManifest, KitManifest, read_model
 from refgi.vectors.spec import Array
+from refgi.vectors.storage import Depth
 
 MAGIC = b"\x93NUMPY"
 LONGEST_NAME = 250  # bytes; .npy follows it
@@ -30,16 +30,28 @@ class Asked:
     chained: bool = False
     stages: tuple[str, ...] = ()  # names or their beginnings; all where empty
     cases: tuple[str, ...] = ()  # the same of ids
-    tiers: Mapping[str, str] = field(default_factory=dict)  # stage's name or its beginning -> tier; "" is for all
+    tiers: Mapping[str, str] = field(default_factory=dict)  # stage or array, or its beginning -> tier; "" is for all
+    layout: str = "planes"  # or "rgba": texels of up to four components are taken too
+    depth: Mapping[str, Depth] = field(default_factory=dict)  # array or beginning of NAME.depth -> its storage
+    unordered: tuple[str, ...] = ()  # stages whose lists may be in another order
+    expect: tuple[str, ...] = ()  # [CASE/]STAGE of those that may fail, with wildcards
+    require: tuple[str, ...] = ()  # starts of CASE/STAGE or of stages' names that must have run; "" is for all
+    fail_fast: bool = False  # stop at the first wrong stage
 
     def fits(self, stage: str) -> bool:
         """Return whether a stage is asked for: by its beginning, or by what follows a dot."""
         return not self.stages or fits(stage, self.stages)
 
-    def tier_of(self, stage: str) -> str:
-        """Return the tier of a stage's floats: that of the longest name that asks for it."""
-        fitting = [start for start in self.tiers if fits(stage, (start,))]
+    def tier_of(self, stage: str, array: str) -> str:
+        """Return the tier of an array of a stage: that of the longest name that asks for either."""
+        fitting = [start for start in self.tiers if fits(stage, (start,)) or fits(array, (start,))]
         return self.tiers[max(fitting, key=len)] if fitting else "T1"
+
+    def depth_of(self, array: str) -> Depth | None:
+        """Return how a port stores the depth of an array; None where it is depth in m, or none."""
+        named = array.endswith(".depth")
+        fitting = [start for start in self.depth if array == start or (named and fits(array, (start,)))]
+        return self.depth[max(fitting, key=len)] if fitting else None
 
 
 def fits(stage: str, names: tuple[str, ...]) -> bool:

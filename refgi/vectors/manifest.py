@@ -113,6 +113,7 @@ class ArrayVerdict(_Strict):
     masked: int = 0  # masked elements that differ
     said: str = ""  # why it is invalid
     damaged: bool = False  # its file cannot be read
+    read: str = ""  # how it was read where it does not lie as the kit's: texels, stored depth, another order
 
 
 class Cause(_Strict):
@@ -132,6 +133,7 @@ class StageVerdict(_Strict):
     upstream: Literal["clean", "dirty", "isolated"]
     arrays: tuple[ArrayVerdict, ...]
     causes: tuple[Cause, ...] = ()
+    excused: str = ""  # wrong, and does not count: why
 
 
 class CommonCause(_Strict):
@@ -165,6 +167,9 @@ class Result(_Strict):
     findings: tuple[Finding, ...]
     stages: tuple[StageVerdict, ...]
     unknown: tuple[str, ...] = ()  # what the output holds that the kit does not know
+    missing: tuple[str, ...] = ()  # stages that must have run and have not: CASE/STAGE
+    passing: tuple[str, ...] = ()  # lines of expected failures none of whose stages fails
+    left: int = 0  # stages not looked at after the first wrong one
 
 
 SCHEMAS: dict[str, type[_Strict]] = {"kit.json": KitManifest, "manifest.json": CaseManifest, "result.json": Result}

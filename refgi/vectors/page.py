@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 
 from refgi.image.whole import write_text
-from refgi.vectors.kit import Asked, Kit, find_array, read_array
-from refgi.vectors.manifest import ArrayVerdict, CaseManifest, Result, StageVerdict
+from refgi.vectors.kit import Asked, Kit
+from refgi.vectors.manifest import ArrayVerdict, Result, StageVerdict
+from refgi.vectors.port import Got, Port
 from refgi.vectors.spec import Array
 
 FILES = Path(__file__).with_name("files")
 MOST_BYTES = 24_000_000  # of arrays in a page; beyond that only those that are out are shown
 
 
-def write_page(file: str, kit: Kit, output: Path, result: Result) -> None:
+def write_page(file: str, kit: Kit, output: Path, result: Result, asked: Asked) -> None:
     """Write the page, whole or not at all.
 
     Parameters
@@ -30,6 +31,8 @@ def write_page(file: str, kit: Kit, output: Path, result: Result) -> None:
         The port's arrays.
     result : Result
         What was found.
+    asked : Asked
+        How the port's arrays are read.
 
     Raises
     ------
@@ -42,7 +45,12 @@ def write_page(file: str, kit: Kit, output: Path, result: Result) -> None:
     ran = [one for one in result.stages if one.verdict != "not-run"]
     size = 12 * sum(int(np.prod(manifests[one.case].arrays[array.name].shape)) for one in ran for array in one.arrays)
     shown = {"out"} if size > MOST_BYTES else {"out", "within", "exact"}
-    stages = {f"{one.case}/{one.stage}": _stage(kit, manifests[one.case], output, one, shown) for one in ran}
+    stages: dict[str, Any] = {}
+    for case in manifests.values():
+        port = Port(kit, case, output, asked)
+        got = {step.name: port.read(step) for step in case.stages}
+        stages |= {f"{case.id}/{one.stage}": _stage(port, one, got[one.stage], shown) for one in ran
+                   if one.case == case.id}
     first = "/".join(result.first) if result.first else next(iter(stages), "")
     wrong = {one.case for one in ran if one.verdict in ("out", "invalid")}
     cases = [{"id": case.id, "what": case.what, "open": not wrong or case.id in wrong,
@@ -57,25 +65,28 @@ def write_page(file: str, kit: Kit, output: Path, result: Result) -> None:
                                      script=safe(script), version=version("refgi")))
 
 
-def _stage(kit: Kit, case: CaseManifest, output: Path, verdict: StageVerdict, shown: set[str]) -> dict[str, Any]:
-    entry = next(step for step in case.stages if step.name == verdict.stage)
+def _stage(port: Port, verdict: StageVerdict, got: Got, shown: set[str]) -> dict[str, Any]:
+    entry = next(step for step in port.case.stages if step.name == verdict.stage)
     return {"verdict": verdict.verdict, "what": entry.what, "paper": entry.paper,
             "causes": [cause.model_dump() for cause in verdict.causes],
-            "arrays": [_array(kit, case, output, one, shown) for one in verdict.arrays]}
+            "arrays": [_array(port, one, got, shown) for one in verdict.arrays]}
 
 
-def _array(kit: Kit, case: CaseManifest, output: Path, verdict: ArrayVerdict, shown: set[str]) -> dict[str, Any]:
-    entry = case.arrays[verdict.name]
+def _array(port: Port, verdict: ArrayVerdict, got: Got, shown: set[str]) -> dict[str, Any]:
+    entry = port.case.arrays[verdict.name]
     told = {"name": verdict.name, "verdict": verdict.verdict, "worst": verdict.worst, "element": verdict.element,
             "expected_value": verdict.expected, "got_value": verdict.got, "bound": verdict.bound,
-            "outside": verdict.outside, "said": verdict.said, "axes": entry.axes, "unit": entry.unit,
-            "what": entry.what, "shape": entry.shape, "got": None}
-    file = find_array(output, case.id, verdict.name)
-    if verdict.verdict not in shown or file is None or not np.prod(entry.shape):
+            "outside": verdict.outside, "said": "; ".join(filter(None, (verdict.said, verdict.read))),
+            "axes": entry.axes, "unit": entry.unit, "what": entry.what, "shape": entry.shape, "got": None}
+    array = got.arrays.get(verdict.name)
+    if verdict.verdict not in shown or array is None or not np.prod(entry.shape):
         return told
-    expected = kit.array(case, verdict.name)
-    limit = kit.extra(case, entry.bound) if entry.bound is not None else np.zeros(entry.shape)
-    return told | {"expected": _text(expected), "got": _text(read_array(file)), "limit": _text(limit)}
+    if verdict.read and verdict.read != got.read.get(verdict.name):
+        moved = port.in_order_of_lists(verdict.name, array)
+        array = array if moved is None else moved
+    expected = port.kit.array(port.case, verdict.name)
+    limit = port.kit.extra(port.case, entry.bound) if entry.bound is not None else np.zeros(entry.shape)
+    return told | {"expected": _text(expected), "got": _text(array), "limit": _text(limit)}
 
 
 def _text(array: Array) -> str:

@@ -27,6 +27,7 @@ from refgi.vectors.edits import Function, called_by, code_of, compiled
 from refgi.vectors.findings import CAUSES
 from refgi.vectors.kit import Asked, Kit
 from refgi.vectors.manifest import CaseManifest, Cause, CommonCause, Result, StageVerdict
+from refgi.vectors.port import Port
 from refgi.vectors.rows import Form
 from refgi.vectors.spec import Array, as_read, kind_of, stored
 
@@ -157,7 +158,7 @@ class Trial:
     def __init__(self, kit: Kit, asked: Asked, output: Path, case: str, stage: str) -> None:
         manifest = next(one for one in kit.cases(Asked(cases=(case,))) if one.id == case)
         step = next(one for one in manifest.stages if one.name == stage)
-        self._wrong = differences_of(kit, manifest, step, output, asked)
+        self._wrong = differences_of(Port(kit, manifest, output, asked), step)
         self._limits = {name: _limit(kit, manifest, name) for name in step.writes}
         made = next(one for one in kit_cases(kit.manifest.kit)[case]().stages if one.name == stage)
         self._form = next((one for one in made.variants if isinstance(one, Form)), None)

@@ -1,0 +1,223 @@
+"""What a GPU gives back: texels, packed floats, stored depth, lists that atomics have put into another order."""
+
+import numpy as np
+import pytest
+
+from refgi.errors import InputError
+from refgi.vectors.check import ALL_WITHIN, NOT_COMPARABLE, OUT
+from refgi.vectors.storage import Depth
+from tests.vectors.port import Port
+
+
+@pytest.fixture
+def port(kit, tmp_path):
+    return Port(kit, "sii-warp-a", tmp_path)
+
+
+def texels(planes, alpha):
+    """Return planes (c, h, w) as (h, w, 4)."""
+    rest = np.full((4 - len(planes), *planes.shape[1:]), alpha)
+    return np.moveaxis(np.concatenate([planes, rest]), 0, -1)
+
+
+def test_readbacks_of_texels_are_taken_where_they_are_asked_for(port):
+    for name, array in port.arrays.items():
+        if array.ndim == 3:
+            port.write(name, texels(array, 1.0))
+    result = port.check()
+    assert result.exit_code == NOT_COMPARABLE
+    (wrong,) = [one for one in port.first().arrays if one.name == "gbuffer.position"]
+    assert wrong.said.endswith("; --layout rgba takes it")
+    result = port.check(layout="rgba")
+    assert (result.verdict, result.exit_code) == ("exact", ALL_WITHIN)
+    read = {array.name: array.read for one in result.stages for array in one.arrays}
+    assert read["gbuffer.normal"] == "read as texels (18, 24, 4), without component 4"
+    assert read["gbuffer.depth"] == ""
+    port.write("rsm0.flux", texels(port.arrays["rsm0.flux"][::-1], 1.0))
+    assert port.check(layout="rgba").first == ("sii-warp-a", "rsm0.flux")
+    assert "order bgr" in port.first(layout="rgba").causes[0].cause
+
+
+def to_r11g11b10f(colours):
+    """Return the numbers of the format below colours: 6, 6 and 5 bits of mantissa."""
+    bits = np.array([6, 6, 5]).reshape(3, *[1] * (colours.ndim - 1))
+    step = 2.0 ** (np.floor(np.log2(np.maximum(colours, 2.0**-14))) - bits)
+    return np.floor(colours / step) * step
+
+
+@pytest.mark.parametrize("tiers", [{"rsm0.flux": "R11G11B10F"}, {"flux": "R11G11B10F"}, {"": "R11G11B10F"}])
+def test_packed_floats_pass_their_tier_and_bugs_do_not(port, tiers):
+    flux = port.arrays["rsm0.flux"]
+    port.write("rsm0.flux", to_r11g11b10f(flux.astype(float)))
+    assert port.check().exit_code == OUT
+    assert port.check(tiers={"": "T2"}).exit_code == OUT
+    assert port.check(tiers=tiers).exit_code == ALL_WITHIN
+    for wrong in (1.05 * flux, flux[::-1], flux * (flux < flux.max())):
+        port.write("rsm0.flux", to_r11g11b10f(wrong.astype(float)))
+        assert port.check(tiers=tiers).first == ("sii-warp-a", "rsm0.flux")
+    port.write("rsm0.flux", -flux)
+    assert port.check(tiers=tiers).exit_code == OUT
+
+
+def test_a_shared_exponent_passes_its_tier(port):
+    flux = port.arrays["lights.flux"].astype(float)
+    step = 2.0 ** (np.floor(np.log2(np.maximum(flux.max(axis=0), 2.0**-16) * 512 / 511.5)) + 1 - 9)
+    port.write("lights.flux", np.rint(flux / step) * step)
+    assert port.check().exit_code == OUT
+    assert port.check(tiers={"lights.flux": "RGB9E5"}).exit_code == ALL_WITHIN
+    assert port.check(tiers={"lights.flux": "R11G11B10F"}).exit_code == OUT  # small beside large: a larger step
+    port.write("lights.flux", to_r11g11b10f(flux))
+    assert port.check(tiers={"lights.flux": "RGB9E5"}).exit_code == OUT
+
+
+@pytest.mark.parametrize("chained", [False, True])
+def test_a_stage_that_reads_packed_floats_may_change_as_they_do(port, chained):
+    """The sum of the lights whose flux the format has cut; a missing 1/pi shows."""
+    flux = port.arrays["lights.flux"].astype(float)
+    packed = to_r11g11b10f(flux)
+    share = np.divide(packed, flux, out=np.ones_like(flux), where=flux > 0)
+    total = port.arrays["sum.irradiance"] * share.min(axis=1)[:, None, None]  # all cut as the worst
+    port.write("lights.flux", packed)
+    port.write("sum.irradiance", total)
+    asked = {"tiers": {"lights.flux": "R11G11B10F"}, "chained": chained}
+    assert share.min() < 0.985
+    assert port.check(**asked).exit_code == ALL_WITHIN
+    assert port.check(chained=chained).exit_code == OUT
+    port.write("sum.irradiance", 1.5 * total)
+    assert port.check(**asked).first == ("sii-warp-a", "sum")
+    port.write("sum.irradiance", port.arrays["sum.irradiance"])
+    port.write("lights.area", 1.001 * port.arrays["lights.area"])  # of texels
+    assert port.check(tiers={"rsm0.lobe_flux": "R11G11B10F"}).first == ("sii-warp-a", "footprints")
+
+
+@pytest.mark.parametrize("encoding", ["linear", "ndc", "gl", "reversed"])
+def test_stored_depth_is_judged_in_metres(port, encoding):
+    near, far = 0.1, 100.0
+    z = port.arrays["gbuffer.depth"].astype(float)
+    with np.errstate(invalid="ignore"):
+        d = {"linear": (z - near) / (far - near), "reversed": near * (far - z) / (z * (far - near))}.get(
+            encoding, far * (z - near) / (z * (far - near)))
+    d = np.where(np.isinf(z), 0.0 if encoding == "reversed" else 1.0, d)
+    kept = np.round(d * (2**24 - 1)) / (2**24 - 1)
+    port.write("gbuffer.depth", 2 * kept - 1 if encoding == "gl" else kept)
+    assert port.check().first == ("sii-warp-a", "gbuffer.surface")
+    assert any(one.said == "a depth buffer? --depth says how it is stored" for one in port.first().arrays)
+    asked = {"depth": {"gbuffer.depth": Depth(encoding, near, far)}}
+    assert port.check(**asked).exit_code == ALL_WITHIN
+    (said,) = [one.read for one in port.check(**asked).stages[1].arrays if one.name == "gbuffer.depth"]
+    assert said == f"from {encoding} depth"
+    assert port.check(depth={"gbuffer.depth": Depth(encoding, near, 2 * far)}).exit_code == OUT
+    port.write("gbuffer.depth", kept[::-1])
+    assert port.check(**asked).exit_code == OUT
+
+
+LIST = ("lights.position", "lights.normal", "lights.flux", "lights.lobe_flux", "lights.lobe_axis",
+        "lights.lobe_exponent", "lights.texel", "lights.map")
+
+
+def shuffled(port, names, seed=5):
+    order = np.random.default_rng(seed).permutation(port.arrays["lights.texel"].size)
+    for name in names:
+        port.write(name, port.arrays[name][..., order])
+    return order
+
+
+def test_a_list_in_another_order_is_matched_by_its_texels(port):
+    shuffled(port, LIST)
+    assert port.check().first == ("sii-warp-a", "lights")
+    result = port.check(unordered=("lights",))
+    assert (result.verdict, result.exit_code) == ("exact", ALL_WITHIN)  # areas of the kit's lights, in their order
+    (read,) = {array.read for one in result.stages for array in one.arrays if one.stage == "lights"}
+    assert read == "its elements matched with those of the kit, as --unordered says"
+
+
+@pytest.mark.parametrize("chained", [False, True])
+def test_what_a_list_indexes_is_matched_with_it(port, chained):
+    order = shuffled(port, (*LIST, "lights.area"))
+    assert port.check(unordered=("lights",), chained=chained).verdict == "exact"
+    port.write("lights.area", port.arrays["lights.area"])  # as if the port had read the kit's lights
+    assert (port.check(unordered=("lights",), chained=chained).exit_code == OUT) == chained
+    port.write("lights.area", 1.5 * port.arrays["lights.area"][order])
+    assert port.check(unordered=("lights",), chained=chained).first == ("sii-warp-a", "footprints")
+
+
+def test_wrong_elements_of_a_list_in_another_order_are_out(port):
+    order = shuffled(port, LIST)
+    flux = port.arrays["lights.flux"].copy()
+    flux[:, 7] *= 2
+    port.write("lights.flux", flux[:, order])
+    wrong = next(one for one in port.first(unordered=("lights",)).arrays if one.verdict == "out")
+    assert (wrong.name, wrong.outside, wrong.element[1]) == ("lights.flux", 3, 7)
+    texel = port.arrays["lights.texel"].copy()
+    texel[4] += 1000
+    port.write("lights.texel", texel[order])
+    wrong = next(one for one in port.first(unordered=("lights",)).arrays if one.name == "lights.texel")
+    assert (wrong.outside, wrong.element) == (1, (4,))
+
+
+def test_a_list_without_numbers_is_matched_by_the_nearest_position(port):
+    rng = np.random.default_rng(2)
+    shuffled(port, LIST)
+    for name in ("lights.texel", "lights.map"):
+        port.remove(name)
+    stage = port.first(unordered=("lights",))
+    assert {one.name: one.verdict for one in stage.arrays} == {name: "exact" for name in LIST} | {
+        "lights.texel": "invalid", "lights.map": "invalid"}  # missing
+    order = rng.permutation(57)
+    for name in LIST[:6]:
+        array = port.arrays[name]
+        port.write(name, (array * (1 + 2.0**-24 * rng.uniform(-1, 1, array.shape)))[..., order])
+    assert {one.verdict for one in port.first(unordered=("lights",)).arrays} <= {"exact", "within", "invalid"}
+
+
+def test_a_wrong_value_does_not_move_an_element_of_a_list_without_numbers(port):
+    order = shuffled(port, LIST)
+    flux = port.arrays["lights.flux"].copy()
+    flux[:, 7] += 1e6
+    port.write("lights.flux", flux[:, order])
+    for name in ("lights.texel", "lights.map"):
+        port.remove(name)
+    verdicts = {one.name: (one.verdict, one.outside) for one in port.first(unordered=("lights",)).arrays}
+    assert verdicts["lights.flux"] == ("out", 3)
+    assert verdicts["lights.position"] == verdicts["lights.normal"] == ("exact", 0)
+
+
+def test_inputs_that_must_be_exact_widen_nothing(port):
+    step = next(one for one in port.case.stages if one.name == "sum")
+    assert "lights.position" in step.exact
+    port.write("sum.irradiance", 1.001 * port.arrays["sum.irradiance"])
+    assert port.check(tiers={"lights.position": "RGB9E5"}).first == ("sii-warp-a", "sum")
+
+
+def test_subsplats_in_another_order_and_all_made_of_them(kit, tmp_path):
+    port = Port(kit, "multires-edge", tmp_path)
+    order = np.random.default_rng(1).permutation(port.arrays["multires.level"].size)
+    names = ("level", "row", "column", "pixel", "point", "normal", "irradiance")
+    for name in names:
+        port.write(f"multires.{name}", port.arrays[f"multires.{name}"][..., order])
+    assert port.check().exit_code == OUT
+    for chained in (False, True):
+        assert port.check(unordered=("subsplats",), chained=chained).verdict == "exact"
+
+
+def test_a_list_of_another_length_is_told_as_before(port):
+    for name in LIST:
+        port.write(name, port.arrays[name][..., 1:])
+    assert "1 fewer along light" in port.first(unordered=("lights",)).arrays[0].said
+
+
+@pytest.mark.parametrize(("asked", "said"), [
+    ({"tiers": {"gbuffer.depth": "RGB9E5"}}, "--tier: expected the start of the name of an array of three floats"),
+    ({"tiers": {"lights.fluxx": "T2"}}, "--tier: .*did you mean 'lights.flux'"),
+    ({"depth": {"gbuffer.dept h": Depth("ndc", 0.1, 10.0)}}, "--depth: .*did you mean 'gbuffer.depth'"),
+    ({"unordered": ("gbuffer.surface",)}, "--unordered: expected the start of the name of a stage that writes a list"),
+])
+def test_names_that_nothing_has_are_refused(port, asked, said):
+    with pytest.raises(InputError, match=said):
+        port.check(**asked)
+
+
+def test_an_empty_list_has_no_order(kit, tmp_path):
+    port = Port(kit, "vpl-no-flux", tmp_path)
+    assert port.arrays["lights.position"].size == 0
+    assert port.check(unordered=("lights",)).verdict == "exact"

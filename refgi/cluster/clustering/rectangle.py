@@ -195,7 +195,7 @@ def _grouped(position: Array, clusters: Clustering) -> tuple[Array, Array, Array
 
 def _axes(away: Array, frames: Array, clusters: Clustering, axes: Axes) -> Array:
     """Return the axes of every rectangle, (M, 2, 3)."""
-    turned = np.ascontiguousarray(frames[:, :2])
+    turned = frames[:, :2].copy()
     if axes == "fixed":
         return turned
     first = 0

@@ -105,10 +105,11 @@ def test_a_turned_square_doubles_its_area_of_fixed_axes(evidence):
 
 @pytest.mark.parametrize("axes", ["fixed", "pca", "min_area"])
 @pytest.mark.parametrize("extent", ["root", "longer", "shorter"])
-def test_rectangles_are_those_of_the_literal_text(axes, extent):
+@pytest.mark.parametrize("count", [1, 12])
+def test_rectangles_are_those_of_the_literal_text(axes, extent, count):
     rng = np.random.default_rng(3)
     position, normal = rng.random((3, 200)), rng.normal(size=(3, 200))
-    clusters = cluster(position, normal, 12, diagonal=1.7)
+    clusters = cluster(position, normal, count, diagonal=1.7)
     options = {"axes": axes, "area_extent": extent, "unbiased_area": extent == "longer"}
     found = area_lights(lights_at(position, normal), clusters, replaced(PUBLISHED, options).area)
     frame, along, side, offset, delta, radius, members = literal_areas(

@@ -25,7 +25,7 @@ from refgi.vectors.spec import Array
 from refgi.vectors.storage import PACKED, can_pack, depth_from, planes_of
 from refgi.vectors.words import did_you_mean
 
-__all__ = ["ALL_WITHIN", "DAMAGED", "NOT_COMPARABLE", "OUT", "TIERS", "Asked", "DamagedError", "Kit", "asked_from",
+__all__ = ["ALL_WITHIN", "DAMAGED", "NOT_COMPARABLE", "OUT", "TIERS", "Asked", "DamagedError", "Kit",
            "check_output", "stage_of_array"]
 
 ALL_WITHIN, OUT, NOT_COMPARABLE, DAMAGED = 0, 1, 4, 5
@@ -80,10 +80,7 @@ def check_output(kit: Kit, output: Path, asked: Asked) -> Result:
 def asked_from(options: Mapping[str, Any]) -> Asked:
     """Return what the options of a command line ask for.
 
-    Raises
-    ------
-    InputError
-        If a tier or a depth is none, or the file of expected failures cannot be read.
+    InputError if a tier or a depth is none, or the file of expected failures cannot be read.
     """
     tiers = {}
     for text in options["tiers"]:

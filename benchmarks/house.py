@@ -18,7 +18,6 @@ MANY = 12  # arguments from which a function has too many
 ROOMS = 15  # functions of a method that may be handed the frame
 METHODS = {"sii": "splat/sii", "multires": "splat/multires", "gather": "splat/gather", "val": "cluster",
            "hssil": "sssil", "truth": "truth"}  # where each lives
-WORDS = (tokenize.STRING, tokenize.COMMENT)
 
 
 class Weight(NamedTuple):

@@ -72,8 +72,8 @@ def assert_stage_close(
         Id of a case, such as "sii-warp-a".
     name : str
         Name of an array, such as "rsm0.flux".
-    tier : {"T0", "T1", "T2", "T2B"}
-        Equal; float32 rounding; storage in half floats; in 8 bits where they fit.
+    tier : {"T0", "T1", "T2", "T2B", "R11G11B10F", "RGB9E5"}
+        Equal; float32 rounding; storage in half floats; in 8 bits where they fit; in packed floats.
     kit : Kit, optional
         The kit; the quick one where absent.
 
@@ -129,7 +129,7 @@ class StageData(Mapping[str, Array]):
             What the port has.
         name : str
             Name of an array, such as "pairs.sum".
-        tier : {"T0", "T1", "T2", "T2B"}
+        tier : {"T0", "T1", "T2", "T2B", "R11G11B10F", "RGB9E5"}
             As for `assert_stage_close`.
 
         Raises

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 @machine
 @shadows("auto")
 @click.option("--engine", type=click.Choice(["kernels", "literal"]), default="kernels", show_default=True,
-              help="literal: stages run by the plain NumPy of refgi/literal where they have it, far slower.")
+              help="literal: stages run by the plain NumPy of refgi/literal where they have it, after their kernels; "
+              "sii of cornell_box at 64x48 takes 6 times as long, hssil 3, multires, val and gather 1.1 to 1.2.")
 @click.option("--again", metavar="FILE.exr", help="Make this picture again, and say whether it is the same to the bit.")
 @click.option("--scene", "scene_path", metavar="PATH", help="Where the scene of --again is now, if it was moved.")
 @click.option("--exposure", type=Exposure(), help="Factor before the sRGB curve of a PNG, the scene's where absent; "

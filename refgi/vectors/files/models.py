@@ -1,9 +1,10 @@
 """As much of pydantic as the check needs: JSON to classes and back, unknown and missing keys refused."""
 
-import functools
 import json
 import types
 import typing
+
+HINTS: dict[typing.Any, dict[str, typing.Any]] = {}  # types of fields, by class
 
 
 class ValidationError(ValueError):
@@ -53,9 +54,10 @@ class BaseModel:
                 if not hasattr(type(self), name) or getattr(type(self), name) != one}
 
 
-@functools.cache
 def _hints(cls: typing.Any) -> dict[str, typing.Any]:
-    return typing.get_type_hints(cls)
+    if cls not in HINTS:
+        HINTS[cls] = typing.get_type_hints(cls)
+    return HINTS[cls]
 
 
 def _to_json(value: typing.Any) -> typing.Any:

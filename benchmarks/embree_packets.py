@@ -66,15 +66,7 @@ def _trace(function: int, scene: int, arguments: int, rays: Array, triangle_id: 
 
 
 class Packets:
-    """The rays of a square camera and the tree of a scene.
-
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    view : Projection
-        One perspective map of a multiple of 4 columns and of 2 rows.
-    """
+    """The rays of one perspective map, of a multiple of 4 columns and of 2 rows, and the tree of a scene."""
 
     def __init__(self, geometry: Geometry, view: Projection) -> None:
         library: Any = embree._library()

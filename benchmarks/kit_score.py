@@ -32,7 +32,6 @@ BUGS = Path(__file__).with_name("kit_bugs")
 PORTS = ROOT / "examples" / "ports"
 SOURCES = {"c": PORTS / "c", "c_fresh": PORTS / "c", "c_blind": PORTS / "c", "glsl": PORTS / "glsl"}
 LONGEST = 300.0  # s for one run of a port
-AIMS = {"found": 1.0, "named": 0.8}
 
 
 class Score(NamedTuple):

@@ -24,7 +24,7 @@ from refgi.pairs.pair_sum import TILE
 from refgi.pairs.settings import Lightcuts
 from refgi.pairs.tiles import block_by_block, taken
 from refgi.settings import of
-from refgi.splat import MultiresSettings, SiiSettings, multires
+from refgi.splat import SiiSettings
 
 SCENES = ("cornell_box", "stage", "ring", "metaballs", "sponza", "kitchen")
 COUNTS = tuple(16**power for power in range(2, 6))
@@ -87,14 +87,6 @@ def _of_count(name: str, frame: Frame, count: int, repeats: int) -> Iterator[Row
                   f"{of_cuts.low:.3f} to {of_cuts.high:.3f}; {note}")
         if count == COUNTS[-1]:
             yield Row(f"{name}, {count}, error {error:g}: as many lights in full", equal, "lights", "<= 3000")
-
-
-def target_rows(frame: Frame, count: int, target: float, repeats: int = 3) -> tuple[Cost, Cost]:
-    """Return the time of `multires` with subsplats "error", with lightcuts and without."""
-    ways = [of(MultiresSettings, lights=count, pattern="halton", subsplats="error", target=target, lightcuts=cuts)
-            for cuts in ("auto", None)]
-    (first, _), (second, _) = _in_turn(*((lambda way=way: multires(frame, way)) for way in ways), repeats)
-    return first, second
 
 
 def _sums(points: Any, normals: Any, packed: Packed) -> Any:

@@ -47,15 +47,7 @@ def available() -> str:
 
 
 class Pipe:
-    """A scene on the graphics side, ready to be drawn and read back.
-
-    Parameters
-    ----------
-    scene : Scene
-        What is drawn: vertices are copied once, an own one for each corner where faces have no vertex normals.
-    size : int
-        Pixels along a side.
-    """
+    """A scene on the graphics side, drawn and read back at some pixels a side; a vertex a corner without normals."""
 
     def __init__(self, scene: Scene, size: int) -> None:
         self._context, self._size = _context(), size

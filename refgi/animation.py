@@ -20,25 +20,10 @@ PICTURE = "animation.picture"  # under which a memory keeps the last pictures
 
 
 class Animation:
-    """Pictures of a scene that changes, by one method.
+    """Pictures of a scene that changes, by one method of `METHODS`; `settings` default to the method's.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene as it is at first.
-    method : str
-        A name of `METHODS`.
-    settings : object, optional
-        The method's settings; its defaults where absent.
-    **frame_options : object
-        Passed to `Frame`.
-
-    Attributes
-    ----------
-    scene : Scene
-        The scene of the last frame, from which the next one follows: `with_camera`, `with_lights`.
-    runs : list of stages.Run
-        Stages of the last frame: which ran, and which were reused; none where all rests.
+    `frame_options` go to `Frame`. `scene` is that of the last frame, from which the next one follows (`with_camera`,
+    `with_lights`); `runs` are that frame's stages, run or reused, none where all rests.
     """
 
     def __init__(self, scene: "Scene", method: str = "sii", settings: Any = None, **frame_options: Any) -> None:
@@ -50,24 +35,12 @@ class Animation:
         self._sampling_error: SamplingError | None = None
 
     def render(self, scene: "Scene | None" = None) -> Picture:
-        """Render the next frame.
+        """Render the next frame, of the scene as it was where `scene` is absent.
 
-        Parameters
-        ----------
-        scene : Scene, optional
-            What the frame shows; the scene as it was where absent.
-
-        Returns
-        -------
-        Picture
-            As that of `refgi.render`, the same object where the scene is that of the frame before. Its arrays are
-            shared with other frames: they are to be read, not written. Its sampling error is that of the last frame
-            that had diagnostics: the first one, or one with other objects, materials or number of lamps.
-
-        Raises
-        ------
-        InputError
-            If scene, method or settings are not usable; the next frame may be rendered all the same.
+        After an `InputError` the next frame may be rendered all the same. The same object as before where the scene is
+        that of the frame before. Its arrays are shared with other frames: they are to be read, not written. Its
+        sampling error is that of the last frame that had diagnostics: the first one, or one with other objects,
+        materials or number of lamps.
         """
         method, settings, frame_options = self._options
         scene = self.scene if scene is None else scene
@@ -89,17 +62,9 @@ class Animation:
         return picture._replace(sampling_error=self._sampling_error)
 
     def along(self, scenes: Iterable["Scene"]) -> Iterator[Picture]:
-        """Render frames one after the other.
+        """Render frames one after the other, of scenes that are taken one by one.
 
-        Parameters
-        ----------
-        scenes : iterable of Scene
-            What they show; taken one by one.
-
-        Yields
-        ------
-        Picture
-            Of each. Who lets go of it before the next one is made gives its memory to that.
+        Who lets go of a picture before the next one is made gives its memory to that.
         """
         for scene in scenes:
             yield self.render(scene)

@@ -41,17 +41,9 @@ _open: ContextVar[Diagnosis | None] = ContextVar("refgi_diagnosis", default=None
 
 @contextmanager
 def diagnosing(due: bool | None = None) -> Iterator[Diagnosis]:
-    """Collect what methods find of a picture that is made inside the block.
+    """Collect what methods find of a picture that is made inside the block, in a `Diagnosis` that fills while it runs.
 
-    Parameters
-    ----------
-    due : bool, optional
-        Whether they are to look; as for the block around where absent, and if there is none they are.
-
-    Yields
-    ------
-    Diagnosis
-        Filled while the block runs.
+    `due`: whether they are to look; where absent, as for the block around, and if there is none they are.
     """
     around = _open.get()
     found = Diagnosis(due if due is not None else around is None or around.due)

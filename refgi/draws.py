@@ -34,43 +34,17 @@ PARTS = 1 << 24  # of one use
 
 @kernel
 def draw_bits(seed: Any, stream: Any, index: Any) -> Any:
-    """Return 32 random bits.
-
-    Parameters
-    ----------
-    seed, stream, index : int
-        Taken modulo 2^32.
-
-    Returns
-    -------
-    uint32
-        A permutation of the index, another one for each seed and stream.
-    """
+    """Return 32 random bits: a permutation of the index, another one for each seed and stream, all modulo 2^32."""
     key = hash_bits(hash_bits(np.uint32(np.uint32(seed) + np.uint32(0x9E3779B9))) ^ np.uint32(stream))
     return hash_bits(hash_bits(np.uint32(np.uint32(index) + key)) ^ key)
 
 
 def draws(seed: int, use: int, count: int, part: int = 0) -> Array:
-    """Return random numbers in [0, 1); one minus them lie in (0, 1].
+    """Return numbers 0 to `count` - 1 of a stream, (count,) float64 in [0, 1); one minus them lie in (0, 1].
 
-    Parameters
-    ----------
-    seed : int
-        0 or more, taken modulo 2^32.
-    use : int
-        One of this module's uses.
-    count : int
-        Numbers 0 to `count` - 1 of the stream.
-    part : int
-        Which stream of that use.
+    They are multiples of 2^-24, the same in float32. `seed` is 0 or more, taken modulo 2^32; `use` is one of this
+    module's uses, `part` which stream of it.
 
-    Returns
-    -------
-    (count,) ndarray of float64
-        Multiples of 2^-24, the same in float32.
-
-    Examples
-    --------
     >>> draws(1, PIXEL_LIGHTS, 3).round(6).tolist()
     [0.64236, 0.831962, 0.388469]
     """

@@ -26,14 +26,8 @@ class RefgiError(Exception):
 class InputError(RefgiError, ValueError):
     """A scene, setting, file or array that cannot be used; the message says what, where and why.
 
-    Parameters
-    ----------
-    message : str
-        What, where and why; characters that cannot be printed are kept as escapes, and 2,000 bytes in all.
-    key : str, optional
-        The setting, option or key of a file that is to blame, for programs that read errors.
-    file : str, optional
-        The file that is to blame.
+    Of the message, characters that cannot be printed are kept as escapes, and 2,000 bytes in all. `key` (a setting,
+    option or key of a file) and `file` are to blame, for programs that read errors.
     """
 
     def __init__(self, message: str = "", *, key: str | None = None, file: str | None = None) -> None:
@@ -46,19 +40,7 @@ class RefgiWarning(UserWarning):
 
 
 def expect(condition: bool, parameter: str, expected: str, got: object) -> None:
-    """Raise `InputError` naming parameter, expectation and value unless `condition` holds.
-
-    Parameters
-    ----------
-    condition : bool
-        What must hold.
-    parameter : str
-        Name of the parameter, as the caller wrote it.
-    expected : str
-        What would have been right.
-    got : object
-        The value; only the start of a long value is shown.
-    """
+    """Raise `InputError` naming parameter, expectation and the start of the value unless `condition` holds."""
     if not condition:
         text = f"{parameter}: expected {expected}, got {shortened(repr(got))}"
         raise InputError(text.replace("\n", "\\n"), key=parameter)  # one fault, one line
@@ -66,15 +48,7 @@ def expect(condition: bool, parameter: str, expected: str, got: object) -> None:
 
 @contextlib.contextmanager
 def blame(*, key: str | None = None, file: str | None = None) -> Iterator[None]:
-    """Set file and key of an `InputError` raised inside the block, unless it has them.
-
-    Parameters
-    ----------
-    key : str, optional
-        The setting, option or key.
-    file : str, optional
-        The file.
-    """
+    """Set file and key (a setting or option) of an `InputError` raised inside the block, unless it has them."""
     try:
         yield
     except InputError as error:
@@ -83,22 +57,8 @@ def blame(*, key: str | None = None, file: str | None = None) -> Iterator[None]:
 
 
 def shortened(text: str, most: int = LONGEST_VALUE) -> str:
-    """Return a text that fits in an error.
+    """Return a text on one line that fits in an error: the same, or its first `most` characters, the last three dots.
 
-    Parameters
-    ----------
-    text : str
-        Any.
-    most : int
-        Characters to keep.
-
-    Returns
-    -------
-    str
-        On one line: the same, or its start and three dots.
-
-    Examples
-    --------
     >>> shortened("abcdefgh", 6)
     'abc...'
     """
@@ -109,18 +69,8 @@ def shortened(text: str, most: int = LONGEST_VALUE) -> str:
 def printable(text: str) -> str:
     r"""Return a text that any terminal shows and any file takes.
 
-    Parameters
-    ----------
-    text : str
-        Any.
+    Control characters, ends of line but ``\n``, and halves of surrogate pairs are escapes.
 
-    Returns
-    -------
-    str
-        With escapes for control characters, ends of line but ``\n``, and halves of surrogate pairs.
-
-    Examples
-    --------
     >>> printable("a\x1b[0m\ud800")
     'a\\x1b[0m\\ud800'
     """
@@ -134,22 +84,8 @@ def _cut(text: str, most: int) -> str:
 
 
 def first_faults(faults: Sequence[str], separator: str = "\n") -> str:
-    """Join the first faults of a file, and say how many more there are.
+    """Join the first faults of a file, at most `MOST_FAULTS` and `LONGEST_MESSAGE`, and say how many more there are.
 
-    Parameters
-    ----------
-    faults : sequence of str
-        What is wrong, one text each.
-    separator : str
-        Between two of them.
-
-    Returns
-    -------
-    str
-        At most `MOST_FAULTS` of them and of `LONGEST_MESSAGE`, and the count of the others.
-
-    Examples
-    --------
     >>> first_faults(["fault"] * 200_000).splitlines()[-1]
     '... and 199,980 more'
     """
@@ -168,20 +104,8 @@ def first_faults(faults: Sequence[str], separator: str = "\n") -> str:
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """Return the known word that a mistyped one is likely to mean.
 
-    Parameters
-    ----------
-    word : str
-        As it was typed.
-    known : iterable of str
-        What would have been right.
+    None where all are further off than a letter for each three of the word, suffix apart.
 
-    Returns
-    -------
-    str or None
-        None where all are further off than a letter for each three of the word, suffix apart.
-
-    Examples
-    --------
     >>> nearest("coutn", ["count", "cutoff"]), nearest("gone.mtl", ["n.mtl", "one.mtl"]), nearest("a.mtl", ["b.mtl"])
     ('count', 'one.mtl', None)
     """

@@ -144,11 +144,13 @@ class Frame:
     @cached_property
     def direct(self) -> Array:
         """Direct irradiance of all lights with shadows, (3, h, w), W/m^2."""
-        from refgi.rsm import direct_irradiance
+        from refgi.rsm.buffers.direct import irradiance_of_lamps
+        from refgi.scene.lamps import lamp_of
 
-        parts = [direct_irradiance(self.gbuffer, light, self._visible_from_light(index))
-                 for index, light in enumerate(self.scene.lights)]
-        return parts[0] if len(parts) == 1 else sum_of_lamps(parts)
+        visible = [self._visible_from_light(index) for index in range(len(self.scene.lights))]
+        position, normal, covered = self.gbuffer.resolve("position", "normal", "covered")
+        lamps = [lamp_of(light) for light in self.scene.lights]
+        return irradiance_of_lamps(position, normal, covered, visible, lamps)
 
     @cached_property
     def glossy_receivers(self) -> bool:
@@ -187,17 +189,8 @@ class Frame:
     def radiance(self, indirect: Array | None = None, lobes: Array | None = None) -> Array:
         """Return what the camera receives: emission + albedo/pi (direct + indirect) + direct and indirect lobes.
 
-        Parameters
-        ----------
-        indirect : (3, h, w) ndarray, optional
-            Indirect irradiance, W/m^2; none where absent.
-        lobes : (3, h, w) ndarray, optional
-            Radiance towards the eye of receivers' lobes by indirect light, W/m^2/sr; none where absent.
-
-        Returns
-        -------
-        (3, h, w) ndarray
-            Radiance, W/m^2/sr, linear RGB.
+        (3, h, w), W/m^2/sr, linear RGB, of indirect irradiance (W/m^2) and the radiance towards the eye of receivers'
+        lobes by indirect light (W/m^2/sr), both (3, h, w); none where absent.
         """
         radiance = compose(self.direct, indirect, self.gbuffer, self.materials)
         return add_lobes(radiance, self.direct_lobes, lobes) if self.glossy_receivers else radiance
@@ -217,8 +210,10 @@ class Frame:
 
             return shadow_map_visibility(buffer.position, buffer.facing, buffer.covered, self.rsms[index],
                                          interpolated=buffer.facing is not buffer.normal)
-        visible: Array = self.tracer.visible_from_light(buffer.position, buffer.facing, buffer.covered, light)
-        return visible
+        from refgi.rays.shadows import visible_from_light
+
+        return visible_from_light(self.tracer, self.scene.geometry, buffer.position, buffer.facing, buffer.covered,
+                                  light)
 
 
 @stage("frame.sum_of_lamps")
@@ -238,7 +233,13 @@ def sum_of_lamps(parts: list[Array]) -> Array:
     return np.asarray(sum(parts[1:], start=parts[0]))
 
 
-@stage("frame.compose")
+def _compose_steps(direct: Array, indirect: Array | None, buffer: "GBuffer", materials: MaterialTable) -> Array:
+    from refgi.rsm.buffers.leaving import leaving_steps
+
+    return leaving_steps(direct, indirect, buffer, materials)
+
+
+@stage("frame.compose", steps=_compose_steps)
 def compose(direct: Array, indirect: Array | None, buffer: "GBuffer", materials: MaterialTable) -> Array:
     """Turn irradiance into what the camera receives.
 

@@ -27,20 +27,7 @@ LEAST_FRACTION = 1e-12  # of a lobe above the surface; less is rounding, of lobe
 
 @kernel
 def inverse_fraction(cos_theta: Any, exponent: Any) -> Any:
-    """Return 1 / K(th, P), or 0 for a lobe of which nothing leaves the surface.
-
-    Parameters
-    ----------
-    cos_theta : float
-        Cosine between lobe axis and surface normal.
-    exponent : float
-        P.
-
-    Returns
-    -------
-    float
-        Of the type of `cos_theta`.
-    """
+    """Return 1 / K(th, P) in the type of `cos_theta`, or 0 for a lobe of which nothing leaves the surface."""
     real = type(cos_theta)
     fraction = lobe_fraction(cos_theta, exponent)
     return real(1.0) / fraction if fraction > real(LEAST_FRACTION) else real(0.0)
@@ -48,19 +35,9 @@ def inverse_fraction(cos_theta: Any, exponent: Any) -> Any:
 
 @kernel
 def lobe_norm(cos_theta: Any, exponent: Any) -> Any:
-    """Return c = (P + 1) / (2 pi K), the peak intensity of a lobe of unit flux.
+    """Return c = (P + 1) / (2 pi K), 1/sr, the peak intensity of a lobe of unit flux.
 
-    Parameters
-    ----------
-    cos_theta : float
-        Cosine between lobe axis and surface normal.
-    exponent : float
-        P.
-
-    Returns
-    -------
-    float
-        1/sr, of the type of `cos_theta`; 0 for a lobe of which nothing leaves the surface.
+    In the type of `cos_theta`, the cosine of axis and normal; 0 for a lobe of which nothing leaves the surface.
     """
     real = type(cos_theta)
     # (P + 1) / (2 pi K): SII Eq. (3) normalised to unit flux above the surface
@@ -71,17 +48,7 @@ def lobe_norm(cos_theta: Any, exponent: Any) -> Any:
 def lobe_gap(rx: Any, ry: Any, rz: Any, wx: Any, wy: Any, wz: Any) -> Any:
     """Return h = |r - w|^2 / 2 for an axis r of length 1 and a vector w of any length but 0.
 
-    Parameters
-    ----------
-    rx, ry, rz : float
-        Unit vector along the lobe's axis.
-    wx, wy, wz : float
-        Any vector along the direction.
-
-    Returns
-    -------
-    float
-        1 - cos of the angle between them, 0 to 2, of the type of the arguments.
+    That is 1 - cos of the angle between them, 0 to 2, in the type of the arguments.
     """
     real = type(wx)
     inverse = real(1.0) / math.sqrt(wx * wx + wy * wy + wz * wz)
@@ -91,39 +58,16 @@ def lobe_gap(rx: Any, ry: Any, rz: Any, wx: Any, wy: Any, wz: Any) -> Any:
 
 @kernel
 def lobe_power(gap: Any, exponent: Any) -> Any:
-    """Return <r . w>^P = (1 - h)^P.
-
-    Parameters
-    ----------
-    gap : float
-        h, of `lobe_gap`.
-    exponent : float
-        P, of the same type.
-
-    Returns
-    -------
-    float
-        0 to 1; 0 from a right angle on.
-    """
+    """Return <r . w>^P = (1 - h)^P of the gap h of `lobe_gap`; 0 from a right angle on. Both of one type."""
     real = type(gap)
     return exp2(exponent * log2p1(-gap)) if gap < real(1.0) else real(0.0)
 
 
 @kernel
 def lobe_direction(u: float, v: float, exponent: float) -> tuple[float, float, float]:
-    """Return a direction around z of density (P + 1) / (2 pi) cos^P.
+    """Return a direction around z (unit vector) of density (P + 1) / (2 pi) cos^P.
 
-    Parameters
-    ----------
-    u, v : float
-        Point of the unit square, u > 0.
-    exponent : float
-        P.
-
-    Returns
-    -------
-    tuple of 3 floats
-        Unit vector. 1 - z keeps its digits, however sharp the lobe is.
+    (u, v) is a point of the unit square, u > 0. 1 - z keeps its digits, however sharp the lobe is.
     """
     gap = -math.expm1(math.log(u) / (exponent + 1.0))  # 1 - u^(1 / (P + 1))
     across, phi = math.sqrt(gap * (2.0 - gap)), 2.0 * np.pi * v
@@ -132,58 +76,23 @@ def lobe_direction(u: float, v: float, exponent: float) -> tuple[float, float, f
 
 @kernel
 def receiver_norm(exponent: Any) -> Any:
-    """Return (P + 2) / (2 pi), by which a receiver's lobe of reflectance 1 reflects at most all light.
-
-    Parameters
-    ----------
-    exponent : float
-        P.
-
-    Returns
-    -------
-    float
-        1/sr, of the type of `exponent`.
-    """
+    """Return (P + 2) / (2 pi), 1/sr, by which a receiver's lobe of reflectance 1 reflects at most all light."""
     real = type(exponent)
     return (exponent + real(2.0)) * real(1.0 / (2.0 * math.pi))
 
 
 @kernel
 def mirrored(wx: Any, wy: Any, wz: Any, nx: Any, ny: Any, nz: Any) -> Any:
-    """Return m = 2 (n . w) n - w, the direction w mirrored in a surface.
-
-    Parameters
-    ----------
-    wx, wy, wz : float
-        Unit vector away from the surface.
-    nx, ny, nz : float
-        Unit normal.
-
-    Returns
-    -------
-    tuple of 3 floats
-        Unit vector.
-    """
+    """Return m = 2 (n . w) n - w: the direction w, away from the surface, mirrored in it (all unit vectors)."""
     twice = type(wx)(2.0) * (wx * nx + wy * ny + wz * nz)
     return twice * nx - wx, twice * ny - wy, twice * nz - wz
 
 
 @kernel
 def receiver_lobe(mx: Any, my: Any, mz: Any, wx: Any, wy: Any, wz: Any, exponent: Any) -> Any:
-    """Return (P + 2) / (2 pi) <m . w>^P: f_s of a receiver over its specular reflectance, where n . w > 0.
+    """Return (P + 2) / (2 pi) <m . w>^P, 1/sr: f_s of a receiver over its specular reflectance, where n . w > 0.
 
-    Parameters
-    ----------
-    mx, my, mz : float
-        Unit vector: the direction to the eye, mirrored.
-    wx, wy, wz : float
-        Any vector towards the light.
-    exponent : float
-        P.
-
-    Returns
-    -------
-    float
-        1/sr, of the type of the arguments. Whether w and the eye lie above the surface is for the caller to know.
+    m is the direction to the eye, mirrored (unit vector), w any vector towards the light. Whether w and the eye lie
+    above the surface is for the caller to know.
     """
     return receiver_norm(exponent) * lobe_power(lobe_gap(mx, my, mz, wx, wy, wz), exponent)

@@ -5,13 +5,7 @@ from pathlib import Path
 
 
 def available_bytes() -> int | None:
-    """Return the memory that is free for use, of the machine or of the container, whichever is less.
-
-    Returns
-    -------
-    int or None
-        Bytes; None where it cannot be told.
-    """
+    """Return the bytes free for use, of machine or container, whichever is less; None where it cannot be told."""
     found = [amount for amount in (_machine_bytes(), _container_bytes()) if amount is not None]
     return min(found) if found else None
 

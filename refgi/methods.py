@@ -91,13 +91,7 @@ class Picture(NamedTuple):
 
 
 class KeepingEstimate:
-    """A method as a function of frame and settings, which keeps the estimate of its last frame.
-
-    Parameters
-    ----------
-    method : Method
-        A row of `METHODS`.
-    """
+    """A method as a function of frame and settings, which keeps the estimate of its last frame."""
 
     def __init__(self, method: Method) -> None:
         self._method = method
@@ -120,46 +114,14 @@ class KeepingEstimate:
 
 
 def find_method(name: str) -> Method:
-    """Return a method of the table.
-
-    Parameters
-    ----------
-    name : str
-        Its short name.
-
-    Returns
-    -------
-    Method
-        The table's row.
-
-    Raises
-    ------
-    InputError
-        If there is none of that name.
-    """
+    """Return a row of the table of methods by its short name; `InputError` if there is none."""
     if not isinstance(name, str) or name not in METHODS:
         raise InputError(f"method: expected one of {', '.join(METHODS)}, got {name!r}")
     return METHODS[name]
 
 
 def require_filter(names: Iterable[str]) -> list[str]:
-    """Return those of some methods that blend frames over time.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Short names.
-
-    Returns
-    -------
-    list of str
-        One or more.
-
-    Raises
-    ------
-    InputError
-        If none of them has a temporal filter.
-    """
+    """Return those of some methods, by short name, that blend frames over time; `InputError` if none does."""
     asked = list(names)
     having = [name for name in asked if find_method(name).temporal is not None]
     if not having:
@@ -172,15 +134,8 @@ def require_filter(names: Iterable[str]) -> list[str]:
 def usual_shadows(settings: Any) -> "Shadows":
     """Return where direct light's shadows come from unless it is said.
 
-    Parameters
-    ----------
-    settings : object
-        Those of a method; their `traces_rays`, false where there is none, says whether it traces rays.
-
-    Returns
-    -------
-    {"map", "exact"}
-        By rays where some are traced anyway, else from the map, so that no rays need be set up.
+    By rays where the settings' `traces_rays` says that some are traced anyway, else from the map, so that no rays need
+    be set up.
     """
     return "exact" if getattr(settings, "traces_rays", False) else "map"
 

@@ -25,19 +25,8 @@ FOR_FLOAT32 = 1e-7  # from here on it is less than 1e-7 of the cosine over that 
 def smooth_edge(above: Any, span: Any, bend: Any, linear: Any) -> Any:
     """Return t (l + (1 - l) t) (1 + 2 b - 2 b t) of t = above / span, moved into [0, 1]: smoothstep, t t or t.
 
-    Parameters
-    ----------
-    above : float
-        How much the cosine of an angle off a spot's axis exceeds that of the outer half-angle.
-    span : float
-        How much that of the inner half-angle does, 0 or more; 0 makes a step.
-    bend, linear : float
-        b and l of `refgi.scene.light.SHAPES`.
-
-    Returns
-    -------
-    float
-        0 to 1.
+    `above` is how much the cosine of an angle off a spot's axis exceeds that of the outer half-angle, `span` (>= 0; 0
+    makes a step) how much that of the inner half-angle does; `bend` b and `linear` l as in `refgi.scene.light.SHAPES`.
     """
     real = type(above)
     if above >= span:
@@ -53,26 +42,8 @@ def smooth_edge(above: Any, span: Any, bend: Any, linear: Any) -> Any:
 def falloff_in_float64(d: Any, axis: Any, cone: Any, plain: float) -> tuple[float, bool]:
     """Return the share of a spot's on-axis intensity in one direction, and whether float64 alone suffices for it.
 
-    Parameters
-    ----------
-    d : tuple of 3 floats
-        Direction away from the spot, of any length above 0; float64.
-    axis : tuple of 3 floats
-        Direction the spot shines in, of any length; float64.
-    cone : (8,) ndarray of float64
-        Of `refgi.scene.light.cone_row`.
-    plain : float
-        Sine of the angle inside the cone from which on float64 alone will do: `FOR_FLOAT32`, or inf for nowhere.
-
-    Returns
-    -------
-    tuple of float and bool
-        0 to 1, float64; free of branches.
-
-    Notes
-    -----
-    cos a - cos b = sin(b - a) sin(b + a) / (cos a + cos b) with the angle a off the axis and the outer half-angle b,
-    and sin a, cos a from the lengths of d x axis and d . axis.
+    Arguments as in `spot_falloff`; free of branches. cos a - cos b = sin(b - a) sin(b + a) / (cos a + cos b) with the
+    angle a off the axis and the outer half-angle b, and sin a, cos a from the lengths of d x axis and d . axis.
     """
     along = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]
     x, y, z = d[1] * axis[2] - d[2] * axis[1], d[2] * axis[0] - d[0] * axis[2], d[0] * axis[1] - d[1] * axis[0]
@@ -90,27 +61,12 @@ def falloff_in_float64(d: Any, axis: Any, cone: Any, plain: float) -> tuple[floa
 
 @kernel
 def spot_falloff(d: Any, axis: Any, cone: Any, plain: float) -> Any:
-    """Return the share of a spot's on-axis intensity in one direction.
+    """Return the share of a spot's on-axis intensity in one direction, within 8 ULP of float32 or float64.
 
-    Parameters
-    ----------
-    d : tuple of 3 floats
-        Direction away from the spot, of any length above 0; float64.
-    axis : tuple of 3 floats
-        Direction the spot shines in, of any length; float64.
-    cone : (8,) ndarray of float64
-        Of `refgi.scene.light.cone_row`.
-    plain : float
-        Sine of the angle inside the cone from which on float64 alone will do: `FOR_FLOAT32`, or inf for nowhere.
-
-    Returns
-    -------
-    float
-        0 to 1, float64, within 8 units in the last place of float32 or float64.
-
-    Notes
-    -----
-    What sin(b - a) cancels is known to twice the precision where it matters.
+    `d` leads away from the spot, `axis` is where it shines, both float64 of any length above 0; `cone` is of
+    `refgi.scene.light.cone_row`, (8,) float64; `plain` the sine of the angle inside the cone from which on float64
+    alone will do (`FOR_FLOAT32`, or inf for nowhere). What sin(b - a) cancels is known to twice the precision where it
+    matters.
     """
     share, certain = falloff_in_float64(d, axis, cone, plain)
     return share if certain else smooth_edge(_above_the_edge(d, axis, cone), cone[4], cone[6], cone[7])
@@ -131,22 +87,7 @@ def _above_the_edge(d: Any, axis: Any, cone: Any) -> Any:
 
 @kernel
 def radiant_intensity(lights: Any, k: int, wx: Any, wy: Any, wz: Any) -> Any:
-    """Return the radiant intensity of a spot or point light in one direction.
-
-    Parameters
-    ----------
-    lights : LightTable
-        Lights.
-    k : int
-        Which light.
-    wx, wy, wz : float
-        Vector away from the light, of any length above 0; float64.
-
-    Returns
-    -------
-    tuple of 3 floats
-        W/sr, linear RGB.
-    """
+    """Return the intensity (W/sr, linear RGB) of spot or point light k along w, float64 of any length above 0."""
     share = 1.0
     if lights.kind[k] == SPOT:
         axis = lights.direction
@@ -157,26 +98,11 @@ def radiant_intensity(lights: Any, k: int, wx: Any, wy: Any, wz: Any) -> Any:
 
 @kernel
 def incident_light(lights: Any, k: int, x: Any, y: Any, z: Any) -> Any:
-    """Return the direction and distance to a light from a point, and its unshadowed irradiance there: I(w) / d^2.
+    """Return the direction and distance to light k from a point (m), and its unshadowed irradiance there: I(w) / d^2.
 
-    Parameters
-    ----------
-    lights : LightTable
-        Lights.
-    k : int
-        Which light.
-    x, y, z : float
-        The point, world space, m.
-
-    Returns
-    -------
-    tuple of 7 floats
-        Unit vector towards the light (3), distance to it (m; inf when directional), irradiance on a surface
-        perpendicular to that vector (W/m^2, RGB). All zero at the light itself; float64.
-
-    Notes
-    -----
-    Float64 whatever the type of the point: how far it lies off a narrow spot's axis would be lost in float32.
+    7 floats: unit vector towards the light, distance (m; inf when directional), irradiance on a surface perpendicular
+    to that vector (W/m^2, RGB). All 0 at the light itself. Float64 whatever the type of the point: how far it lies off
+    a narrow spot's axis would be lost in float32.
     """
     zero = 0.0
     if lights.kind[k] == DIRECTIONAL:
@@ -202,15 +128,7 @@ def incident_light(lights: Any, k: int, x: Any, y: Any, z: Any) -> Any:
 def corner_solid_angle_perspective(x: Any, y: Any) -> Any:
     """Return F(x, y) of a perspective image at z = 1: a rectangle spans F11 - F01 - F10 + F00.
 
-    Parameters
-    ----------
-    x, y : float
-        Corner on the plane z = 1.
-
-    Returns
-    -------
-    float
-        Solid angle of the rectangle from (0, 0) to (x, y), signed, sr.
+    F is the signed solid angle of the rectangle from (0, 0) to (x, y), sr.
     """
     real = type(x)
     return math.atan2(x * y, math.sqrt(real(1.0) + x * x + y * y))
@@ -220,15 +138,8 @@ def corner_solid_angle_perspective(x: Any, y: Any) -> Any:
 def corner_solid_angle_paraboloid(u: Any, v: Any) -> Any:
     """Return F(u, v) of a paraboloid image, (u, v) = (x, y) / (1 + z): a rectangle spans F11 - F01 - F10 + F00.
 
-    Parameters
-    ----------
-    u, v : float
-        Corner; the hemisphere is the unit disc, which texels must be masked to.
-
-    Returns
-    -------
-    float
-        Solid angle of the rectangle from (0, 0) to (u, v), signed, sr.
+    F is the signed solid angle from (0, 0) to (u, v), sr; the hemisphere is the unit disc, which texels must be masked
+    to.
     """
     real = type(u)
     su = math.sqrt(real(1.0) + u * u)
@@ -238,20 +149,8 @@ def corner_solid_angle_paraboloid(u: Any, v: Any) -> Any:
 
 @kernel
 def orthonormal_basis(nx: Any, ny: Any, nz: Any) -> Any:
-    """Return two unit vectors that make a right-handed frame with a unit normal, without branches.
+    """Return tangent and bitangent (6 floats) that make a right-handed frame with a unit normal, without branches.
 
-    Parameters
-    ----------
-    nx, ny, nz : float
-        Unit normal.
-
-    Returns
-    -------
-    tuple of 6 floats
-        Tangent (3) and bitangent (3).
-
-    Notes
-    -----
     The construction of Duff et al. 2017 (JCGT 6, 1): the sign of z moves the seam to z = 0.
     """
     real = type(nx)
@@ -265,23 +164,11 @@ def orthonormal_basis(nx: Any, ny: Any, nz: Any) -> Any:
 def lobe_fraction(cos_theta: Any, exponent: Any) -> Any:
     """Return K(th, P), the part of a cos^P lobe's flux above a surface whose normal is th off the lobe's axis.
 
-    Parameters
-    ----------
-    cos_theta : float
-        Cosine of the tilt, 0 to 1; below 0 the part is that of the mirrored tilt, 1 - K(pi - th).
-    exponent : float
-        P >= 0, real.
-
-    Returns
-    -------
-    float
-        0 to 1, of the type of `cos_theta`, computed in float64.
-
-    Notes
-    -----
-    K = 1 - I(sin^2 th; (P + 1) / 2, 1/2) / 2 with the regularised incomplete beta function I, by its continued
-    fraction on the side where that converges fast. K(th, 0) = 1 - th/pi, K(th, 1) = (1 + cos th)/2. From P = 10^6 on,
-    where the fraction takes sqrt(P) steps, I(x; a, 1/2) = erfc sqrt(-(a - 1/4) ln x), off by less than 1 / (24 a^2).
+    P >= 0, real; below a cosine of 0 the part is that of the mirrored tilt, 1 - K(pi - th). In the type of `cos_theta`,
+    computed in float64.
+    K = 1 - I(sin^2 th; (P + 1) / 2, 1/2) / 2 with the regularised incomplete beta function I, by its continued fraction
+    on the side where that converges fast. K(th, 0) = 1 - th/pi, K(th, 1) = (1 + cos th)/2. From P = 10^6 on, where the
+    fraction takes sqrt(P) steps, I(x; a, 1/2) = erfc sqrt(-(a - 1/4) ln x), off by less than 1 / (24 a^2).
     """
     real = type(cos_theta)
     c = min(1.0, abs(np.float64(cos_theta)))

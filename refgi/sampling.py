@@ -23,26 +23,10 @@ FIRST_STEP, SECOND_STEP = 0.7548776662466927, 0.5698402909980532
 
 
 def halton(count: int, bases: Sequence[int] = (2, 3), shift: Sequence[float] | None = None, start: int = 0) -> Array:
-    """Return consecutive points of the Halton sequence, optionally shifted modulo 1 (Cranley-Patterson).
+    """Return consecutive points of the Halton sequence in [0, 1), optionally shifted modulo 1 (Cranley-Patterson).
 
-    Parameters
-    ----------
-    count : int
-        Number of points.
-    bases : sequence of int
-        One base a dimension, pairwise coprime.
-    shift : sequence of float, optional
-        Added to every point, modulo 1.
-    start : int
-        Index of the first point; index 0 is the origin.
+    (count, d) float64, one pairwise coprime base a dimension, from index `start` on; index 0 is the origin.
 
-    Returns
-    -------
-    (count, d) ndarray of float64
-        Points in [0, 1).
-
-    Examples
-    --------
     >>> halton(3, start=1).round(3).tolist()
     [[0.5, 0.333], [0.25, 0.667], [0.75, 0.111]]
     """
@@ -64,20 +48,8 @@ def _radical_inverse(index: Array, base: int) -> Array:
 
 
 def grid(n: int) -> Array:
-    """Return the centres of an n by n grid, rows first: ((i + 1/2) / n, (j + 1/2) / n).
+    """Return the centres (u, v) of an n by n grid, (n n, 2) float64; u runs fastest.
 
-    Parameters
-    ----------
-    n : int
-        Cells along each side.
-
-    Returns
-    -------
-    (n * n, 2) ndarray of float64
-        Points (u, v); u runs fastest.
-
-    Examples
-    --------
     >>> grid(2).tolist()
     [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]]
     """
@@ -87,18 +59,7 @@ def grid(n: int) -> Array:
 
 
 def hilbert_order(height: int, width: int) -> Array:
-    """Return the pixels of a picture in the order a Hilbert curve visits them, so that neighbours stay close.
-
-    Parameters
-    ----------
-    height, width : int
-        Size of the picture, pixels.
-
-    Returns
-    -------
-    (height * width,) ndarray of int64
-        Flat pixel indices, each once.
-    """
+    """Return a picture's flat pixel indices (h w,), int64, in the order of a Hilbert curve: neighbours stay close."""
     order = max(1, max(height, width) - 1).bit_length()
     row, column = (axis.ravel().astype(np.int64) for axis in np.mgrid[:height, :width])
     rank = np.zeros(len(row), np.int64)
@@ -114,18 +75,7 @@ def hilbert_order(height: int, width: int) -> Array:
 
 @kernel
 def hash_bits(value: Any) -> Any:
-    """Return 32 well-mixed bits of an integer.
-
-    Parameters
-    ----------
-    value : int
-        Taken modulo 2^32.
-
-    Returns
-    -------
-    uint32
-        The hash.
-    """
+    """Return 32 well-mixed bits of an integer, taken modulo 2^32."""
     x = np.uint32(value)
     x = np.uint32((x ^ (x >> np.uint32(16))) * np.uint32(0x21F0AAAD))
     x = np.uint32((x ^ (x >> np.uint32(15))) * np.uint32(0xD35A2D97))
@@ -134,18 +84,7 @@ def hash_bits(value: Any) -> Any:
 
 @kernel
 def reverse_bits(value: Any) -> Any:
-    """Return a 32-bit integer with its bits in reverse order.
-
-    Parameters
-    ----------
-    value : int
-        Taken modulo 2^32.
-
-    Returns
-    -------
-    uint32
-        First bit last.
-    """
+    """Return a 32-bit integer (taken modulo 2^32) with its bits in reverse order."""
     x = np.uint32(value)
     x = np.uint32((x >> np.uint32(16)) | (x << np.uint32(16)))
     x = np.uint32(((x & np.uint32(0xFF00FF00)) >> np.uint32(8)) | ((x & np.uint32(0x00FF00FF)) << np.uint32(8)))
@@ -158,21 +97,8 @@ def reverse_bits(value: Any) -> Any:
 def scramble(value: Any, seed: Any) -> Any:
     """Return 32 bits after a nested uniform (Owen) scramble: each bit flips by a hash of the bits above it.
 
-    Parameters
-    ----------
-    value : int
-        Bits of a point (value * 2^-32 in [0, 1)).
-    seed : int
-        Which scramble; equal seeds give equal scrambles.
-
-    Returns
-    -------
-    uint32
-        Bits of the scrambled point. Every elementary interval keeps its number of points.
-
-    Notes
-    -----
-    The multiply-and-add permutation idea of Laine and Karras 2011, applied to the reversed bits.
+    `value` 2^-32 is a point in [0, 1); every elementary interval keeps its number of points. The multiply-and-add
+    permutation idea of Laine and Karras 2011, applied to the reversed bits.
     """
     s = hash_bits(seed)
     x = np.uint32(reverse_bits(value) + s)
@@ -185,25 +111,10 @@ def scramble(value: Any, seed: Any) -> Any:
 
 @kernel
 def sobol_owen(index: Any, dimension: Any, seed: Any) -> Any:
-    """Return one coordinate of a scrambled low-discrepancy point.
+    """Return one coordinate in [0, 1), float64, of point `index` (0 to 2^32 - 1) of a scrambled low-discrepancy set.
 
-    Parameters
-    ----------
-    index : int
-        Which point, 0 to 2^32 - 1.
-    dimension : int
-        Which coordinate. Coordinates 2 k and 2 k + 1 form a (0, 2)-sequence; pairs are shuffled against each other.
-    seed : int
-        Which randomisation of the whole set.
-
-    Returns
-    -------
-    float64
-        In [0, 1).
-
-    Notes
-    -----
-    Padded pairs with shuffled order, after Burley 2020 (JCGT 9, 4).
+    Coordinates 2 k and 2 k + 1 form a (0, 2)-sequence; pairs are shuffled against each other, after Burley 2020 (JCGT
+    9, 4). `seed` randomises the whole set.
     """
     pair = hash_bits(np.uint32(seed) ^ hash_bits(np.uint32(dimension >> 1) + np.uint32(0x9E3779B9)))
     shuffled = scramble(index, pair)  # blocks of 2^k points stay blocks, so each stays well spread
@@ -228,17 +139,9 @@ def _second_sobol_axis(index: Any) -> Any:
 
 @kernel
 def cosine_hemisphere(u: Any, v: Any) -> Any:
-    """Return a direction of the upper hemisphere with density cos(theta) / pi.
+    """Return a direction of density cos(theta) / pi, z up, by a point of the unit square.
 
-    Parameters
-    ----------
-    u, v : float
-        Point of the unit square; u = sin^2 theta, v the share of the turn.
-
-    Returns
-    -------
-    tuple of 3 floats
-        Unit vector, z up.
+    u = sin^2 theta, v the share of the turn.
     """
     real = type(u)
     radius = math.sqrt(u)

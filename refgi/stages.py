@@ -43,6 +43,7 @@ class Run:
     output: Any = None
     arguments: Mapping[str, Any] | None = None  # the inputs as the stage was handed them, kept likewise
     value: Any = None  # the output as the stage returned it
+    steps: Any = None  # what its steps made of it, by field, where they ran; their runs follow
 
 
 @dataclasses.dataclass
@@ -51,6 +52,7 @@ class Log:
 
     runs: list[Run] = dataclasses.field(default_factory=list)
     record: bool = False
+    steps: bool = False
     memory: "Memory | None" = None
     progress: Callable[[str, float], None] | None = None
     counts: Counter[Counted] | None = None  # of what `tally` counts; None where nobody asked
@@ -58,6 +60,7 @@ class Log:
     _depth: int = 0
     _open: list[str] = dataclasses.field(default_factory=list)
     _made: dict[int, weakref.ref[Any]] = dataclasses.field(default_factory=dict)  # arrays whose bytes are counted
+    _steps: dict[int, tuple[Any, Any]] = dataclasses.field(default_factory=dict)  # outputs by id, and their steps'
 
     def seconds(self, name: str) -> float:
         """Return the total time of all runs of the stage `name`, s."""
@@ -111,20 +114,16 @@ class Memory:
 _log: ContextVar[Log | None] = ContextVar("refgi_stage_log", default=None)
 
 
-def stage(name: str, *, kept: bool = True) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Name a pure function as one step of a method.
+def stage(
+    name: str, *, kept: bool = True, steps: Callable[..., Any] | Literal["inside"] | None = None, each: str = ""
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Name a pure function as one step of a method; the decorated function behaves as before.
 
-    Parameters
-    ----------
-    name : str
-        The step's name in logs and test vectors, package.verb_or_noun and no other stage's, such as ``"pairs.sum"``.
-    kept : bool
-        Whether a `Memory` keeps its results; not worth it where the inputs are made anew in every call.
-
-    Returns
-    -------
-    callable
-        The decorator; the decorated function behaves as before.
+    `name` is package.verb_or_noun and no other stage's; `kept`: whether a `Memory` keeps its results (not worth it
+    where inputs are made anew in every call); `each`: what it runs once for, such as a lamp: test vectors number its
+    runs even where there is one. `steps`: "inside", where the stages that run inside are its steps, or a function that
+    makes the same of the same arguments one step after the other, each a stage, where this one makes several at once.
+    That runs inside `observe(record=True, steps=True)` alone and returns what the steps made, by the output's fields.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -133,9 +132,9 @@ def stage(name: str, *, kept: bool = True) -> Callable[[Callable[P, R]], Callabl
             log = _log.get()
             if log is None:
                 return function(*args, **kwargs)
-            return _observed(log, name, function, args, kwargs, log.memory if kept else None)
+            return _observed(log, name, function, args, kwargs, log.memory if kept else None, steps)
 
-        call.stage_name = name  # type: ignore[attr-defined]
+        call.stage_name, call.each = name, each  # type: ignore[attr-defined]
         known = STAGES.setdefault(name, call)
         if (known.__module__, known.__qualname__) != (function.__module__, function.__qualname__):
             raise ValueError(f"stage {name!r}: {function.__qualname__} of {function.__module__} has the name of "
@@ -147,30 +146,17 @@ def stage(name: str, *, kept: bool = True) -> Callable[[Callable[P, R]], Callabl
 
 @contextmanager
 def observe(
-    *, record: bool = False, memory: Memory | None = None, progress: Callable[[str, float], None] | None = None,
-    counting: bool = False, substitute: Substitute | None = None,
+    *, record: bool = False, steps: bool = False, memory: Memory | None = None,
+    progress: Callable[[str, float], None] | None = None, counting: bool = False, substitute: Substitute | None = None,
 ) -> Iterator[Log]:
-    """Log every stage that runs inside the block.
+    """Log every stage that runs inside the block, in a `Log` that fills while it runs.
 
-    Parameters
-    ----------
-    record : bool
-        Keep inputs and outputs of each run.
-    memory : Memory, optional
-        Reuse results kept there by this and earlier blocks.
-    progress : callable, optional
-        Called with (stage name, fraction done) as long stages advance.
-    counting : bool
-        Count pairs, rays and bytes of the arrays that stages make, which takes time of its own.
-    substitute : callable, optional
-        Called with a stage's name, function and arguments, positional and by name; what it returns is the output.
-
-    Yields
-    ------
-    Log
-        Filled while the block runs.
+    `record` keeps inputs and outputs; `steps` then follows each stage that makes several things at once by its steps;
+    `memory` reuses results kept there; `progress` is called with (stage name, fraction done). `counting` counts pairs,
+    rays and bytes of arrays. Steps and counts take time of their own. `substitute` is called with a stage's name,
+    function and arguments, positional and by name, and returns the output.
     """
-    log = Log(record=record, memory=memory, progress=progress, counts=Counter() if counting else None,
+    log = Log(record=record, steps=steps, memory=memory, progress=progress, counts=Counter() if counting else None,
               substitute=substitute)
     token = _log.set(log)
     try:
@@ -183,15 +169,7 @@ def observe(
 def reusing(memory: Memory | None) -> Iterator[list[Run]]:
     """Let the stages inside the block, a frame, reuse what the frames before left; whoever observes goes on observing.
 
-    Parameters
-    ----------
-    memory : Memory or None
-        Of these frames; None: nothing is reused but what the observer's own memory holds.
-
-    Yields
-    ------
-    list of Run
-        Filled with the block's runs when it ends.
+    Yields the block's runs, filled at its end. Without a memory nothing is reused but what the observer's holds.
     """
     log, runs = _log.get(), list[Run]()
     if log is None:
@@ -213,10 +191,7 @@ def reusing(memory: Memory | None) -> Iterator[list[Run]]:
 def sharing() -> Iterator[None]:
     """Let the stages inside the block, two passes over one frame, share their results.
 
-    Yields
-    ------
-    None
-        Nothing: an observer's memory serves where there is one, else one that ends with the block.
+    An observer's memory serves where there is one, else one that ends with the block.
     """
     log = _log.get()
     if log is None:
@@ -234,42 +209,29 @@ def sharing() -> Iterator[None]:
 
 
 def skip(name: str, reason: str) -> None:
-    """Note in the log that a stage was left out and why.
-
-    Parameters
-    ----------
-    name : str
-        The stage that does not run.
-    reason : str
-        Why the scene at hand does not need it.
-    """
+    """Note in the log that a stage was left out, and why the scene at hand does not need it."""
     if (log := _log.get()) is not None:
         log.runs.append(Run(name, "skipped", reason=reason, depth=log._depth))
 
 
 def tally(what: Counted, number: Callable[[], SupportsInt]) -> None:
-    """Add to what whoever observes counts.
+    """Add to what whoever observes counts; `number` is called only where they are counted.
 
-    Parameters
-    ----------
-    what : str
-        ``"pairs"`` of light, or other sender, and receiver that a sum is given; ``"rays"`` that are traced.
-    number : callable
-        Returns how many; called only where they are counted.
+    ``"pairs"`` of light, or other sender, and receiver that a sum is given; ``"rays"`` that are traced.
     """
     log = _log.get()
     if log is not None and log.counts is not None:
         log.counts[what] += int(number())
 
 
-def report_progress(fraction: float) -> None:
-    """Tell whoever observes how far the running stage is.
+def of_steps(output: Any) -> Any:
+    """Return what steps made in place of a stage's output, for the steps of a later stage; else the output."""
+    log = _log.get()
+    return output if log is None else log._steps.get(id(output), (None, output))[1]
 
-    Parameters
-    ----------
-    fraction : float
-        Share of the stage's work that is done, 0 to 1.
-    """
+
+def report_progress(fraction: float) -> None:
+    """Tell whoever observes what share of the running stage's work is done, 0 to 1."""
     log = _log.get()
     if log is not None and log.progress is not None and log._open:
         log.progress(log._open[-1], fraction)
@@ -277,7 +239,7 @@ def report_progress(fraction: float) -> None:
 
 def _observed(
     log: Log, name: str, function: Callable[..., R], args: tuple[Any, ...], kwargs: dict[str, Any],
-    memory: Memory | None,
+    memory: Memory | None, steps: Callable[..., Any] | Literal["inside"] | None,
 ) -> R:
     inputs = (*args, *(item for pair in sorted(kwargs.items()) for item in pair))
     if memory is not None:
@@ -307,6 +269,19 @@ def _observed(
         arguments = _arguments(function, args, kwargs)
         run = dataclasses.replace(run, inputs={name: recorded(value) for name, value in arguments.items()},
                                   output=recorded(output), arguments=arguments, value=output)
+        if log.steps and steps == "inside":
+            run = dataclasses.replace(run, steps=run.output)
+        elif log.steps and callable(steps):
+            del log.runs[position:]  # what ran inside; the steps say it finer
+            log._depth += 1
+            others, log.memory = log.memory, None  # what ran inside is not there for them to reuse
+            try:
+                made = steps(*args, **kwargs)
+                log._steps[id(output)] = output, made
+                run = dataclasses.replace(run, steps=recorded(made))
+            finally:
+                log._depth -= 1
+                log.memory = others
     log.runs.insert(position, run)
     if memory is not None:
         memory.keep(name, inputs, output)

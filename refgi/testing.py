@@ -1,6 +1,7 @@
 """For pytest suites of ports: assertions on stages and pictures, and kits made once.
 
-`assert_stage_close(my_flux, "sii-warp-a", "rsm0.flux")` judges one array by the quick kit, which is made on first use;
+`assert_stage_close(my_flux, "sii-warp-a", "rsm.reflected_flux0.flux")` judges one array by the quick kit, which is
+made on first use;
 `stages(scene, "val", folder=...)` gives the arrays of every stage of any scene and settings;
 `pytest_plugins = ["refgi.testing"]` in a conftest.py gives the fixture `refgi_kit`.
 """
@@ -8,6 +9,7 @@
 import functools
 import hashlib
 import os
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.errors import InputError
+from refgi.errors import InputError, RefgiWarning
 
 if TYPE_CHECKING:
     from refgi.scene import Scene
@@ -71,7 +73,7 @@ def assert_stage_close(
     case : str
         Id of a case, such as "sii-warp-a".
     name : str
-        Name of an array, such as "rsm0.flux".
+        Name of an array, such as "rsm.reflected_flux0.flux".
     tier : {"T0", "T1", "T2", "T2B", "R11G11B10F", "RGB9E5"}
         Equal; float32 rounding; storage in half floats; in 8 bits where they fit; in packed floats.
     kit : Kit, optional
@@ -92,16 +94,12 @@ def assert_stage_close(
         from refgi.vectors.words import story
 
         raise AssertionError("\n".join(story(verdict)))
+    if verdict.verdict == "not-judged":
+        warnings.warn(RefgiWarning(f"{case}/{name}: not judged: {verdict.arrays[0].said}"), stacklevel=2)
 
 
 class StageData(Mapping[str, Array]):
-    """Arrays of every stage of a method on a scene, by name, as `stages` makes them.
-
-    Parameters
-    ----------
-    kit : Kit
-        A kit of one case.
-    """
+    """Arrays of every stage of a method on a scene, by name, as `stages` makes them: a kit of one case."""
 
     def __init__(self, kit: "Kit") -> None:
         from refgi.vectors.kit import Asked
@@ -121,22 +119,7 @@ class StageData(Mapping[str, Array]):
         return len(self.case.arrays)
 
     def assert_close(self, got: npt.ArrayLike, name: str, *, tier: str = "T1") -> None:
-        """Assert that an array of a port is what it should be, as `assert_stage_close` does.
-
-        Parameters
-        ----------
-        got : array_like
-            What the port has.
-        name : str
-            Name of an array, such as "pairs.sum".
-        tier : {"T0", "T1", "T2", "T2B", "R11G11B10F", "RGB9E5"}
-            As for `assert_stage_close`.
-
-        Raises
-        ------
-        AssertionError
-            If it is not.
-        """
+        """Assert that an array of a port is what it should be; tiers and errors as for `assert_stage_close`."""
         assert_stage_close(got, self.case.id, name, tier=tier, kit=self.kit)
 
 

@@ -7,20 +7,7 @@ IN_TITLES = {":": "%3A", ",": "%2C"}
 
 
 def table(rows: Sequence[tuple[str, ...]], *, right: frozenset[int] = frozenset()) -> str:
-    """Lay rows out as lines of aligned columns.
-
-    Parameters
-    ----------
-    rows : sequence of tuple of str
-        Equally many cells in each.
-    right : frozenset of int
-        Columns that are flush right.
-
-    Returns
-    -------
-    str
-        One line a row.
-    """
+    """Lay rows of equally many cells out as lines of aligned columns, those numbered in `right` flush right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     cells = ((cell.rjust(width) if i in right else cell.ljust(width)
               for i, (cell, width) in enumerate(zip(row, widths, strict=True))) for row in rows)
@@ -28,24 +15,8 @@ def table(rows: Sequence[tuple[str, ...]], *, right: frozenset[int] = frozenset(
 
 
 def annotation(title: str, text: str, kind: str = "error") -> str:
-    r"""Return an error or a warning as GitHub Actions shows it beside a change.
+    r"""Return an error or a warning as a workflow command, which GitHub Actions shows beside a change.
 
-    Parameters
-    ----------
-    title : str
-        Its headline.
-    text : str
-        What is wrong.
-    kind : {"error", "warning"}
-        How bad it is.
-
-    Returns
-    -------
-    str
-        A workflow command.
-
-    Examples
-    --------
     >>> annotation("a: b", "50 %\nand more")
     '::error title=a%3A b::50 %25%0Aand more'
     """

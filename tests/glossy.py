@@ -6,7 +6,7 @@ import numpy as np
 
 from refgi.scene import Scene, load_scene
 from refgi.scene.material import Material
-from tests.naive.pair_term import parts, received
+from tests.literal.whole.pairs import irradiance_of
 from tests.naive.receiver_lobes import brdf
 
 SIZE = 48  # pixels
@@ -44,13 +44,14 @@ def glossy_box(
 
 
 def defined(points, lights, w_o, pairs, footprint=None, factor=None):
-    """Return sum f_s E from the definition of f_s; E of each pair is that of the diffuse sum's twin."""
-    x, normal = points.position.T.astype(float), points.normal.T.astype(float)
-    result = np.zeros((3, len(x)))
-    for part in parts(lights, pairs, footprint):
-        w_i = part.position - x
-        w_i = w_i / np.linalg.norm(w_i, axis=1)[:, None]
-        f = brdf(points.exponent.astype(float), normal, w_i, w_o.T)
-        e = received(part, x.T, normal.T, pairs)
-        result += np.outer(part.flux, f * e * (1.0 if factor is None else factor(part, x)))
-    return result * points.specular
+    """Return sum f_s E from the definition of f_s; E of each pair is that of the literal diffuse sum.
+
+    `factor`: what pairs of the diffuse parts (0) and of lobes (1) are multiplied by, (N, n).
+    """
+    x, normal = points.position.astype(float), points.normal.astype(float)
+    away = (lights.position - pairs.offset * lights.normal)[..., None] - x[:, None]
+    w_i = np.moveaxis(away / np.linalg.norm(away, axis=0), 0, 2)
+    f = brdf(points.exponent.astype(float), normal.T, w_i, w_o.T)
+    received = irradiance_of(x, normal, lights, pairs, footprint)
+    total = sum(one * f * (1.0 if factor is None else factor(part)) for part, one in enumerate(received))
+    return total.sum(axis=1) * points.specular

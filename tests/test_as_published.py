@@ -34,7 +34,7 @@ from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
 from refgi.stages import observe
 from tests import lamps
-from tests.naive import gather as literal_gather
+from tests.literal.whole import gather as literal_gather
 from tests.naive.radiometry import lobe_fraction, solid_angle_of_rectangle
 from tests.wiring.cases import needed
 

@@ -88,6 +88,7 @@ def test_both_estimators_of_the_truth_pass_holes(estimator: str) -> None:
     assert np.abs(none - mesh).mean() > 0.02 * mesh.mean()
 
 
+@pytest.mark.slow("float64")
 @pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_flux_behind_a_plate_that_is_half_hole(dtype: type, evidence: Callable[[str], None]) -> None:

@@ -71,6 +71,7 @@ def test_each_stream_is_uniform_and_without_memory(use, seed):
         assert abs(np.corrcoef(values[:-lag], values[lag:])[0, 1]) < DEVIATIONS / math.sqrt(COUNT)
 
 
+@pytest.mark.slow
 def test_neighbouring_seeds_streams_and_parts_are_independent():
     seeds, uses, parts = (0, 1, 2, 3, 2**31, 2**32 - 1), tuple(USES.values()), (0, 1, 2, 255)
     streams = [draws(seed, use, COUNT, part) for seed, use, part in itertools.chain(

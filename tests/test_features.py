@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+from tests.conftest import COLLECTED
+
 ROOT = Path(__file__).parents[1]
 NUMBERS = {paper: range(1, count + 1) for paper, count in (("SII", 29), ("VAL", 27), ("AMS", 22), ("HSS", 20))}
 NUMBERS["REF"] = [*range(1, 29), 31, 32, 33]  # beyond the papers
@@ -16,11 +18,12 @@ def listed():
 
 
 def marked():
-    """Return the ids that tests carry."""
-    found = set()
+    """Return the files of the tests that carry an id, by id."""
+    found = {}
     for path in (ROOT / "tests").rglob("test_*.py"):
         for call in re.findall(r"mark\.feature\(([^)]*)\)", path.read_text()):
-            found |= set(re.findall(r"[A-Z]{3}-\d\d", call))
+            for feature in re.findall(r"[A-Z]{3}-\d\d", call):
+                found.setdefault(feature, set()).add(path)
     return found
 
 
@@ -30,4 +33,13 @@ def test_every_feature_is_listed_once_and_in_order():
 
 
 def test_listed_features_are_the_marked_ones():
-    assert {feature for feature, evidence in listed() if not evidence.startswith(NOT_BUILT)} == marked()
+    assert {feature for feature, evidence in listed() if not evidence.startswith(NOT_BUILT)} == marked().keys()
+
+
+def test_the_short_list_has_a_test_of_every_feature(request):
+    """Of ids all of whose files were collected; which in `make test` are all."""
+    items, left_out = request.config.stash.get(COLLECTED, ([], set()))
+    files = {item.path for item in items}
+    kept = {feature for item in items if id(item) not in left_out for mark in item.iter_markers("feature")
+            for feature in mark.args}
+    assert {feature for feature, carrying in marked().items() if carrying <= files} <= kept

@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.stability.file_trial import kinds, read_in_children
+from benchmarks.stability.file_child import kinds, read_in_children
 
 FORMATS = ("GLB", "OBJS", "LIBRARY", "POLYGONS", "IMAGE", "PICTURE", "KIT", "MANIFEST", "BUGS", "OUTPUT")
 FILES, SEED = 1000, 37  # of each format

@@ -29,11 +29,12 @@ from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.levels import pyramid, sender_pyramid
 from refgi.sssil.temporal import Sequence
 from tests.glossy import SIZE, defined, glossy_box
-from tests.naive import crown_points, gather, per_light, receiver_lobes
+from tests.literal.whole import gather
+from tests.literal.whole.multires import upsampled
+from tests.naive import crown_points, per_light, receiver_lobes
 from tests.naive.bitmask import one_slice
 from tests.naive.bitmask import transfer as transfer_of
 from tests.naive.crossings import LIFT, corners_of, face_normals, free
-from tests.naive.multires import upsampled
 from tests.wiring.cases import SCENES, VIEW
 
 pytestmark = pytest.mark.filterwarnings("ignore::refgi.errors.RefgiWarning")
@@ -161,7 +162,7 @@ def test_vpl_sums_what_shadow_rays_let_through(scene, visibility):
     settings = from_text(METHODS["vpl"].settings(), ("lights=40", f"visibility={str(visibility).lower()}"))
     with stages.observe(record=True) as log:
         got = METHODS["vpl"].lobes(frame, settings)
-    lights = next(run.inputs["lights"] for run in log.runs if run.name == "pairs.glossy_rays")
+    lights = next(run.arguments["lights"] for run in log.runs if run.name == "pairs.glossy_rays")
     pairs = SiiSettings().pairs
     close(got, receiver_lobes.of_lights(frame, lights, replaced(pairs, {"clamp": "none"}), visibility), RAYS)
 
@@ -217,7 +218,7 @@ def test_lists_of_each_light_are_refined_by_what_the_lobe_reflects(room, criteri
             at = spread(room, points, defined(single, one, to_eye(room, points), settings.pairs))
             leaves = per_light.subsplats(covered, lambda place, at=at: at[:, place[0], place[1]], top, 0,
                                          lambda largest: 0.4 * largest)
-            expected += upsampled(covered, top, "tent", frozenset(), leaves)
+            expected += upsampled(covered, top, "tent", leaves)
     specular = spread(room, points, points.specular)
     got = METHODS["multires"].lobes(room, settings)
     if criteria == "none":
@@ -250,7 +251,7 @@ def test_shared_subsplats_stand_for_glossy_pixels_of_one_exponent(room, upsampli
             times[i << level : (i + 1) << level, j << level : (j + 1) << level] += 1
         assert (times[covered] == 1).all()
         leaves = {cell: at[:, *per_light.representative(covered, *cell)] for cell in cells}
-        expected += upsampled(covered, shared.top, upsampling, frozenset(), leaves) * covered
+        expected += upsampled(covered, shared.top, upsampling, leaves) * covered
         listed += len(cells)
     assert listed < len(points.pixel)
     close(METHODS["multires"].lobes(room, settings), expected * spread(room, points, points.specular), 1e-9)

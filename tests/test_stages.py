@@ -49,6 +49,30 @@ def test_recording_keeps_inputs_and_output():
     assert log.runs[0].output is result
 
 
+def doubled_in_steps(values):
+    return {"": double(values), "other": values}
+
+
+@stages.stage("test.whole", steps=doubled_in_steps)
+def whole(values):
+    double(values)
+    return 2 * values
+
+
+def test_steps_run_where_asked_for_and_take_the_place_of_what_ran_inside():
+    with stages.observe(record=True) as log:
+        whole(np.ones(2))
+    assert [(run.name, run.depth) for run in log.runs] == [("test.whole", 0), ("test.double", 1)]
+    assert log.runs[0].steps is None
+    with stages.observe(record=True, steps=True) as log:
+        made = whole(np.ones(2))
+    assert [(run.name, run.depth) for run in log.runs] == [("test.whole", 0), ("test.double", 1)]
+    assert made.tolist() == log.runs[0].steps[""].tolist() == log.runs[1].output.tolist() == [2, 2]
+    with stages.observe(steps=True) as log:
+        whole(np.ones(2))
+    assert log.runs[0].steps is None
+
+
 class Lazy:
     def __init__(self):
         self.made = 0

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from benchmarks.stability.inputs import BLOCK, any_size
 from benchmarks.stability.ladder import THREADS, Ladder
 from benchmarks.stability.maths import Maths
-from benchmarks.stability.pair_ladders import filled
+from benchmarks.stability.pair_ladders import each, filled
 from refgi.elementary import exp2, log2, log2p1, pow
 from refgi.jit import kernel
 from refgi.stress.rows import Row
@@ -27,31 +27,8 @@ TINY, LARGEST = float(np.finfo(np.float32).tiny), 2.0**128
 UNIT = 2.0 ** (np.maximum(np.arange(256), 1) - 150.0)  # ULP of a float32 by its exponent's bits
 
 
-@kernel
-def _exp2(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = exp2(x[0, i])
-
-
-@kernel
-def _log2(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = log2(x[0, i])
-
-
-@kernel
-def _log2p1(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = log2p1(x[0, i])
-
-
-@kernel
-def _pow(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = pow(x[0, i], x[1, i])
-
-
-FILL = {"exp2": _exp2, "log2": _log2, "log2p1": _log2p1}
+FILL = {"exp2": each(exp2, 1), "log2": each(log2, 1), "log2p1": each(log2p1, 1)}
+POW = each(pow, 2)
 EXACT = {"exp2": np.exp2, "log2": np.log2, "log2p1": lambda x: np.log1p(x) * (1 / np.log(x.dtype.type(2)))}
 
 
@@ -191,9 +168,9 @@ def _ladder(name: str, draw: Any, fill: Any, formula: Any, limit: float, reals: 
 
 BOTH = ("float32", "float64")
 LADDERS = (
-    _ladder("exp2", draw_exponents, _exp2, power_of_two, 1.3, BOTH),
-    _ladder("log2", draw_positive, _log2, logarithm, 0.6, BOTH),
-    _ladder("log2p1", draw_above_minus_one, _log2p1, logarithm_of_more, 3.0, BOTH),
-    _ladder("pow32", draw_powers, _pow, power, 2.5, ("float32",)),
-    _ladder("pow64", draw_powers, _pow, power, 15.0, ("float64",)),
+    _ladder("exp2", draw_exponents, FILL["exp2"], power_of_two, 1.3, BOTH),
+    _ladder("log2", draw_positive, FILL["log2"], logarithm, 0.6, BOTH),
+    _ladder("log2p1", draw_above_minus_one, FILL["log2p1"], logarithm_of_more, 3.0, BOTH),
+    _ladder("pow32", draw_powers, POW, power, 2.5, ("float32",)),
+    _ladder("pow64", draw_powers, POW, power, 15.0, ("float64",)),
 )

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks.stability.cache_faults import cold_starts, damaged
-from benchmarks.stability.tasks import Task, Tell
+from benchmarks.stability.promise import Task, Tell
 from benchmarks.stability.victim_host import Host
 from benchmarks.stability.victims import VICTIMS, Stand, undisturbed
 from refgi.stress.rows import Row

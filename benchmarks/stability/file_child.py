@@ -2,7 +2,7 @@
 
 `python -m benchmarks.stability.file_child NAME FOLDER SEED FIRST END` reads the mutations FIRST to END of a format, or
 with the seed `bomb` its bombs of these numbers, and writes one JSON line a breach. The number at work stands in
-FOLDER/number, so that whoever started it knows which file it died of.
+FOLDER/number, so that `read_in_children` knows which file it died of, and starts the next behind that.
 """
 
 import importlib
@@ -10,9 +10,13 @@ import json
 import os
 import resource
 import signal
+import subprocess
 import sys
+import tempfile
 import warnings
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,6 +30,10 @@ PATIENCE = 120  # s by the clock, for a reader that waits for something
 MEMORY = 1 << 30  # bytes beside those of a process that has read a sound file
 MOST_BYTES = 2048  # of a refusal
 BOMB = "bomb"
+ROOT = Path(__file__).parents[2]
+CHILD = ["-m", "benchmarks.stability.file_child"]
+IN_MEMORY = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # a disk takes longer than most readers
+MOST_DEATHS = 200  # of one range of numbers: something else is wrong then
 
 
 class Breach(NamedTuple):
@@ -131,6 +139,45 @@ def limit_memory(more: int) -> None:
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     most = pages * resource.getpagesize() + more
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+
+def read_in_children(name: str, seed: int | str, numbers: range, processes: int = 1) -> list[Breach]:
+    """Read mutations of a format by number, of the seed `BOMB` its bombs, in some processes; return all breaches."""
+    step = -(-len(numbers) // processes)
+    shares = [numbers[k : k + step] for k in range(0, len(numbers), step)]
+    with ThreadPoolExecutor(processes) as pool:
+        return [one for share in pool.map(lambda share: _share(name, str(seed), share), shares) for one in share]
+
+
+def _share(name: str, seed: str, numbers: range) -> list[Breach]:
+    found: list[Breach] = []
+    first, deaths = numbers.start, 0
+    while first < numbers.stop:
+        with tempfile.TemporaryDirectory(prefix="refgi-files-", dir=IN_MEMORY) as folder:
+            command = [sys.executable, *CHILD, name, folder, seed, str(first),
+                       str(numbers.stop)]
+            child = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+            progress = Path(folder) / "number"
+            at = int(progress.read_text()) if progress.exists() else -1
+        found += [Breach(*json.loads(line)) for line in child.stdout.splitlines()]
+        if at < first or deaths > MOST_DEATHS:
+            raise RuntimeError(f"{name}: files cannot be read at all: {child.stderr[-2000:]}")
+        if at < numbers.stop:
+            found.append(Breach(at, *_death(child.returncode, child.stderr)))
+        deaths, first = deaths + 1, at + 1
+    return found
+
+
+def _death(code: int, said: str) -> tuple[str, str]:
+    if code in (-signal.SIGALRM, -signal.SIGPROF):
+        return "hang", f"more than {SECONDS} s"
+    return "death", f"ended by {signal.Signals(-code).name}" if code < 0 else f"exit {code}: {said[-500:]}"
+
+
+def kinds(breaches: Sequence[Breach]) -> str:
+    """Return how many breaches there are of each kind."""
+    counts = Counter(breach.kind for breach in breaches)
+    return ", ".join(f"{count} {kind}" for kind, count in counts.most_common())
 
 
 if __name__ == "__main__":

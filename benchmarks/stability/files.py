@@ -9,10 +9,9 @@ from functools import partial
 
 from benchmarks.stability import promise, written_promises
 from benchmarks.stability.bombs import BOMBS
-from benchmarks.stability.file_child import BOMB, MEMORY, SECONDS, Breach
+from benchmarks.stability.file_child import BOMB, MEMORY, SECONDS, Breach, kinds, read_in_children
 from benchmarks.stability.file_formats import FORMATS
-from benchmarks.stability.file_trial import kinds, read_in_children
-from benchmarks.stability.tasks import Task, Tell
+from benchmarks.stability.promise import Task, Tell
 from refgi.stress.rows import Row
 
 SEED = 19

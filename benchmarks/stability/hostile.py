@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from refgi.errors import InputError
 from refgi.scene import Camera, DirectionalLight, Light, Material, Mesh, PointLight, Scene, SpotLight, merge
 from refgi.scene.values import Array
 
@@ -190,4 +189,3 @@ def _flat(rng: np.random.Generator) -> Piece:
 
 
 PIECES = (_room, _room, _triangles, _needles, _soup, _fan, _flat)
-REFUSED = InputError

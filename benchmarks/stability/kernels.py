@@ -7,15 +7,13 @@ import numpy as np
 
 from benchmarks.stability import (
     area_promises,
-    crown_ladders,
+    buffers,
     elementary_range,
-    floor_promises,
-    height_ladders,
+    hssil,
     lamp_ladders,
     level_promises,
     light_ladders,
-    lobe_ladders,
-    lobe_promises,
+    lobes,
     map_ladders,
     map_promises,
     pair_ladders,
@@ -24,18 +22,17 @@ from benchmarks.stability import (
     sampled_promises,
     sent_promises,
     sum_promises,
-    unit_promises,
     val_ladders,
 )
 from benchmarks.stability.inputs import BLOCK
 from benchmarks.stability.ladder import Ladder, conditions, errors, inputs_of, rows
 from benchmarks.stability.maths import DIGITS, EXTENDED, trusted
-from benchmarks.stability.tasks import Task, Tell
+from benchmarks.stability.promise import Task, Tell
 from refgi.stress.rows import Row
 
-MODULES = (pair_ladders, crown_ladders, lamp_ladders, val_ladders, map_ladders, elementary_range, lobe_ladders,
-           light_ladders, area_promises, height_ladders, level_promises, sent_promises)
-PROMISED = (sum_promises, lobe_promises, unit_promises, floor_promises, map_promises, area_promises, level_promises,
+MODULES = (pair_ladders, hssil, lamp_ladders, val_ladders, map_ladders, elementary_range, lobes, light_ladders,
+           area_promises, level_promises, sent_promises)
+PROMISED = (sum_promises, lobes, buffers, map_promises, area_promises, level_promises,
             place_promises, sampled_promises, sent_promises)  # of stages
 ALL = ".all"
 
@@ -60,7 +57,7 @@ def tasks(short: bool) -> list[Task]:
         return lambda _: elementary_range.rows(name, short)
 
     return [*(Task(name, measured(ladder)) for name, ladder in ladders().items()),
-            Task("crown.unit", lambda _: crown_ladders.unit_rows(short)),
+            Task("crown.unit", lambda _: hssil.unit_rows(short)),
             *(Task(f"{name}{ALL}", whole(name)) for name in elementary_range.FILL),
             *promise.promise_tasks(promises().values(), "kernels", short)]
 

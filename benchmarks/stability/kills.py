@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.kill_batch import killed as killed_batch
-from benchmarks.stability.tasks import Task, Tell
+from benchmarks.stability.promise import Task, Tell
 from benchmarks.stability.victim_host import Host
 from benchmarks.stability.victims import VICTIMS, Stand, Undisturbed, allowed, undisturbed, with_old_files
 from refgi.stress.rows import Row

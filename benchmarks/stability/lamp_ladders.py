@@ -13,7 +13,7 @@ import numpy.typing as npt
 from benchmarks.stability.inputs import BLOCK, across, directions, sizes
 from benchmarks.stability.ladder import Ladder
 from benchmarks.stability.maths import dot
-from benchmarks.stability.pair_ladders import filled
+from benchmarks.stability.pair_ladders import each_of, filled
 from refgi.jit import kernel
 from refgi.radiometry import (
     FOR_FLOAT32,
@@ -43,25 +43,6 @@ def _edges(x: Array, out: Array) -> None:
 def _shares(x: Array, cones: Array, plain: float, out: Array) -> None:
     for i in range(x.shape[1]):
         out[0, i] = spot_falloff((x[0, i], x[1, i], x[2, i]), (x[3, i], x[4, i], x[5, i]), cones[i], plain)
-
-
-@kernel
-def _perspective_corners(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = corner_solid_angle_perspective(x[0, i], x[1, i])
-
-
-@kernel
-def _paraboloid_corners(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = corner_solid_angle_paraboloid(x[0, i], x[1, i])
-
-
-@kernel
-def _bases(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        (out[0, i], out[1, i], out[2, i], out[3, i], out[4, i],
-         out[5, i]) = orthonormal_basis(x[0, i], x[1, i], x[2, i])
 
 
 def draw_edges(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
@@ -179,13 +160,13 @@ LADDERS = (
            falloffs(FOR_FLOAT32), falloff, 8.0, source="8 ULP of float32, as the kernel promises, without a condition",
            unit="float32", conditioned=False, reals=("float64",), extended=0, fixed=(OUTER, INNER),
            brief_exact=2000),
-    Ladder("solid_angle.perspective", "corners 1e-12 .. 1e6", draw_corners, filled(_perspective_corners),
+    Ladder("solid_angle.perspective", "corners 1e-12 .. 1e6", draw_corners, each_of(corner_solid_angle_perspective, 2),
            perspective_corner, lowest=-np.inf),
-    Ladder("solid_angle.paraboloid", "corners 1e-9 .. 1", draw_disc, filled(_paraboloid_corners), paraboloid_corner,
-           9.0, source="9 roundings, each at most one ULP", lowest=-np.inf),
+    Ladder("solid_angle.paraboloid", "corners 1e-9 .. 1", draw_disc, each_of(corner_solid_angle_paraboloid, 2),
+           paraboloid_corner, 9.0, source="9 roundings, each at most one ULP", lowest=-np.inf),
     Ladder("solid_angle.texel", "1 .. 16384 texels a side, half extents 1e-6 .. 3", draw_texels, texels, texel, 9.0,
            source="four corners off by 2.2e-16 each, over the texel at the rim, 1.6e-9 sr: 5.5e-7", unit="float32",
            conditioned=False, reals=("float64",), extended=0, exact=10_000),
-    Ladder("frame.basis", "unit normals, along axes, flat, needles", draw_normals, filled(_bases, 6), basis, 4.0,
-           unit="one", lowest=-np.inf),
+    Ladder("frame.basis", "unit normals, along axes, flat, needles", draw_normals, each_of(orthonormal_basis, 3, 6),
+           basis, 4.0, unit="one", lowest=-np.inf),
 )

@@ -12,19 +12,13 @@ import numpy.typing as npt
 from benchmarks.stability.inputs import BLOCK, directions, sizes, some
 from benchmarks.stability.ladder import Ladder
 from benchmarks.stability.maths import dot
-from benchmarks.stability.pair_ladders import filled
+from benchmarks.stability.pair_ladders import each_of
 from refgi.jit import kernel
 from refgi.pairs.sphere_pair import cone_term
 from refgi.radiometry import POINT, incident_light
 from refgi.scene.model import LightTable
 
 Array = npt.NDArray[Any]
-
-
-@kernel
-def _cones(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = cone_term(x[0, i], x[1, i], x[2, i], x[3, i])
 
 
 @kernel
@@ -83,8 +77,8 @@ def _lamp(name: str, near: Any, of: str) -> Ladder:
 
 
 LADDERS = (
-    Ladder("sphere.cone", "a 1e-7 rad .. 88 degrees and 0, above both horizons", draw_cones, filled(_cones), cone,
-           12.0, source="12 roundings, each at most one ULP", extended=0),
+    Ladder("sphere.cone", "a 1e-7 rad .. 88 degrees and 0, above both horizons", draw_cones, each_of(cone_term, 4),
+           cone, 12.0, source="12 roundings, each at most one ULP", extended=0),
     _lamp("lamp.light", np.float64, "float64"),
     _lamp("lamp.light32", np.float32, "float32"),
 )

@@ -107,20 +107,7 @@ BYTEWISE = (spoiled, with_odd_token, with_odd_line, with_odd_word)
 
 
 def mutated(content: bytes, random: np.random.Generator) -> bytes:
-    """Return the bytes of a file changed in one of all ways.
-
-    Parameters
-    ----------
-    content : bytes
-        A sound file. JSON, and the JSON of a GLB, is changed as a tree in half of the cases.
-    random : Generator
-        What is changed, and how.
-
-    Returns
-    -------
-    bytes
-        Mostly unusable, sometimes sound.
-    """
+    """Return the bytes of a file changed in one of all ways; JSON and that of a GLB in half of the cases as a tree."""
     is_glb = content[:4] == b"glTF"
     if (is_glb or content[:1] == b"{") and random.random() < 0.5:
         tree, buffer = _parts_of_glb(content) if is_glb else (json.loads(content), b"")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from benchmarks.stability.inputs import BLOCK, around, directions, sizes, some
 from benchmarks.stability.ladder import Ladder
@@ -25,12 +26,6 @@ PAIR = "r 1e-15 .. 1e9 m and 0; normals any way, 1 ULP off, grazing, opposite"
 
 
 @kernel
-def _terms(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = geometry_term(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i], x[8, i])
-
-
-@kernel
 def _clamped(x: Array, out: Array) -> None:
     for i in range(x.shape[1]):
         out[0, i] = clamped_term(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i], x[8, i],
@@ -38,28 +33,28 @@ def _clamped(x: Array, out: Array) -> None:
 
 
 @kernel
-def _gaps(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = lobe_gap(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i])
-
-
-@kernel
-def _powers(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = lobe_power(x[0, i], x[1, i])
-
-
-@kernel
-def norms(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = lobe_norm(x[0, i], x[1, i])
-
-
-@kernel
 def _offsets(x: Array, out: Array) -> None:
     for i in range(x.shape[1]):
         out[0, i] = ray_offset(x[0, i], x[1, i], x[2, i], x[3, i])
         out[1, i] = far_offset(x[0, i], x[1, i], x[2, i])
+
+
+def each(function: Any, inputs: int, outputs: int = 1) -> Any:
+    """Return a kernel that fills (outputs, n) by a function of the columns of (inputs, n)."""
+    if outputs == 1:
+        @kernel
+        def fill(x: Array, out: Array) -> None:
+            for i in range(x.shape[1]):
+                out[0, i] = function(*to_fixed_tuple(x[:, i], inputs))
+    else:
+        @kernel
+        def fill(x: Array, out: Array) -> None:
+            for i in range(x.shape[1]):
+                found = function(*to_fixed_tuple(x[:, i], inputs))
+                for k in range(outputs):
+                    out[k, i] = found[k]
+
+    return fill
 
 
 def filled(fill: Any, outputs: int = 1) -> Any:
@@ -70,6 +65,14 @@ def filled(fill: Any, outputs: int = 1) -> Any:
         return out
 
     return run
+
+
+def each_of(function: Any, inputs: int, outputs: int = 1) -> Any:
+    """Return `each` as a function of inputs that allocates what it fills."""
+    return filled(each(function, inputs, outputs), outputs)
+
+
+norms = each_of(lobe_norm, 2)
 
 
 def draw_pairs(rng: np.random.Generator, real: Any) -> Array:
@@ -178,18 +181,19 @@ def offset(m: Any, x: Any) -> Any:
 
 
 LADDERS = (
-    Ladder("eq2.term", PAIR, draw_pairs, filled(_terms), term, 14.0, source=ROUNDINGS, smooth=term_unclamped,
+    Ladder("eq2.term", PAIR, draw_pairs, each_of(geometry_term, 9), term, 14.0, source=ROUNDINGS, smooth=term_unclamped,
            extended=10_000_000),
     Ladder("eq2.clamped", f"{PAIR}; bound, least distance and softness within e^6 of the pair's", draw_clamps,
            filled(_clamped), clamped, 16.0, source=f"{ROUNDINGS}, 2 more of the clamp", smooth=clamped_smooth,
            extended=4_000_000),
-    Ladder("lobe.gap", "r 1e-15 .. 1e9 m, any direction, 1 ULP off, opposite", draw_gaps, filled(_gaps), gap, 12.0,
+    Ladder("lobe.gap", "r 1e-15 .. 1e9 m, any direction, 1 ULP off, opposite", draw_gaps, each_of(lobe_gap, 6), gap,
+           12.0,
            source="6.5 roundings of the unit vector and 5 of its square, each at most one ULP", extended=2_000_000),
-    Ladder("lobe.power", "P 0 .. 1e8 (float64: 1e20), gap 0 .. 2", draw_powers, filled(_powers), power, floor=flushed,
-           extended=4_000_000),
-    Ladder("lobe.norm", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, filled(norms), norm,
+    Ladder("lobe.power", "P 0 .. 1e8 (float64: 1e20), gap 0 .. 2", draw_powers, each_of(lobe_power, 2), power,
+           floor=flushed, extended=4_000_000),
+    Ladder("lobe.norm", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, norms, norm,
            reals=("float32",), extended=0, exact=2000),
-    Ladder("lobe.norm64", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, filled(norms), norm, 5300.0,
+    Ladder("lobe.norm64", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, norms, norm, 5300.0,
            "observed x 2", "2615 ULP: a continued fraction of sqrt(P) steps", conditioned=False, reals=("float64",),
            extended=0, exact=2000),
     Ladder("ray.offset", "coordinates 0, 1e-30 .. 1e30 m", draw_offsets, filled(_offsets, 2), offset),

@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from benchmarks.stability.hostile import Hostile, hostile, shrunk
-from benchmarks.stability.tasks import Task, Tell
+from benchmarks.stability.promise import Task, Tell
 from refgi import load_scene
 from refgi.errors import InputError, RefgiWarning
 from refgi.methods import BUILT_IN, render

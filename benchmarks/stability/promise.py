@@ -1,4 +1,4 @@
-"""Promises of stages that no scalar kernel keeps alone: drawn cases, each with a figure; the worst is the row.
+"""Tasks of a part, and promises of stages: drawn cases, each with a figure; the worst is the row.
 
 A case is drawn from a generator of its own, so that case `i` of a seed is the same in every run.
 """
@@ -10,10 +10,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.stability.tasks import Task, Tell
 from refgi.stress.rows import Kind, Row
 
+Tell = Callable[[str], None]
 SEED = 17
+
+
+class Task(NamedTuple):
+    """Some rows that are made together; a run that was interrupted goes on after the last finished one."""
+
+    name: str  # unique in its part
+    run: Callable[[Tell], Iterable[Row]]
 
 
 class Case(NamedTuple):

@@ -19,10 +19,9 @@ from unittest.mock import patch
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.stability import ground_promises, promise
+from benchmarks.stability import promise
 from benchmarks.stability.meshes import MESHES, Mesh, Places, Rays, aimed_rays, leaving_rays, places_upon, random_rays
-from benchmarks.stability.promise import Promise, promise_tasks
-from benchmarks.stability.tasks import Task, Tell
+from benchmarks.stability.promise import Promise, Task, Tell, promise_tasks
 from refgi.rays import MISS, Tracer
 from refgi.stress.rows import Row
 
@@ -203,9 +202,9 @@ def tasks(short: bool) -> list[Task]:
 
 def promises() -> dict[str, Promise]:
     """Return the promises of shadow rays, of reach and of what stands on a large floor, by name."""
-    from benchmarks.stability import shadow_promises
+    from benchmarks.stability import shadows
 
-    return {one.name: one for one in (*shadow_promises.PROMISES, *ground_promises.PROMISES)}
+    return {one.name: one for one in shadows.PROMISES}
 
 
 def again(name: str, seed: int, case: int) -> str:

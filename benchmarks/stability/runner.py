@@ -19,7 +19,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from benchmarks.stability.tasks import Task
+from benchmarks.stability.promise import Task
 from refgi.compare.provenance import environment
 from refgi.stress.rows import Row, Stability, markdown, over_scenes, read_rows, write_rows
 

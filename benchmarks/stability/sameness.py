@@ -1,4 +1,8 @@
-"""Sameness: one hash a stage over threads, tiles and batches, cold and warm kernels, and compiler targets."""
+"""Sameness: one hash a stage over threads, tiles and batches, cold and warm kernels, and compiler targets.
+
+`python -m benchmarks.stability.sameness METHOD[,KEY=VALUE] ...` prints the hashes of each stage's result; the threads,
+the compiler's target and the folder of compiled kernels are those of the environment.
+"""
 
 import json
 import os
@@ -6,11 +10,16 @@ import platform
 import subprocess
 import sys
 import tempfile
+import warnings
 from pathlib import Path
 
-from benchmarks.stability.hashes import SCENES
-from benchmarks.stability.tasks import Task, Tell
-from refgi.methods import BUILT_IN
+from benchmarks.stability.promise import Task, Tell
+from refgi import Frame, load_scene
+from refgi.batch.digest import hashes_of
+from refgi.errors import RefgiWarning
+from refgi.methods import BUILT_IN, find_method
+from refgi.stages import observe
+from refgi.stress.promises import settings_of
 from refgi.stress.rows import Row
 
 ROOT = Path(__file__).parents[2]
@@ -24,7 +33,25 @@ BATCHES = {"truth": ("batch=4099", "batch=262144"), "vpl": ("batch=4099", "batch
 OWNED = "each element is owned by one iteration and summed in a fixed order"
 STRICT = "strict IEEE arithmetic: no contraction, no reassociation"
 
+SCENES = ("cornell_box", "stage")
+WIDTH, HEIGHT, MAP = 45, 33, 64  # pixels, texels: no multiples of any tile
+FEW = {"sii": ("lights=256",), "multires": ("lights=256",), "val": ("lights=256", "clusters=8", "maps=64"),
+       "vpl": ("lights=64",), "truth": ("samples=32",)}
+
 Hashes = dict[str, dict[str, str]]
+
+
+def hashes(method: str, *changes: str) -> dict[str, str]:
+    """Return the hash of each stage's results, in the order in which they ended, over all scenes."""
+    found: dict[str, str] = {}
+    settings = settings_of(method, (*FEW.get(method, ()), *changes))
+    for scene in SCENES:
+        with warnings.catch_warnings(), observe(record=True) as log:
+            warnings.simplefilter("ignore", RefgiWarning)
+            frame = Frame(load_scene(scene), width=WIDTH, height=HEIGHT, rsm_resolution=MAP)
+            frame.radiance(find_method(method).compute(frame, settings)[0])
+        found |= {f"{scene} {number} {name}": digest for number, (name, digest) in enumerate(hashes_of(log, {}))}
+    return found
 
 
 def tasks(short: bool) -> list[Task]:
@@ -49,7 +76,7 @@ def apart(first: Hashes, second: Hashes) -> list[str]:
 
 def hashes_in(environment: dict[str, str], *methods: str) -> Hashes:
     """Return the hashes that a process of some environment finds."""
-    made = subprocess.run([sys.executable, "-m", "benchmarks.stability.hashes", *methods], cwd=ROOT, check=True,
+    made = subprocess.run([sys.executable, "-m", "benchmarks.stability.sameness", *methods], cwd=ROOT, check=True,
                           env={**os.environ, **environment}, stdout=subprocess.PIPE, text=True)
     found: Hashes = json.loads(made.stdout)
     return found
@@ -69,7 +96,7 @@ def _threads(methods: tuple[str, ...], counts: tuple[int, ...], tell: Tell) -> R
         differing += apart(base, hashes_in({"NUMBA_NUM_THREADS": str(count)}, *methods))
     stages = sum(len(one) for one in base.values()) * (len(counts) - 1)
     return _row("threads", ", ".join(methods), f"{', '.join(map(str, counts))} threads", stages, differing, OWNED,
-                f"NUMBA_NUM_THREADS={counts[-1]} python -m benchmarks.stability.hashes {' '.join(methods)}")
+                f"NUMBA_NUM_THREADS={counts[-1]} python -m benchmarks.stability.sameness {' '.join(methods)}")
 
 
 def _batches(method: str) -> Row:
@@ -77,7 +104,7 @@ def _batches(method: str) -> Row:
     small, large = ({"picture": dict(zip(SCENES, _pictures(method, batch), strict=True))}
                     for batch in BATCHES[method])
     return _row("batches", method, " and ".join(BATCHES[method]), len(small["picture"]), apart(small, large), OWNED,
-                f"python -m benchmarks.stability.hashes {method},{BATCHES[method][0]}")
+                f"python -m benchmarks.stability.sameness {method},{BATCHES[method][0]}")
 
 
 def _pictures(method: str, change: str) -> list[str]:
@@ -92,7 +119,7 @@ def _cold() -> Row:
         cold = hashes_in({"REFGI_CACHE_DIR": folder}, *COLD)
     return _row("cold and warm kernels", ", ".join(COLD), "kernels compiled in the process and read from the cache",
                 sum(len(one) for one in warm.values()), apart(warm, cold), "the same machine code",
-                f"REFGI_CACHE_DIR=$(mktemp -d) python -m benchmarks.stability.hashes {' '.join(COLD)}")
+                f"REFGI_CACHE_DIR=$(mktemp -d) python -m benchmarks.stability.sameness {' '.join(COLD)}")
 
 
 def _target(name: str) -> Row:
@@ -102,4 +129,8 @@ def _target(name: str) -> Row:
     variables = " ".join(f"{key}='{value}'" for key, value in TARGETS[name].items())
     return _row("compiler target", ", ".join(COLD), f"{name} beside native",
                 sum(len(one) for one in native.values()), apart(native, other), STRICT,
-                f"{variables} REFGI_CACHE_DIR=$(mktemp -d) python -m benchmarks.stability.hashes {' '.join(COLD)}")
+                f"{variables} REFGI_CACHE_DIR=$(mktemp -d) python -m benchmarks.stability.sameness {' '.join(COLD)}")
+
+
+if __name__ == "__main__":
+    print(json.dumps({text.partition(",")[0]: hashes(*text.split(",")) for text in sys.argv[1:]}))

@@ -12,9 +12,8 @@ import numpy.typing as npt
 
 from benchmarks.stability.inputs import BLOCK, directions
 from benchmarks.stability.ladder import Ladder
-from benchmarks.stability.pair_ladders import filled
+from benchmarks.stability.pair_ladders import each_of
 from benchmarks.stability.promise import Case, Promise
-from refgi.jit import kernel
 from refgi.lights.walk import walk_lights
 from refgi.rays import Tracer
 from refgi.scene import Geometry, Material, SpotLight, light_table, material_table
@@ -27,12 +26,6 @@ GOOD_TO = 1e-8  # hemisphere directions, as the kernel promises
 CELLS, PATHS = 16, 64
 NARROWEST, WIDEST = 1.8e-7, 1.2  # half-angles, rad: refgi takes no narrower ones
 THINNEST = 1e-3  # of faces that rays leave, as wide as long
-
-
-@kernel
-def _directions(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i], out[1, i], out[2, i] = cosine_direction(x[0, i], x[1, i])
 
 
 def draw_square(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
@@ -136,7 +129,7 @@ def promised(m: Any, x: Any, real: Any) -> Any:  # noqa: ARG001
 
 LADDERS = (
     Ladder("hemisphere.cosine", "the unit square, near borders of the eighths of a turn", draw_square,
-           filled(_directions, 3), cosine_weighted, 1.0, source="1e-8, as the kernel promises",
+           each_of(cosine_direction, 2, 3), cosine_weighted, 1.0, source="1e-8, as the kernel promises",
            scale=promised, conditioned=False, reals=("float64",), lowest=-1.0),
 )
 NARROW = f"half-angles {NARROWEST:g} .. {WIDEST:g} rad"

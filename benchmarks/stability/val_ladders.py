@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from benchmarks.stability.inputs import BLOCK, directions, sizes
 from benchmarks.stability.ladder import Ladder
-from benchmarks.stability.pair_ladders import filled
+from benchmarks.stability.pair_ladders import each_of, filled
 from refgi.cluster.filters.basis import fill_basis, sine_cosine
 from refgi.cluster.filters.depth_scale import DepthScale, series_depths, series_distance
 from refgi.cluster.visibility.csm import compare_filtered, find_penumbra
@@ -39,12 +39,6 @@ Array = npt.NDArray[Any]
 TERMS = 4
 LEAST_BLOCKED = 0.02  # share of a search disc below which nothing blocks
 CAP = math.radians(80.0)  # the widest cone
-
-
-@kernel
-def _basis(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i], out[1, i] = sine_cosine(x[0, i])
 
 
 @kernel
@@ -232,8 +226,8 @@ def sines(m: Any, x: Any) -> Any:
 
 
 LADDERS = (
-    Ladder("val.basis", "t 0 .. 1", lambda rng, real: draw_depths(rng, real)[1:], filled(_basis, 2), sines, 2.5,
-           source="2.4e-7 (float64: 4e-16), as the kernel promises, of 1.2e-7 (2.2e-16)", unit="one",
+    Ladder("val.basis", "t 0 .. 1", lambda rng, real: draw_depths(rng, real)[1:], each_of(sine_cosine, 1, 2), sines,
+           2.5, source="2.4e-7 (float64: 4e-16), as the kernel promises, of 1.2e-7 (2.2e-16)", unit="one",
            conditioned=False, lowest=-1.000001),
     Ladder("val.step", "d and z 0 .. 1, 4 terms; near, equal, at the ends", draw_depths, steps, step, 16.0,
            source="each turn adds 4 ULP to sine and cosine, of 2 k - 1 turns 2 / c_k counts: 4 TERMS", unit="one",

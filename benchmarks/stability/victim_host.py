@@ -27,13 +27,7 @@ MODULES = ["refgi.cli.render", "refgi.cli.sequence", "refgi.cli.compare", "refgi
 
 
 class Host:
-    """Start commands in a host's forks; one at a time.
-
-    Parameters
-    ----------
-    patch : str
-        Python that the host runs first, such as a fault to be found.
-    """
+    """Start commands in a host's forks, one at a time; `patch` is Python that it runs first, such as a fault."""
 
     def __init__(self, patch: str = "") -> None:
         self._process = subprocess.Popen([sys.executable, "-m", "benchmarks.stability.victim_host", patch], cwd=ROOT,
@@ -51,23 +45,10 @@ class Host:
 
     def run(self, arguments: Sequence[str], folder: Path, *, end: signal.Signals | None = None, after: float = 0.0,
             at_file: int = 0, limits: Mapping[str, int] | None = None, said: str = "said") -> tuple[int, str]:
-        """Run a command, and send it a signal some seconds after it has begun to heed signals, or while it writes.
+        """Run a command and return its exit code, negative for a signal, and what it said, to the file `said`.
 
-        Parameters
-        ----------
-        arguments, folder
-            Of the command, and where it works.
-        end, after, at_file
-            The signal, and its moment: seconds, or the how manieth unfinished file that is seen, from 1.
-        limits, said
-            Of resources, and the end of the name of the file for what it says.
-
-        Returns
-        -------
-        code : int
-            Exit code, negative for a signal.
-        said : str
-            On stdout and stderr.
+        The signal `end` comes `after` seconds after it has begun to heed signals, or at the unfinished file `at_file`
+        that is seen, counted from 1.
         """
         process, place = self._start(arguments, folder, limits or {}, said)
         if end is not None:

@@ -15,23 +15,7 @@ MORE_IS_BETTER = ("ssim",)
 
 
 def read_baseline(file: Path) -> Result:
-    """Read the results of an earlier batch or bench.
-
-    Parameters
-    ----------
-    file : Path
-        Its results.json.
-
-    Returns
-    -------
-    Result
-        What it says.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read or is something else.
-    """
+    """Read the results.json of an earlier batch or bench; InputError if it cannot be read or is something else."""
     try:
         return Result.model_validate_json(file.read_bytes())
     except OSError as error:
@@ -44,21 +28,10 @@ def read_baseline(file: Path) -> Result:
 
 
 def worse(result: Result, baseline: Result, tolerance: float, folder: str = "") -> list[Finding]:
-    """Return figures that are worse than they were.
+    """Return figures of a batch that are worse than an earlier one's by more than `tolerance`, a share of that.
 
-    Parameters
-    ----------
-    result, baseline : Result
-        A batch and an earlier one; what only one of them holds is passed over.
-    tolerance : float
-        By which share of the earlier figure a figure may be worse.
-    folder : str
-        Of the earlier pictures.
-
-    Returns
-    -------
-    list of Finding
-        One a figure, with both pictures and the first stage whose output is another.
+    One finding a figure, with both pictures (the earlier ones in `folder`) and the first stage whose output is another.
+    What only one of the results holds is passed over.
     """
     before = dict(_runs(baseline))
     return [finding for key, run in _runs(result) if key in before
@@ -66,17 +39,9 @@ def worse(result: Result, baseline: Result, tolerance: float, folder: str = "") 
 
 
 def first_change(now: Run, before: Run) -> str | None:
-    """Return the first stage whose output is not what it was.
+    """Return the first stage of one method and setting whose output is not what it was.
 
-    Parameters
-    ----------
-    now, before : Run
-        Of one method and setting.
-
-    Returns
-    -------
-    str or None
-        Its name; None where all are the same or one of the runs holds no digests.
+    None where all are the same or one of the runs holds no digests.
     """
     if not (now.hashes and before.hashes):
         return None

@@ -73,10 +73,7 @@ class Buffers(stages.Memory):
 def load_kernels(scene: Scene) -> None:
     """Make the smallest of buffers, so that the time of no other holds that of loading its kernels.
 
-    Parameters
-    ----------
-    scene : Scene
-        Its materials and lights decide on the kernels.
+    The scene's materials and lights decide on the kernels.
     """
     small = Frame(scene, width=TINY, height=TINY, rsm_resolution=TINY)
     small.gbuffer.recorded()

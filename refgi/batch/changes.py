@@ -13,24 +13,9 @@ PACKAGE = Path(refgi.__file__).parent
 
 
 def changed_methods(methods: Iterable[str], commit: str) -> dict[str, list[str]]:
-    """Return what changed since a commit in the code that methods reach.
+    """Return by method which modules of those that it reaches changed since a commit; methods without are left out.
 
-    Parameters
-    ----------
-    methods : iterable of str
-        Short names.
-    commit : str
-        Whatever git takes for a commit of the checkout that refgi lies in.
-
-    Returns
-    -------
-    dict of str to list of str
-        Modules by method, for methods with some; comments and docstrings count for nothing.
-
-    Raises
-    ------
-    InputError
-        If refgi lies in no checkout or there is no such commit.
+    Comments and docstrings count for nothing. InputError if refgi lies in no git checkout or there is no such commit.
     """
     changed = _changed_files(commit)
     found = {}

@@ -21,25 +21,10 @@ SECONDS_TO_ANSWER = 10
 
 
 def run_on_cluster(address: str, jobs: Sequence[Job], common: Common, tell: Tell, written: Written) -> None:
-    """Do jobs on the workers of a scheduler.
+    """Do jobs, those of one frame side by side, on the workers of a scheduler, such as ``tcp://10.0.0.1:8786``.
 
-    Parameters
-    ----------
-    address : str
-        Of the scheduler, such as ``tcp://10.0.0.1:8786``.
-    jobs : sequence of Job
-        Those of one frame side by side; their scenes are there on every worker.
-    common : Common
-        What they share; its folders are there on every worker.
-    tell : callable
-        Called with (what runs, share done).
-    written : callable
-        Called after each chunk.
-
-    Raises
-    ------
-    InputError
-        If dask.distributed is not installed or nobody answers at the address.
+    Scenes and folders are there on every worker; `written` is called after each chunk. InputError if dask.distributed
+    is not installed or nobody answers at the address.
     """
     try:
         distributed: Any = import_module("distributed")

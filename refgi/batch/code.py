@@ -40,19 +40,9 @@ class Source(NamedTuple):
 
 
 def code_key(*places: str, alone: tuple[str, ...] = ()) -> str:
-    """Return a digest of all sources that some objects reach.
+    """Return a digest, 64 hexadecimal digits, of all sources that objects such as "refgi.splat.sii:METHOD" reach.
 
-    Parameters
-    ----------
-    *places : str
-        Module and name with a colon between, such as "refgi.splat.sii:METHOD".
-    alone : tuple of str
-        Modules that count by themselves, without what they import.
-
-    Returns
-    -------
-    str
-        64 hexadecimal digits; equal where all reached sources are the same but for comments and docstrings.
+    Equal where these are the same but for comments and docstrings. Modules `alone` count without what they import.
     """
     modules = sorted({*alone}.union(*(reached(place) for place in places)))
     text = "\n".join(f"{module} {_source(file_of(module)).digest}" for module in modules)
@@ -61,18 +51,7 @@ def code_key(*places: str, alone: tuple[str, ...] = ()) -> str:
 
 @functools.cache
 def reached(place: str) -> frozenset[str]:
-    """Return the modules that an object reaches by imports, in its own package and in refgi.
-
-    Parameters
-    ----------
-    place : str
-        Module and name with a colon between.
-
-    Returns
-    -------
-    frozenset of str
-        Names of modules.
-    """
+    """Return the modules that an object, "module:name", reaches by imports, in its own package and in refgi."""
     module, _, name = place.partition(":")
     packages = {"refgi", module.partition(".")[0]}
     found: set[str] = set()
@@ -88,34 +67,12 @@ def reached(place: str) -> frozenset[str]:
 
 
 def place_of(method: str) -> str:
-    """Return where a method is declared.
-
-    Parameters
-    ----------
-    method : str
-        Short name of a method.
-
-    Returns
-    -------
-    str
-        Module and name with a colon between.
-    """
+    """Return where a method is declared, as "module:name"."""
     return BUILT_IN[method] if method in BUILT_IN else entry_points(group=GROUP)[method].value
 
 
 def source_digest(text: bytes) -> str:
-    """Return a digest of a source without its comments and docstrings.
-
-    Parameters
-    ----------
-    text : bytes
-        Python.
-
-    Returns
-    -------
-    str
-        Hexadecimal digits.
-    """
+    """Return a digest, in hexadecimal digits, of a Python source without its comments and docstrings."""
     return _digest(ast.parse(text))
 
 

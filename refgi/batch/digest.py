@@ -13,20 +13,10 @@ DIGITS = 16
 
 
 def hashes_of(log: Log, buffers: Mapping[str, Sequence[str]]) -> tuple[tuple[str, str], ...]:
-    """Return the name and the digest of each stage's output.
+    """Return the name and the digest of each stage's output of a recorded log, in the order in which stages ended.
 
-    Parameters
-    ----------
-    log : Log
-        Recorded.
-    buffers : mapping of str to sequence of str
-        Digests of shared buffers by stage, in the order in which they were used. They stand for what the stage gives
-        whether it ran or gave back an earlier result; stages inside it are left out.
-
-    Returns
-    -------
-    tuple of (str, str)
-        In the order in which stages ended: one that others call comes after them.
+    `buffers`: digests of shared buffers by stage, in the order in which they were used. They stand for what the stage
+    gives whether it ran or gave back an earlier result; stages inside it are left out.
     """
     left = {name: list(digests) for name, digests in buffers.items()}
     ended: list[tuple[str, str]] = []
@@ -41,17 +31,9 @@ def hashes_of(log: Log, buffers: Mapping[str, Sequence[str]]) -> tuple[tuple[str
 
 
 def digest_of(value: Any) -> str:
-    """Return a digest of a stage's output.
+    """Return a digest of a stage's output, in hexadecimal digits.
 
-    Parameters
-    ----------
-    value : object
-        Arrays, numbers, text and None, in tuples, lists, mappings and dataclasses; of any other object its type alone.
-
-    Returns
-    -------
-    str
-        Hexadecimal digits.
+    Of arrays, numbers, text and None, in tuples, lists, mappings and dataclasses; of any other object its type alone.
     """
     digest = hashlib.sha256()
     for part in _parts(value):

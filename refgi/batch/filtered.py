@@ -33,28 +33,9 @@ _left: list[_Left] = []  # of the last filtered job of this process
 
 
 def blended(job: Job, common: Common, shared: Shared, irradiance: Array) -> Filtered:
-    """Blend a frame's light with that of the frame before, and leave it to the next.
+    """Blend a frame's irradiance, (3, h, w), W/m^2, with that of the frame before, and leave it to the next.
 
-    Parameters
-    ----------
-    job : Job
-        With a temporal filter.
-    common : Common
-        What it shares with the batch.
-    shared : Shared
-        What it shares with the jobs of its frame.
-    irradiance : (3, h, w) ndarray
-        Light of this frame by itself, W/m^2.
-
-    Returns
-    -------
-    Filtered
-        Its light; that of the first frame is as it was.
-
-    Raises
-    ------
-    InputError
-        If the frame before gave no picture.
+    That of the first frame stays as it was. InputError if the frame before gave no picture.
     """
     assert job.temporal is not None
     frame, geometry = shared.frame, shared.scene.geometry

@@ -73,61 +73,24 @@ class Job(NamedTuple):
 
 
 def jobs_of(plan: Plan) -> list[Job]:
-    """Return all jobs of a plan, those of one frame side by side.
+    """Return all jobs of a plan in the order of scenes, frames and choices; its scenes are loaded.
 
-    Parameters
-    ----------
-    plan : Plan
-        Its scenes are loaded.
-
-    Returns
-    -------
-    list of Job
-        In the order of scenes, frames and choices.
-
-    Raises
-    ------
-    InputError
-        If a scene or path is not usable.
+    InputError if a scene or path is not usable.
     """
     _loaded.cache_clear()
     return [job for name, source in plan.scenes.items() for job in _of_scene(plan, name, source)]
 
 
 def scene_at(shot: Shot) -> Scene:
-    """Return the scene of a frame, its camera of the picture's size.
+    """Return the scene as the path leaves it at a frame, its camera of the picture's size.
 
-    Parameters
-    ----------
-    shot : Shot
-        Which frame of which scene.
-
-    Returns
-    -------
-    Scene
-        As the path leaves it at that frame.
-
-    Raises
-    ------
-    InputError
-        If scene or path are not usable.
+    InputError if scene or path are not usable.
     """
     return next(itertools.islice(_scenes(shot), shot.frame, None))
 
 
 def key_of_scene(scene: Scene) -> str:
-    """Return a digest of everything that a picture of a scene depends on.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its camera is of the picture's size.
-
-    Returns
-    -------
-    str
-        64 hexadecimal digits.
-    """
+    """Return a digest, 64 hexadecimal digits, of all of a scene that a picture depends on, its camera's size too."""
     return _digest([geometry_digest(scene), materials_digest(scene), plain(scene.camera),
                     [light_json(light) for light in scene.lights]])
 

@@ -59,37 +59,14 @@ def failed(job: Job, message: str) -> Outcome:
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> None:
-    """Write the result of a job.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the batch; its folder of jobs is there.
-    outcome : Outcome
-        The result.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-    """
+    """Write the result of a job into the batch's folder; InputError if it cannot be written."""
     write_text(folder / "jobs" / f"{outcome.job}.json", outcome.model_dump_json(indent=1) + "\n")
 
 
 def read_outcome(folder: Path, job: Job) -> Outcome | None:
-    """Return the result of a job.
+    """Return the result of a job from the batch's folder.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the batch.
-    job : Job
-        The job.
-
-    Returns
-    -------
-    Outcome or None
-        None where there is none, or a file that is not whole: whoever damaged it, the job is run again.
+    None where there is none, or a file that is not whole: whoever damaged it, the job is run again.
     """
     try:
         found = Outcome.model_validate_json(outcome_file(folder, job).read_bytes())
@@ -99,13 +76,7 @@ def read_outcome(folder: Path, job: Job) -> Outcome | None:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Remove temporary files of processes that were killed: their writer is dead, or has not written for long.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the batch.
-    """
+    """Remove temporary files of processes that were killed: their writer is dead, or has not written for long."""
     for place in ("jobs", "pictures", "store"):
         for file in (folder / place).rglob("*.part*"):
             with contextlib.suppress(OSError):

@@ -66,22 +66,9 @@ class Plan(NamedTuple):
 
 
 def read_plan(file: Path) -> Plan:
-    """Read a plan.
+    """Read a plan from TOML; its scenes are not loaded yet.
 
-    Parameters
-    ----------
-    file : Path
-        TOML.
-
-    Returns
-    -------
-    Plan
-        Its scenes are not loaded yet.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or a table, a method, a key or a value is not usable.
+    InputError if the file cannot be read, or a table, a method, a key or a value is not usable.
     """
     tables = read_toml(file)
     expect(BATCH in tables, str(file), "a table [batch] with the key scenes", ", ".join(tables) or "no table")

@@ -16,39 +16,14 @@ Outcomes = dict[str, Outcome]  # by name of the job
 
 
 def read_outcomes(folder: Path, jobs: Sequence[Job]) -> Outcomes:
-    """Return the results that there are.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the batch.
-    jobs : sequence of Job
-        Of its plan.
-
-    Returns
-    -------
-    dict of str to Outcome
-        By name of the job.
-    """
+    """Return by name the results that the folder holds of a plan's jobs."""
     return {job.name: found for job in jobs if (found := read_outcome(folder, job)) is not None}
 
 
 def result_of(folder: Path, jobs: Sequence[Job], outcomes: Outcomes) -> Result:
-    """Return what a batch has found so far, as a bench does.
+    """Return what a batch has found so far, as a bench does: a scene for each frame of which there is some result.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the batch.
-    jobs : sequence of Job
-        Of its plan, those of one frame side by side.
-    outcomes : dict of str to Outcome
-        Results by name of the job.
-
-    Returns
-    -------
-    Result
-        A scene for each frame of which there is some result.
+    The jobs of one frame are side by side.
     """
     scenes = []
     for shot, group in groupby(jobs, lambda job: job.shot):

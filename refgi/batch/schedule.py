@@ -27,21 +27,9 @@ Written = Callable[[], None]
 
 
 def chunks_of(jobs: Sequence[Job], common: Common, workers: int) -> list[Chunk]:
-    """Cut jobs into chunks: a frame each, or parts of one where there are fewer frames than workers.
+    """Cut jobs, those of one frame side by side, into chunks: a frame each, or parts of one each if workers are more.
 
-    Parameters
-    ----------
-    jobs : sequence of Job
-        Those of one frame side by side.
-    common : Common
-        What they share.
-    workers : int
-        How many processes there are.
-
-    Returns
-    -------
-    list of Chunk
-        All frames of one method behind a temporal filter are one chunk, in the order of frames.
+    All frames of one method behind a temporal filter are one chunk, in the order of frames.
     """
     alone = [list(group) for _, group in groupby((job for job in jobs if job.temporal is None), lambda job: job.shot)]
     ways: dict[object, list[Job]] = {}
@@ -54,17 +42,7 @@ def chunks_of(jobs: Sequence[Job], common: Common, workers: int) -> list[Chunk]:
 
 
 def run_here(chunks: Sequence[Chunk], tell: Tell, written: Written) -> None:
-    """Do chunks in this process.
-
-    Parameters
-    ----------
-    chunks : sequence of Chunk
-        The jobs.
-    tell : callable
-        Called with (what runs, share done).
-    written : callable
-        Called after each chunk.
-    """
+    """Do chunks in this process; `written` is called after each."""
     total, before = sum(len(chunk.jobs) for chunk in chunks), 0
     for chunk in chunks:
         run_chunk(chunk, within(tell, before / total, len(chunk.jobs) / total))
@@ -74,19 +52,7 @@ def run_here(chunks: Sequence[Chunk], tell: Tell, written: Written) -> None:
 
 
 def run_in_processes(chunks: Sequence[Chunk], workers: int, tell: Tell, written: Written) -> None:
-    """Do chunks in several processes of this machine.
-
-    Parameters
-    ----------
-    chunks : sequence of Chunk
-        The jobs.
-    workers : int
-        How many processes.
-    tell : callable
-        Called with (what runs, share done).
-    written : callable
-        Called after each chunk.
-    """
+    """Do chunks in several processes of this machine; `written` is called after each."""
     waiting = list(chunks)
     while waiting:
         try:
@@ -104,23 +70,10 @@ def follow(
     running: Sequence[tuple[Chunk, "Future[int]"]], tell: Tell, written: Written,
     died: Callable[[Chunk, BaseException], "Future[int] | None"] | None = None,
 ) -> None:
-    """Wait for chunks and say how many jobs are done.
+    """Wait for submitted chunks and say how many jobs are done; `written` is called after each.
 
-    Parameters
-    ----------
-    running : sequence of (Chunk, Future)
-        What was submitted.
-    tell : callable
-        Called with (what runs, share done).
-    written : callable
-        Called after each chunk.
-    died : callable, optional
-        Called with a chunk and what ended it; gives what runs in its place, or None where nothing is left of it.
-
-    Raises
-    ------
-    Exception
-        What ended a chunk, where `died` is absent.
+    `died` is called with a chunk and what ended it; gives what runs in its place, or None where nothing is left of it.
+    Without it, what ended a chunk is raised.
     """
     of = {future: chunk for chunk, future in running}
     total = sum(len(chunk.jobs) for chunk in of.values())
@@ -140,18 +93,7 @@ def follow(
 
 
 def unfinished(chunks: Sequence[Chunk]) -> list[Chunk]:
-    """Return what is left of chunks: their jobs without a result.
-
-    Parameters
-    ----------
-    chunks : sequence of Chunk
-        The jobs.
-
-    Returns
-    -------
-    list of Chunk
-        Those of which something is left.
-    """
+    """Return what is left of chunks, their jobs without a result, without those of which nothing is left."""
     left = [chunk._replace(jobs=tuple(job for job in chunk.jobs if not is_done(chunk.common.folder, job)))
             for chunk in chunks]
     return [chunk for chunk in left if chunk.jobs]

@@ -71,21 +71,7 @@ class Common(NamedTuple):
 class Shared:
     """What all jobs of one frame share, each part made on first use.
 
-    Parameters
-    ----------
-    shot : Shot
-        The frame.
-    scene_key : str
-        What its scene was when the job was named.
-    common : Common
-        Of the batch.
-    tell : callable
-        Called with (what runs, share done).
-
-    Raises
-    ------
-    InputError
-        If the scene is another by now, or its camera sees no surface.
+    InputError if the scene is no more what it was when the job was named, `scene_key`, or its camera sees no surface.
     """
 
     def __init__(self, shot: Shot, scene_key: str, common: Common, tell: Tell) -> None:

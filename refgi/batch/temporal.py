@@ -48,17 +48,9 @@ class OverTime(NamedTuple):
 
 
 def over_time(frames: Iterator[Still]) -> OverTime:
-    """Judge a sequence by that of the truth.
+    """Judge a sequence of frames by that of the truth; two are held at a time.
 
-    Parameters
-    ----------
-    frames : iterator of Still
-        In their order; two are held at a time.
-
-    Returns
-    -------
-    OverTime
-        Flicker and its noise, and lag; nan for fewer than two frames, and a lag of nan where the light rests.
+    Flicker and its noise, and lag; nan for fewer than two frames, and a lag of nan where the light rests.
     """
     sums = np.zeros(6)  # of squared flicker, its noise, x - r along the change, v, squared change, r; a value each
     count, before = 0, None
@@ -76,21 +68,9 @@ def over_time(frames: Iterator[Still]) -> OverTime:
 
 
 def paths_of(folder: Path, jobs: Sequence[Job], outcomes: dict[str, Outcome]) -> tuple[PathResult, ...]:
-    """Return the figures of each choice whose frames are all there.
+    """Return the figures of each choice whose frames are all there; nothing for scenes at rest.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the batch, with the pictures.
-    jobs : sequence of Job
-        Of its plan.
-    outcomes : dict of str to Outcome
-        Results by name of the job.
-
-    Returns
-    -------
-    tuple of PathResult
-        Nothing for scenes at rest.
+    The folder of the batch holds the pictures; `outcomes` are by name of the job.
     """
     ways: dict[Any, list[Job]] = {}
     for job in jobs:

@@ -47,28 +47,10 @@ class Finding(NamedTuple):
 
 
 def read_threshold(key: str, text: object, scenes: Collection[str], methods: Collection[str], file: str) -> Threshold:
-    """Read one line of `[expect]`.
+    """Read one line of a plan's `[expect]`.
 
-    Parameters
-    ----------
-    key : str
-        Such as ``atrium.sii.relmse`` or ``atrium.val.clusters.count=8, lights=256.rmse``.
-    text : object
-        Such as ``<= 0.31``.
-    scenes, methods : collection of str
-        Of the plan.
-    file : str
-        The plan, for errors.
-
-    Returns
-    -------
-    Threshold
-        What it says.
-
-    Raises
-    ------
-    InputError
-        If scene, method, figure or comparison is unknown.
+    `key`: such as ``atrium.sii.relmse`` or ``atrium.val.clusters.count=8, lights=256.rmse``; `text`: such as ``<=
+    0.31``. An InputError, which names `file`, if scene, method, figure or comparison is unknown.
     """
     where = f'{file}: expect."{key}"'
     scene = max((name for name in scenes if key.startswith(f"{name}.")), key=len, default="")
@@ -87,22 +69,10 @@ def read_threshold(key: str, text: object, scenes: Collection[str], methods: Col
 
 
 def broken(thresholds: Collection[Threshold], result: Result, *, whole: bool = True) -> list[Finding]:
-    """Return thresholds that do not hold.
+    """Return a finding for each threshold that does not hold.
 
-    Parameters
-    ----------
-    thresholds : collection of Threshold
-        Of a plan.
-    result : Result
-        Of its batch.
-    whole : bool
-        Whether all jobs of the plan are done, so that a threshold has to find its figure.
-
-    Returns
-    -------
-    list of Finding
-        One for each figure that is missed, or that is not there although its threshold speaks of it, or that is judged
-        by a truth whose error is not to be trusted.
+    Its figure is missed, or judged by a truth whose error is not to be trusted, or, where the `whole` plan is done, not
+    there.
     """
     found = []
     for one in thresholds:
@@ -122,20 +92,7 @@ def broken(thresholds: Collection[Threshold], result: Result, *, whole: bool = T
 
 
 def figure_of(run: Run, figure: str) -> float | None:
-    """Return a figure of a run.
-
-    Parameters
-    ----------
-    run : Run
-        Method and setting on one scene.
-    figure : str
-        Of `FIGURES`.
-
-    Returns
-    -------
-    float or None
-        None where it is not known.
-    """
+    """Return a figure, of `FIGURES`, of a run; None where it is not known."""
     if figure in ERRORS:
         value: float | None = getattr(run.errors["truth"], figure)
         return value

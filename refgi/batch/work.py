@@ -45,24 +45,9 @@ _kept: dict[tuple[Shot, str, Common], Shared] = {}  # of this process: what the 
 
 
 def run_chunk(chunk: Chunk, tell: Tell = lambda *_: None) -> int:
-    """Do jobs one after the other, those without a result.
+    """Do jobs without a result one after the other; return how many were done.
 
-    Parameters
-    ----------
-    chunk : Chunk
-        The jobs.
-    tell : callable
-        Called with (what runs, share done).
-
-    Returns
-    -------
-    int
-        How many were done; errors of a job are its result.
-
-    Raises
-    ------
-    InputError
-        If a result cannot be written.
+    Errors of a job are its result. InputError if a result cannot be written.
     """
     done = 0
     with contextlib.chdir(chunk.working_folder), threads(chunk.common.threads), warnings.catch_warnings():
@@ -78,22 +63,7 @@ def run_chunk(chunk: Chunk, tell: Tell = lambda *_: None) -> int:
 
 
 def outcome_of(job: Job, common: Common, tell: Tell) -> Outcome:
-    """Do a job and write its picture.
-
-    Parameters
-    ----------
-    job : Job
-        The job.
-    common : Common
-        What it shares with the batch.
-    tell : callable
-        Called with (what runs, share done).
-
-    Returns
-    -------
-    Outcome
-        Figures, or the error of whatever went wrong.
-    """
+    """Do a job and write its picture; return the figures, or the error of whatever went wrong."""
     try:
         return _done(job, common, _shared(job, common, tell))
     except RefgiError as error:

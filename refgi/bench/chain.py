@@ -64,18 +64,8 @@ class Chain(NamedTuple):
 class Renderer:
     """Makes pictures of one view, each once.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    truth : TruthSettings, optional
-        How truths are traced; each has a seed of its own, so that their noise is not alike.
-    tell : callable
-        Called with (what runs, share done).
-    still : StillFrames, optional
-        Frames of the resting scene that a method with a temporal filter blends: "still" among the options.
-    **options : object
-        Of `Frame`.
+    Each truth has a seed of its own, so that their noise is not alike. `still` gives the frames of the resting scene
+    that a method with a temporal filter blends.
     """
 
     def __init__(
@@ -131,25 +121,10 @@ class Renderer:
 def chain_of(
     renderer: Renderer, choice: Choice, seeds: int, tell: Tell = lambda *_: None, *, alone: bool = True
 ) -> Chain:
-    """Make the pictures of one method and choice of settings.
+    """Make the pictures of one method and choice of settings, `seeds` of each kind.
 
-    Parameters
-    ----------
-    renderer : Renderer
-        Of the view; keeps what it made.
-    choice : Choice
-        The method as it is used.
-    seeds : int
-        How many seeds.
-    tell : callable
-        Called with (approximation, share done).
-    alone : bool
-        Whether approximations are switched off alone as well.
-
-    Returns
-    -------
-    Chain
-        Approximations that the settings do not make are left out, and those that `from_truth` takes in.
+    Approximations that the settings do not make are left out, and those that `from_truth` takes in. With `alone` they
+    are switched off one by one as well.
     """
     kept = [one for one in METHODS[choice.method].approximations if _is_made(one, choice.settings, renderer.options)]
     limits = [one for one in kept if one.shared_by(choice.settings)]

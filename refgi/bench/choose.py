@@ -58,35 +58,10 @@ def choose(
     scene: Scene, tracks: Sequence[Track], wish: Wish, *, rounds: int = 3, truth: TruthSettings | None = None,
     tell: Tell = lambda *_: None, **frame_options: Any,
 ) -> Chosen:
-    """Find the cheapest choice of settings that meets a wish on a scene.
+    """Find the cheapest choice of settings that meets a wish; each runs `rounds` times at full size, with a seed each.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    tracks : sequence of Track
-        Where to look.
-    wish : Wish
-        The largest error or the longest time.
-    rounds : int
-        How often each choice runs at full size, with a seed each.
-    truth : TruthSettings, optional
-        How references are traced, and with which bounces; by the wish where absent.
-    tell : callable
-        Called with (what runs, share done), the share not known and 0.
-    **frame_options : object
-        Passed to `Frame`.
-
-    Returns
-    -------
-    Chosen
-        The best, all that was tried, and what the best leaves out; no best where the truth's error is not to be
-        trusted.
-
-    Raises
-    ------
-    InputError
-        If not one thing is wished for, a wish is not above 0 or the camera sees no surface.
+    The wish decides on the truth's bounces where `truth` is absent. No best where the truth's error is not to be
+    trusted. InputError if not one thing is wished for, a wish is not above 0 or the camera sees no surface.
     """
     wish.check()
     truth = dataclasses.replace(truth or wish.truth, seed=REFERENCE_SEED)
@@ -108,20 +83,7 @@ def choose(
 class Pictures:
     """A scene at one size: runs choices and judges them by a truth that is traced once.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    truth : TruthSettings
-        How the reference is traced.
-    rounds : int
-        How often each choice is run, a seed each.
-    tell : callable
-        Called with (what runs, share done).
-    frame_options : dict
-        Passed to `Frame`.
-    first_seed : int
-        Of the first round; each round has the next one.
+    Each choice runs `rounds` times, with the seeds from `first_seed` on.
     """
 
     def __init__(self, scene: Scene, truth: TruthSettings, rounds: int, tell: Tell, frame_options: dict[str, Any],

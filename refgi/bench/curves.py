@@ -9,17 +9,9 @@ Point = tuple[float, float]  # s, error
 
 
 def front(points: Sequence[Point]) -> list[bool]:
-    """Return for each point whether no other is as fast and nearer, or as near and faster (Pareto).
+    """Return for each point (time, error) whether no other is as fast and nearer, or as near and faster (Pareto).
 
-    Parameters
-    ----------
-    points : sequence of (float, float)
-        Time and error; such as are not finite are never on the front.
-
-    Returns
-    -------
-    list of bool
-        In the order of the points.
+    Points that are not finite are never on the front.
     """
     def beaten(seconds: float, error: float) -> bool:
         return any(s <= seconds and e <= error and (s, e) != (seconds, error) for s, e in points)
@@ -28,20 +20,10 @@ def front(points: Sequence[Point]) -> list[bool]:
 
 
 def error_in(line: Sequence[Point], seconds: float) -> float:
-    """Return the error of an estimate that runs for some time, by its measured points.
+    """Return the error of an estimate that runs for some time, s, by its measured points (time, error).
 
-    Parameters
-    ----------
-    line : sequence of (float, float)
-        Time and error of the estimate when it is stopped early.
-    seconds : float
-        The time.
-
-    Returns
-    -------
-    float
-        Between points along the straight line of both logarithms; after the last one falling with the root of time;
-        infinite before the first, which no shorter run precedes.
+    Between points along the straight line of both logarithms; after the last one falling with the root of time;
+    infinite before the first, which no shorter run precedes.
     """
     known = sorted((s, e) for s, e in line if s > 0 and e > 0)
     if not known or seconds < known[0][0]:
@@ -53,23 +35,11 @@ def error_in(line: Sequence[Point], seconds: float) -> float:
 
 
 def knee(points: Sequence[Point]) -> int | None:
-    """Return which point of a curve is its knee: that of the least error^4 x time.
+    """Return which point (time, error) of a method's curve is its knee: the first of the least error^4 x time.
 
     Where an error is bias and noise, e^2 = b^2 + c / t, this is where the noise has come down to the bias, c / t = b^2:
-    from there on more time buys less and less.
+    from there on more time buys less and less. None where no point is positive and finite.
 
-    Parameters
-    ----------
-    points : sequence of (float, float)
-        Time and error of settings of one method.
-
-    Returns
-    -------
-    int or None
-        Its place in the sequence, the first one of equals; None where no point is positive and finite.
-
-    Examples
-    --------
     >>> knee([(t, (0.1**2 + 0.04 / t) ** 0.5) for t in (1.0, 2.0, 4.0, 8.0)])
     2
     """

@@ -22,8 +22,6 @@ from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import PairSettings
 from refgi.settings import Settings
 
-__all__ = ["DimLights", "dim_lights", "parts_of_lights"]
-
 Array = npt.NDArray[Any]
 
 SHARE = 0.999
@@ -47,25 +45,9 @@ class DimLights(pydantic.BaseModel):
 def dim_lights(
     frame: Frame, settings: Settings, rounds: int, *, share: float = SHARE, clock: Callable[[], float] = perf_counter
 ) -> DimLights | None:
-    """Measure what leaving out the dimmest pixel lights would save and cost.
+    """Measure what leaving out the dimmest pixel lights would save and cost; at least `share` of the light is kept.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its buffers.
-    settings : Settings
-        Of a method; those of its lights and pairs count.
-    rounds : int
-        How often both sums are timed.
-    share : float
-        Of the light that is kept at least.
-    clock : callable
-        Says the time, s.
-
-    Returns
-    -------
-    DimLights or None
-        None for a method without pixel lights, or with more than `MOST`, and for a dark picture.
+    None for a method without pixel lights, or with more than `MOST`, and for a dark picture. `clock` in s.
     """
     chosen = getattr(settings, "lights", None)
     if not isinstance(chosen, LightSettings):
@@ -98,23 +80,9 @@ def dim_lights(
 def parts_of_lights(
     receivers: Receivers, lights: PixelLights, pairs: PairSettings, footprint: Array | None = None
 ) -> Array:
-    """Return the mean irradiance that each pixel light adds to a picture, without visibility.
+    """Return the irradiance, W/m^2, that each of N lights adds to the mean over sampled pixels and channels, (N,).
 
-    Parameters
-    ----------
-    receivers : Receivers
-        The picture's points; some of them are sampled.
-    lights : PixelLights
-        N lights.
-    pairs : PairSettings
-        How one light lights one receiver.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2.
-
-    Returns
-    -------
-    (N,) ndarray
-        W/m^2, mean over pixels and channels.
+    Without visibility; `footprint`: surface area that each light stands for, m^2.
     """
     sample = sample_for(receivers, lights)
     return np.array([light_at(sample, selected(lights, [k]), pairs, None if footprint is None else footprint[[k]])

@@ -37,26 +37,10 @@ def without_noise(rmse: float, noise: float) -> float:
 
 
 def error_of(pictures: Sequence[Array], reference: Array, variance: Array, covered: Array) -> Error:
-    """Judge pictures of several seeds by a reference.
+    """Judge pictures of several seeds, each (3, h, w), W/m^2, by a reference and the variance of its mean.
 
-    Parameters
-    ----------
-    pictures : sequence of (3, h, w) ndarray
-        Of one method and setting, a seed each; W/m^2.
-    reference, variance : (3, h, w) ndarray
-        What they estimate, and the variance of its mean, the unit squared.
-    covered : (h, w) ndarray of bool
-        Pixels that show a surface.
-
-    Returns
-    -------
-    Error
-        Figures over the reference's mean; infinite where that is 0.
-
-    Raises
-    ------
-    InputError
-        If there is no picture, or no pixel is covered.
+    Figures are over the reference's mean; infinite where that is 0. InputError if there is no picture, or no pixel is
+    covered.
     """
     expect(len(pictures) > 0, "pictures", "one or more", 0)
     expect(bool(covered.any()), "covered", "some pixel that shows a surface", "none")

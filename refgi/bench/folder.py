@@ -31,23 +31,7 @@ class Held(NamedTuple):
 
 
 def read_result(file: Path) -> Result:
-    """Read what a bench or batch found.
-
-    Parameters
-    ----------
-    file : Path
-        A results.json.
-
-    Returns
-    -------
-    Result
-        By its schema.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read or is of another kind; names the first key that is wrong.
-    """
+    """Read the results.json of a bench or batch; an InputError names the first key that is wrong."""
     try:
         return Result.model_validate_json(file.read_bytes())
     except OSError as error:
@@ -60,23 +44,7 @@ def read_result(file: Path) -> Result:
 
 
 def folders_of(folder: Path) -> list[Path]:
-    """Return the folders with results: the folder itself, or those in it.
-
-    Parameters
-    ----------
-    folder : Path
-        An existing folder.
-
-    Returns
-    -------
-    list of Path
-        Sorted by name.
-
-    Raises
-    ------
-    InputError
-        If there are none.
-    """
+    """Return the folders with results: the folder itself, or those in it by name; InputError if there are none."""
     if (folder / RESULTS).is_file():
         return [folder]
     found = sorted(file.parent for file in folder.glob(f"*/{RESULTS}"))
@@ -88,24 +56,8 @@ def folders_of(folder: Path) -> list[Path]:
 def remake(folder: Path, folders: Sequence[Path], refresh: int | None = None) -> list[Held]:
     """Write the pages of folders with results, and the index over them where they lie in a common folder.
 
-    Parameters
-    ----------
-    folder : Path
-        The one folder, or the common one.
-    folders : sequence of Path
-        What `folders_of` gave.
-    refresh : int, optional
-        Seconds after which a browser reads the pages again unless they are in use; never where absent.
-
-    Returns
-    -------
-    list of Held
-        What was read.
-
-    Raises
-    ------
-    InputError
-        If results or pictures cannot be read, or a page not written.
+    A browser reads the pages again each `refresh` seconds unless they are in use; never where absent. InputError if
+    results or pictures cannot be read, or a page not written.
     """
     held = [Held(one, read_result(one / RESULTS)) for one in folders]
     for one in held:
@@ -116,21 +68,9 @@ def remake(folder: Path, folders: Sequence[Path], refresh: int | None = None) ->
 
 
 def index_page(folder: Path, held: Sequence[Held], refresh: int | None = None) -> str:
-    """Return the page over all scenes of several folders.
+    """Return the HTML page over all scenes of several folders below `folder`; it leads to their own pages.
 
-    Parameters
-    ----------
-    folder : Path
-        In which they lie.
-    held : sequence of Held
-        The folders with their results.
-    refresh : int, optional
-        Seconds after which a browser reads the page again unless it is in use; never where absent.
-
-    Returns
-    -------
-    str
-        HTML; it leads to the folders' own pages.
+    A browser reads it again each `refresh` seconds unless it is in use; never where absent.
     """
     from markupsafe import Markup
 
@@ -146,16 +86,9 @@ def index_page(folder: Path, held: Sequence[Held], refresh: int | None = None) -
 
 
 def watch(folder: Path, say: Say, wait: Callable[[float], None] = time.sleep) -> None:
-    """Keep pages up to date until interrupted; the last ones do not refresh any more.
+    """Keep pages of the folders that `folders_of` gives up to date until interrupted; the last ones do not refresh.
 
-    Parameters
-    ----------
-    folder : Path
-        As of `folders_of`; folders may come.
-    say : callable
-        Called with a line for each time that pages were made, or why they were not.
-    wait : callable
-        Called with seconds between looks.
+    `say` is called with a line each time pages were made, or why they were not; `wait` with seconds between looks.
     """
     known: dict[Path, int] = {}
     try:

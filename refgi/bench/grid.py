@@ -43,61 +43,19 @@ class Grid(NamedTuple):
 
 
 def built_in(quick: bool) -> Grid:
-    """Return the grid that refgi comes with.
-
-    Parameters
-    ----------
-    quick : bool
-        Three settings a method in place of ten and more.
-
-    Returns
-    -------
-    Grid
-        Of all methods.
-    """
+    """Return the grid that refgi comes with; the quick one has three settings a method in place of ten and more."""
     return read_grid(FILES / ("quick.toml" if quick else "grid.toml"))
 
 
 def read_grid(file: Path) -> Grid:
-    """Read a grid.
-
-    Parameters
-    ----------
-    file : Path
-        TOML.
-
-    Returns
-    -------
-    Grid
-        Choices in the file's order, each once.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a method or key is unknown or a value not usable; names all of them.
-    """
+    """Read a grid from TOML; an InputError names all unknown methods and keys and values that are not usable."""
     return grid_of(read_toml(file), file)
 
 
 def grid_of(tables: Mapping[str, Any], file: Path) -> Grid:
-    """Return the grid that tables describe.
+    """Return the grid of tables by method and that of the truth: choices in the tables' order, each once.
 
-    Parameters
-    ----------
-    tables : mapping
-        By method, and that of the truth.
-    file : Path
-        Where they come from, for errors.
-
-    Returns
-    -------
-    Grid
-        Choices in the tables' order, each once.
-
-    Raises
-    ------
-    InputError
-        If a method or key is unknown or a value not usable; names all of them.
+    An InputError names all unknown methods and keys and values that are not usable; `file` is where they come from.
     """
     passes = _passes(tables.get(TRUTH, {}), file)
     choices: dict[tuple[str, tuple[str, ...]], Choice] = {}
@@ -117,24 +75,9 @@ def grid_of(tables: Mapping[str, Any], file: Path) -> Grid:
 
 
 def chosen(grid: Grid, methods: Sequence[str] | None) -> Grid:
-    """Return the part of a grid that is of some methods.
+    """Return the part of a grid that is of some methods, all where absent.
 
-    Parameters
-    ----------
-    grid : Grid
-        Of all methods.
-    methods : sequence of str, optional
-        Short names; all where absent.
-
-    Returns
-    -------
-    Grid
-        Their choices, in the grid's order.
-
-    Raises
-    ------
-    InputError
-        If a method is unknown or the grid has no setting of it.
+    InputError if a method is unknown or the grid has no setting of it.
     """
     if methods is None:
         return grid
@@ -162,20 +105,7 @@ def _combinations(table: Any, where: str) -> Iterable[tuple[str, ...]]:
 
 
 def flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return values by their dotted keys: TOML reads `a.b = 1` as a table in a table.
-
-    Parameters
-    ----------
-    table : mapping
-        Of values and tables.
-    prefix : str
-        What keys begin with.
-
-    Returns
-    -------
-    dict
-        By key.
-    """
+    """Return values by their dotted keys: TOML reads `a.b = 1` as a table in a table."""
     found: dict[str, Any] = {}
     for key, value in table.items():
         found |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
@@ -190,20 +120,6 @@ def value_text(value: Any) -> str:
 def toml_line(key: str, value: Any) -> str:
     """Return one line of a table: a list, a number, true or false as it is, any other text in quotes.
 
-    Parameters
-    ----------
-    key : str
-        Bare or dotted.
-    value : str, number or list
-        The value, or its text as `--set` takes it.
-
-    Returns
-    -------
-    str
-        TOML.
-
-    Examples
-    --------
     >>> [toml_line("a.b", "0.5"), toml_line("kind", "csm"), toml_line("size", [64, 48])]
     ['a.b = 0.5', 'kind = "csm"', 'size = [64, 48]']
     """

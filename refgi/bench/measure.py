@@ -78,36 +78,11 @@ def bench_scene(
     scene: Scene, grid: Grid, *, rounds: int = 3, truth: TruthSettings | None = None, tell: Tell = lambda *_: None,
     place: Place | None = None, source: str | None = None, **frame_options: Any,
 ) -> SceneResult:
-    """Run a grid on a scene.
+    """Run a grid on a scene, each choice `rounds` times, a seed each; from two on bias and variance are told apart.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    grid : Grid
-        Choices of settings, and passes of the truth.
-    rounds : int
-        How often each is run, a seed each; from two on bias and variance are told apart.
-    truth : TruthSettings, optional
-        How the reference is traced; its seed is one that no round has.
-    tell : callable
-        Called with (what runs, share done).
-    place : Place, optional
-        Where the pictures of the first seed and of the references are written; nowhere where absent.
-    source : str, optional
-        What the scene was loaded from, by which new processes load it for `SceneResult.cold`; none where absent.
-    **frame_options : object
-        Passed to `Frame`: width, height, dtype, rsm_resolution, shadows.
-
-    Returns
-    -------
-    SceneResult
-        A choice that gives no picture is in `failures` and stops none of the others.
-
-    Raises
-    ------
-    InputError
-        If the camera sees no surface.
+    The truth's seed is one that no round has. Pictures of the first seed and of the references are written to `place`,
+    if any; new processes load the scene from `source` for `SceneResult.cold`. A choice that gives no picture is in
+    `failures` and stops none of the others. InputError if the camera sees no surface.
     """
     frame = Frame(scene, **frame_options)
     covered = frame.gbuffer.covered
@@ -254,20 +229,7 @@ def load_kernels(frame: Frame, choice: Choice) -> None:
 
 
 def with_seed(settings: Settings, seed: int) -> Settings:
-    """Return settings with another seed; the same where they draw no random numbers.
-
-    Parameters
-    ----------
-    settings : Settings
-        Of a method.
-    seed : int
-        The seed.
-
-    Returns
-    -------
-    Settings
-        With it.
-    """
+    """Return settings with another seed; the same where they draw no random numbers."""
     if not any(leaf.key.rpartition(".")[2] == "seed" for leaf in leaves(type(settings))):
         return settings
     return from_text(settings, [f"seed={seed}"])

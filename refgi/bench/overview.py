@@ -19,17 +19,9 @@ class Place(NamedTuple):
 
 
 def overview(places: Sequence[Place]) -> dict[str, Any]:
-    """Return the table and the plot over all scenes.
+    """Return the table and the plot over all scenes, in the page's order.
 
-    Parameters
-    ----------
-    places : sequence of Place
-        In the page's order.
-
-    Returns
-    -------
-    dict
-        `methods`; `rows`, one a scene, with a cell a method; `plot`, an ``<svg>`` element.
+    `methods`; `rows`, one a scene, with a cell a method; `plot`, an ``<svg>`` element.
     """
     from markupsafe import Markup
 

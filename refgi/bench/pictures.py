@@ -37,20 +37,7 @@ class Place(NamedTuple):
 
 
 def places(out: Path, scenes: Sequence[str]) -> list[Place]:
-    """Return a place for each of several scenes, no two the same.
-
-    Parameters
-    ----------
-    out : Path
-        Folder of results.json.
-    scenes : sequence of str
-        Their names.
-
-    Returns
-    -------
-    list of Place
-        Folders named after the scenes; of scenes of one name the later ones have a number.
-    """
+    """Return a place for each of several scenes: folders by their names, the later ones of one name with a number."""
     names: list[str] = []
     for scene in scenes:
         stem = re.sub(r"[^A-Za-z0-9_-]+", "_", scene) or "_"
@@ -67,21 +54,9 @@ class Writer(NamedTuple):
     frame: Frame  # what they show
 
     def write(self, stem: str, planes: Mapping[str, Array], record: Record) -> str:
-        """Write one EXR, whole or not at all.
+        """Write one EXR, whole or not at all; return its path from the folder of results.json.
 
-        Parameters
-        ----------
-        stem : str
-            The file's name.
-        planes : mapping of str to (h, w) ndarray
-            By channel.
-        record : dict
-            What it holds beside the record of scene and frame.
-
-        Returns
-        -------
-        str
-            The file, from the folder of results.json.
+        `planes`: (h, w) by channel; `record`: what it holds beside the record of scene and frame.
         """
         frame, name = self.frame, self.place.name(f"{stem}.exr")
         file = self.place.out / name
@@ -91,17 +66,10 @@ class Writer(NamedTuple):
         return name
 
     def write_runs(self, runs: Sequence[tuple[str, Any, Array, Array | None]]) -> Iterator[str]:
-        """Write pictures of methods.
+        """Write pictures of methods and yield each file, from the folder of results.json.
 
-        Parameters
-        ----------
-        runs : sequence of (str, settings, (3, h, w) ndarray, (3, h, w) ndarray or None)
-            Method, all its settings, the indirect irradiance that it gave, W/m^2, and receivers' lobes, W/m^2/sr.
-
-        Yields
-        ------
-        str
-            Each file, from the folder of results.json.
+        A run: method, all its settings, indirect irradiance (3, h, w), W/m^2, and receivers' lobes (3, h, w), W/m^2/sr,
+        or None.
         """
         counts: Counter[str] = Counter()
         for method, settings, irradiance, lobes in runs:
@@ -110,13 +78,7 @@ class Writer(NamedTuple):
             yield self.write(f"{method}-{counts[method]:02d}", planes, method_record(method, settings))
 
     def write_ids(self) -> str:
-        """Write what each pixel shows: planes `face` and `material`, 2^32 - 1 where it shows nothing.
-
-        Returns
-        -------
-        str
-            The file, from the folder of results.json.
-        """
+        """Write what each pixel shows, planes `face` and `material`, 2^32 - 1 where nothing; return the file."""
         buffer = self.frame.gbuffer
         ids = {"face": buffer.triangle_id, "material": buffer.material_id}
         return self.write(Path(IDS_FILE).stem, {key: plane.astype(np.uint32) for key, plane in ids.items()}, {})

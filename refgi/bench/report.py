@@ -30,41 +30,18 @@ HOW = ("Each round runs every choice once on a frame of its own, buffers include
 
 
 def write_page(result: Result, folder: Path, refresh: int | None = None) -> None:
-    """Write index.html, whole or not at all.
+    """Write index.html into a folder that holds the pictures, whole or not at all.
 
-    Parameters
-    ----------
-    result : Result
-        Of all scenes.
-    folder : Path
-        An existing folder, with the pictures.
-    refresh : int, optional
-        Seconds after which a browser reads the page again unless it is in use; never where absent.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written, or a picture is damaged.
+    A browser reads it again each `refresh` seconds unless it is in use; never where absent. InputError if it cannot be
+    written, or a picture is damaged.
     """
     write_text(folder / "index.html", page(result, folder, refresh))
 
 
 def page(result: Result, folder: Path, refresh: int | None = None) -> str:
-    """Return the page of a bench as HTML that refers to nothing outside itself.
+    """Return the page of a bench as HTML that refers to nothing outside itself; the same for equal input.
 
-    Parameters
-    ----------
-    result : Result
-        Of all scenes.
-    folder : Path
-        With the pictures; those that are missing are left out.
-    refresh : int, optional
-        Seconds after which a browser reads the page again unless it is in use; never where absent.
-
-    Returns
-    -------
-    str
-        The same text for equal input.
+    Pictures that `folder` lacks are left out; `refresh` as in `write_page`.
     """
     from markupsafe import Markup
 
@@ -109,17 +86,8 @@ def _ms(seconds: float) -> str:
 def plot_of(scene: SceneResult, position: int = 1) -> str:
     """Draw one curve a method, and the path tracer's dashed; bars are 95 % intervals, marks lead to pictures.
 
-    Parameters
-    ----------
-    scene : SceneResult
-        Of one scene.
-    position : int
-        Of the scene on the page.
-
-    Returns
-    -------
-    str
-        An ``<svg>`` element, points of a method in the order of their times; nothing where no error is known.
+    An ``<svg>`` element, points of a method in the order of their times; nothing where no error is known. `position`:
+    of the scene on the page.
     """
     if not any(0 < run.rmse < math.inf for run in (*scene.runs, *scene.line)):
         return ""
@@ -133,15 +101,7 @@ def plot_of(scene: SceneResult, position: int = 1) -> str:
 def said_of(scene: SceneResult) -> Iterator[str]:
     """Yield what the curves say: each method's nearest picture, and whether the path tracer is better in that time.
 
-    Parameters
-    ----------
-    scene : SceneResult
-        Of one scene.
-
-    Yields
-    ------
-    str
-        A sentence a method, in the order of their errors.
+    A sentence a method, in the order of their errors.
     """
     best = {run.method: run for run in sorted(scene.runs, key=lambda one: -one.rmse)}
     for method, run in sorted(best.items(), key=lambda one: one[1].rmse):

@@ -202,63 +202,22 @@ class Result(_Strict):
 
 
 def figures_of(error: Error, *, in_doubt: bool = False) -> Figures:
-    """Return an error as data.
-
-    Parameters
-    ----------
-    error : Error
-        Figures, nan and infinity among them.
-    in_doubt : bool
-        Whether the error of the reference is not to be trusted.
-
-    Returns
-    -------
-    Figures
-        None in their place.
-    """
+    """Return an error as data, None for nan and infinity; `in_doubt`: the reference's error is not to be trusted."""
     return Figures(**{key: known(value) for key, value in error._asdict().items()}, in_doubt=in_doubt)
 
 
 def known(value: float) -> float | None:
-    """Return a figure as data.
-
-    Parameters
-    ----------
-    value : float
-        Nan and infinity where it is not known.
-
-    Returns
-    -------
-    float or None
-        None in their place.
-    """
+    """Return a figure as data: None for nan and infinity."""
     return value if math.isfinite(value) else None
 
 
 def schema_text() -> str:
-    """Return the JSON Schema of results.json.
-
-    Returns
-    -------
-    str
-        As the repository holds it.
-    """
+    """Return the JSON Schema of results.json, as the repository holds it."""
     return json.dumps(Result.model_json_schema(), indent=1, sort_keys=True) + "\n"
 
 
 def rows_of(result: Result) -> Iterable[dict[str, Any]]:
-    """Yield one row a run, the path tracer's among them.
-
-    Parameters
-    ----------
-    result : Result
-        Of all scenes.
-
-    Yields
-    ------
-    dict
-        By `COLUMNS`; None where there is nothing to say.
-    """
+    """Yield one row a run by `COLUMNS`, the path tracer's among them; None where there is nothing to say."""
     for scene in result.scenes:
         for run in (*scene.runs, *scene.line):
             yield {"scene": scene.scene, "method": run.method, "settings": run.label, "seconds": run.seconds,
@@ -276,20 +235,7 @@ def rmse_against(run: Run, reference: str) -> float | None:
 
 
 def write_results(result: Result, folder: Path) -> None:
-    """Write results.json, results.csv and results.md, each whole or not at all.
-
-    Parameters
-    ----------
-    result : Result
-        Of all scenes.
-    folder : Path
-        An existing folder.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be written.
-    """
+    """Write results.json, results.csv and results.md, each whole or not at all; InputError where it cannot be done."""
     table = io.StringIO()
     writer = csv.DictWriter(table, COLUMNS, lineterminator="\n")
     writer.writeheader()
@@ -300,18 +246,7 @@ def write_results(result: Result, folder: Path) -> None:
 
 
 def markdown(result: Result) -> str:
-    """Return the table of each scene, fastest first.
-
-    Parameters
-    ----------
-    result : Result
-        Of all scenes.
-
-    Returns
-    -------
-    str
-        Markdown; errors in % of the truth's mean, times in ms.
-    """
+    """Return the table of each scene in Markdown, fastest first: errors in % of the truth's mean, times in ms."""
     lines = [f"<!-- refgi {result.refgi} -->", ""]
     for scene in result.scenes:
         lines += [f"## {scene.scene}, {scene.width} x {scene.height}", "", scene.truth, "",

@@ -55,21 +55,9 @@ class Found(NamedTuple):
 
 
 def for_error(tracks: Sequence[Track], wish: float, small: Pictures, full: Pictures) -> Found:
-    """Find the fastest choice whose error is at most a wish.
+    """Find the fastest choice whose error, RMSE over the truth's mean, is at most a wish.
 
-    Parameters
-    ----------
-    tracks : sequence of Track
-        Where to look.
-    wish : float
-        RMSE over the truth's mean.
-    small, full : Pictures
-        The scene at a small size, to search, and at its own, to check.
-
-    Returns
-    -------
-    Found
-        The best of what was judged at full size.
+    `small` is searched; the best is of what was judged at `full` size.
     """
     walk = _Walk(tracks, wish, small)
     queue = [(full.seconds(track.rungs[rung]), number, rung)
@@ -96,21 +84,9 @@ def for_error(tracks: Sequence[Track], wish: float, small: Pictures, full: Pictu
 
 
 def for_time(tracks: Sequence[Track], wish: float, small: Pictures, full: Pictures) -> Found:
-    """Find the choice of least error whose frame takes at most a wish.
+    """Find the choice of least error whose frame takes at most a wish, s.
 
-    Parameters
-    ----------
-    tracks : sequence of Track
-        Where to look.
-    wish : float
-        Time of a frame, s.
-    small, full : Pictures
-        The scene at a small size, to rank, and at its own, to time and check.
-
-    Returns
-    -------
-    Found
-        The best of what was judged at full size.
+    `small` is ranked; the best is of what was timed and judged at `full` size.
     """
     reached = _reached(tracks, TIME_MARGIN * wish, full) or _reached(tracks, wish, full)
     ranked = sorted((Probe(choice, small.seconds(choice), small.error(choice)) for choice in reached),

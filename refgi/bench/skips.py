@@ -24,8 +24,6 @@ from refgi.methods import Picture, find_method, render
 from refgi.scene import Scene
 from refgi.settings import Settings
 
-__all__ = ["UNMEASURED", "MeasuredSkip", "SkipReport", "Unmeasured", "measure_skips"]
-
 Tell = Callable[[str, float], None]
 Clock = Callable[[], float]  # s
 Times = tuple[tuple[float, ...], tuple[float, ...]]  # s, a round each: of the plain picture, and of one right after
@@ -118,32 +116,9 @@ def measure_skips(
 ) -> SkipReport:
     """Measure what each skip saves on a scene, and whether the picture has the same bits without it.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene, its camera's size that of the picture.
-    method : str
-        Short name of the method.
-    settings : Settings, optional
-        The method's; its defaults where absent.
-    rounds : int
-        How often each is timed.
-    clock : callable
-        Says the time, s; `time.process_time` is that of processors alone, for machines that do other work as well.
-    tell : callable
-        Called with (what runs, share done).
-    **frame_options : object
-        Passed to `render`: width, height, dtype, rsm_resolution, shadows.
-
-    Returns
-    -------
-    SkipReport
-        Skips that have nothing to leave out are not in it.
-
-    Raises
-    ------
-    InputError
-        If scene, method or settings are not usable, or there is no round.
+    The scene's camera has the size of the picture; the method's default settings where absent. `clock` in s:
+    `time.process_time` is that of processors alone, for machines that do other work as well. Skips that have nothing to
+    leave out are not in the report. InputError if scene, method or settings are not usable, or there is no round.
     """
     expect(rounds >= 1, "rounds", "1 or more", rounds)
     chosen = find_method(method).settings() if settings is None else settings

@@ -41,33 +41,11 @@ def with_splits(
     result: SceneResult, scene: Scene, grid: Grid, *, seeds: int, truth: TruthSettings | None = None,
     tell: Tell = lambda *_: None, defaults: bool = True, still: StillFrames | None = None, **frame_options: Any,
 ) -> SceneResult:
-    """Split the error of each method at its defaults and at the knee of its curve.
+    """Split the error of each method at the knee of its curve and, with `defaults`, at its defaults.
 
-    Parameters
-    ----------
-    result : SceneResult
-        The curves.
-    scene : Scene
-        The scene.
-    grid : Grid
-        The choices that were run.
-    seeds : int
-        How many pictures of each kind; from two on bias and variance are told apart.
-    truth : TruthSettings, optional
-        How truths are traced.
-    tell : callable
-        Called with (what runs, share done).
-    defaults : bool
-        Whether defaults are split as well, not the knees alone.
-    still : StillFrames, optional
-        Frames of the resting scene that methods with a temporal filter blend.
-    **frame_options : object
-        Passed to `Frame`; where width and height are absent, the longer side has `SIDE` pixels at most.
-
-    Returns
-    -------
-    SceneResult
-        With splits, by method in the order of the runs; what could not be split is among the failures.
+    `seeds` pictures of each kind: from two on bias and variance are told apart. Without width and height the longer
+    side has `SIDE` pixels at most. Splits are by method in the order of the runs; what could not be split is among the
+    failures. `still`: frames of the resting scene that methods with a temporal filter blend.
     """
     splits, failures = [], dict(result.failures)
     size = dict(zip(("width", "height"), small_size(result.width, result.height), strict=True))
@@ -90,8 +68,6 @@ def with_splits(
 def small_size(width: int, height: int) -> tuple[int, int]:
     """Return the size of a view with `SIDE` pixels along the longer side, or its own where it is smaller.
 
-    Examples
-    --------
     >>> small_size(1024, 768), small_size(64, 100)
     ((128, 96), (64, 100))
     """
@@ -100,21 +76,9 @@ def small_size(width: int, height: int) -> tuple[int, int]:
 
 
 def chosen_for_split(runs: Sequence[Run], grid: Grid, *, defaults: bool = True) -> list[tuple[Choice, bool]]:
-    """Return what is split: each method's default, and the choice at the knee of its curve where that is another.
+    """Return what is split, each with whether it is the knee of its curve.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        Of a scene.
-    grid : Grid
-        Their choices.
-    defaults : bool
-        Whether defaults are among them where they are no knees.
-
-    Returns
-    -------
-    list of (Choice, bool)
-        Each with whether it is the knee.
+    The knee of each method and, with `defaults`, its default where that is another.
     """
     chosen = []
     for method in dict.fromkeys(run.method for run in runs):
@@ -130,23 +94,10 @@ def chosen_for_split(runs: Sequence[Run], grid: Grid, *, defaults: bool = True) 
 
 
 def split_of(chain: Chain, choice: Choice, at_knee: bool = False, statement: str = "") -> Split:
-    """Measure the pictures of a chain.
+    """Measure the pictures of a chain, from the truth to the method as it is used.
 
-    Parameters
-    ----------
-    chain : Chain
-        From the truth to the method as it is used.
-    choice : Choice
-        The method and its settings.
-    at_knee : bool
-        Whether they are at the knee of the curve.
-    statement : str
-        How well the truth is known.
-
-    Returns
-    -------
-    Split
-        Figures over the mean of the truth; None where that is 0 or a picture is not finite.
+    Figures are over the mean of the truth; None where that is 0 or a picture is not finite. `statement` says how well
+    the truth is known.
     """
     first, last, covered = chain.links[0], chain.links[-1], chain.covered
     scale = float(first.pictures[0][:, covered].mean(dtype=np.float64))

@@ -22,18 +22,7 @@ HOW = ("From the truth to the method as it is used, one approximation more at a 
 
 
 def splits_of(splits: Sequence[Split]) -> dict[str, Any] | None:
-    """Return what a page shows of a scene's splits.
-
-    Parameters
-    ----------
-    splits : sequence of Split
-        Of one scene.
-
-    Returns
-    -------
-    dict or None
-        Of the template; None without splits.
-    """
+    """Return what the page's template shows of a scene's splits; None without splits."""
     from markupsafe import Markup
 
     if not splits:
@@ -43,18 +32,7 @@ def splits_of(splits: Sequence[Split]) -> dict[str, Any] | None:
 
 
 def bars(splits: Sequence[Split]) -> str:
-    """Draw a bar for each split.
-
-    Parameters
-    ----------
-    splits : sequence of Split
-        Of one scene, top to bottom.
-
-    Returns
-    -------
-    str
-        An ``<svg>`` element without references to anything outside; the same for equal input.
-    """
+    """Draw a bar for each split, top to bottom: an ``<svg>`` element that refers to nothing outside itself."""
     names = list(dict.fromkeys(part.name for split in splits for part in split.parts))
 
     def draw(figure: Any) -> None:
@@ -76,18 +54,8 @@ def bars(splits: Sequence[Split]) -> str:
 def stacked(values: Sequence[float]) -> list[tuple[float, float]]:
     """Return where the parts of a signed bar begin, and their lengths.
 
-    Parameters
-    ----------
-    values : sequence of float
-        Parts in order.
+    Those above 0 follow each other to the right of 0, those below to the left.
 
-    Returns
-    -------
-    list of (float, float)
-        Those above 0 follow each other to the right of 0, those below to the left.
-
-    Examples
-    --------
     >>> stacked([3, -1, 2, -4])
     [(0.0, 3), (0.0, -1), (3.0, 2), (-1.0, -4)]
     """

@@ -14,19 +14,10 @@ LEAST = 0.01  # of the mean square: what is taken back and not said
 
 
 def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
-    """Return a row for each part and one for the whole.
+    """Return a row for each part and one for the whole, by `COLUMNS`, over the truth's mean.
 
-    Parameters
-    ----------
-    split : Split
-        Of one method and setting.
-
-    Returns
-    -------
-    list of tuple of str
-        By `COLUMNS`: change of the mean, root mean square and spread over seeds of what the part changes, its share of
-        the whole's mean square, then the whole's RMSE and change of the mean with it switched off; over the truth's
-        mean.
+    Change of the mean, root mean square and spread over seeds of what the part changes, its share of the whole's mean
+    square, then the whole's RMSE and change of the mean with it switched off.
     """
     parts = [(part.name, percent(part.mean), percent(part.error.rmse), percent(part.error.spread),
               percent(part.share), percent(part.alone.rmse if part.alone else None),
@@ -37,15 +28,7 @@ def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
 def said_of_split(split: "Split") -> str:
     """Return what a split says: the largest share and what takes most back, how squares add up, what helps most.
 
-    Parameters
-    ----------
-    split : Split
-        Of one method and setting.
-
-    Returns
-    -------
-    str
-        A sentence or two; the settings alone where nothing is known.
+    The settings alone where nothing is known.
     """
     known = [part for part in split.parts if part.share is not None]
     if not known or split.squares is None or split.cross is None:
@@ -66,18 +49,7 @@ def said_of_split(split: "Split") -> str:
 
 
 def tables_of(splits: "Sequence[Split]") -> list[str]:
-    """Return the tables of a scene's splits.
-
-    Parameters
-    ----------
-    splits : sequence of Split
-        Of one scene.
-
-    Returns
-    -------
-    list of str
-        Lines of Markdown; none without splits.
-    """
+    """Return the tables of a scene's splits as lines of Markdown; none without splits."""
     return [line for split in splits for line in _table(split)]
 
 

@@ -28,22 +28,9 @@ class Track(NamedTuple):
 
 
 def built_in_tracks(methods: Sequence[str] | None = None) -> tuple[Track, ...]:
-    """Return the tracks that refgi comes with.
+    """Return the tracks that refgi comes with, of all methods where absent.
 
-    Parameters
-    ----------
-    methods : sequence of str, optional
-        Short names; all where absent.
-
-    Returns
-    -------
-    tuple of Track
-        One or more.
-
-    Raises
-    ------
-    InputError
-        If a method is unknown or has no track.
+    InputError if a method is unknown or has no track.
     """
     tracks = read_tracks(FILES / "tracks.toml")
     if methods is None:
@@ -55,23 +42,10 @@ def built_in_tracks(methods: Sequence[str] | None = None) -> tuple[Track, ...]:
 
 
 def read_tracks(file: Path) -> tuple[Track, ...]:
-    """Read tracks.
+    """Read tracks from TOML, in the file's order.
 
-    Parameters
-    ----------
-    file : Path
-        TOML: an array of tables a method, each with `along` (a key), `from` and `to` (its least and largest value), and
-        other keys with their values.
-
-    Returns
-    -------
-    tuple of Track
-        In the file's order.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a method or key is unknown or a value not usable.
+    An array of tables a method, each with `along` (a key), `from` and `to` (its least and largest value), and other
+    keys with their values. InputError if the file cannot be read, a method or key is unknown or a value not usable.
     """
     found = []
     for name, tables in read_toml(file).items():

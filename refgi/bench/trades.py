@@ -11,8 +11,6 @@ from refgi.errors import InputError
 from refgi.methods import Picture
 from refgi.settings import Settings, from_text
 
-__all__ = ["TRADES", "Change", "Trade", "changes_of", "difference"]
-
 Array = npt.NDArray[Any]
 
 # by method: what is left out, or put back, and how settings change
@@ -48,19 +46,7 @@ class Change(NamedTuple):
 def changes_of(method: str, settings: Settings, lights: DimLights | None) -> list[Change]:
     """Return what a method could leave out and does not yet.
 
-    Parameters
-    ----------
-    method : str
-        Its short name.
-    settings : Settings
-        Its settings.
-    lights : DimLights or None
-        How many pixel lights carry nearly all of the light.
-
-    Returns
-    -------
-    list of Change
-        Those of `TRADES` that go with the other settings, after fewer lights.
+    Those of `TRADES` that go with the other settings, after fewer lights.
     """
     fewer = () if lights is None else (
         (f"lights: as many as carry {lights.share:.1%}, drawn anew", (f"lights.count={lights.count}",)),)
@@ -78,15 +64,7 @@ def changes_of(method: str, settings: Settings, lights: DimLights | None) -> lis
 def difference(picture: Picture, plain: Picture) -> float | None:
     """Return the RMSE between the irradiance of two pictures over all pixels with a surface, over the second's mean.
 
-    Parameters
-    ----------
-    picture, plain : Picture
-        Of one view.
-
-    Returns
-    -------
-    float or None
-        None where the second is black.
+    None where the second is black.
     """
     covered = plain.frame.gbuffer.covered
     made, right = (one.irradiance[:, covered].astype(np.float64) for one in (picture, plain))

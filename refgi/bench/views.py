@@ -25,44 +25,15 @@ Planes = dict[str, Array]
 
 
 def named(scene: SceneResult, position: int) -> list[tuple[str, Run]]:
-    """Return all runs of a scene, each with a name of its own on the page.
-
-    Parameters
-    ----------
-    scene : SceneResult
-        Methods and the path tracer's line.
-    position : int
-        Of the scene on the page.
-
-    Returns
-    -------
-    list of (str, Run)
-        Methods first.
-    """
+    """Return all runs of a scene, methods first, each with a name of its own on the page."""
     return [(f"scene{position}-{run.method}-{i}", run) for i, run in enumerate((*scene.runs, *scene.line), 1)]
 
 
 def view_of(scene: SceneResult, position: int, folder: Path) -> tuple[View, Record] | None:
-    """Return the pictures of a scene that are there.
+    """Return the pictures of a scene that are there, and the record of the truth's; `folder` is that of results.json.
 
-    Parameters
-    ----------
-    scene : SceneResult
-        What results.json says.
-    position : int
-        Of the scene on the page.
-    folder : Path
-        Of results.json.
-
-    Returns
-    -------
-    tuple of View and dict, or None
-        With the record of the truth's picture; None where the truth or every run has no picture.
-
-    Raises
-    ------
-    InputError
-        If a picture is damaged, of another size, or outside the folder.
+    None where the truth or every run has no picture. InputError if a picture is damaged, of another size, or outside
+    the folder.
     """
     there = [(name, run, file) for name, run in named(scene, position)
              if (file := _file(run, folder)) is not None and file.is_file()]
@@ -138,18 +109,7 @@ def _said(run: Run) -> str:
 
 
 def provenance_of(record: Record) -> Iterator[tuple[str, str]]:
-    """Yield what a picture's record says of its scene, as text by name.
-
-    Parameters
-    ----------
-    record : dict
-        What `view_of` gave.
-
-    Yields
-    ------
-    (str, str)
-        Name and value; nothing where the picture holds no record.
-    """
+    """Yield what a picture's record says of its scene, as (name, value); nothing where the picture holds no record."""
     from refgi.compare.provenance import provenance_rows
 
     if "scene" in record:

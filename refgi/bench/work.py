@@ -64,26 +64,9 @@ def quietly() -> Iterator[None]:
 
 
 def work_of(scene: Scene, choice: Choice, options: Mapping[str, Any]) -> Work:
-    """Count what one frame takes, its buffers included.
+    """Count what one frame takes, its buffers included; what the scene holds itself counts as nothing.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene; what it holds itself counts as nothing.
-    choice : Choice
-        The method and its settings.
-    options : mapping
-        Of `Frame`.
-
-    Returns
-    -------
-    Work
-        Memory is that of arrays and objects of Python; trees of Embree and what kernels hold inside are not seen.
-
-    Raises
-    ------
-    RefgiError
-        As the method.
+    Memory is that of arrays and objects of Python; trees of Embree and what kernels hold inside are not seen.
     """
     running = tracemalloc.is_tracing()
     if not running:
@@ -104,24 +87,7 @@ def work_of(scene: Scene, choice: Choice, options: Mapping[str, Any]) -> Work:
 def cold_seconds(source: str, method: str, options: Mapping[str, Any]) -> float:
     """Return how long a new process takes to its first frame, s: Python, kernels from the cache, the scene, the frame.
 
-    Parameters
-    ----------
-    source : str
-        What the scene is loaded from: a name or a path.
-    method : str
-        Short name; its default settings are used.
-    options : mapping
-        Of `Frame`.
-
-    Returns
-    -------
-    float
-        Wall time.
-
-    Raises
-    ------
-    RefgiError
-        If the process gives no frame.
+    The method at its defaults; `source`: a scene's name or path. RefgiError if the process gives no frame.
     """
     command = [sys.executable, "-c", FIRST_FRAME, source, method, json.dumps(dict(options))]
     started = time.perf_counter()

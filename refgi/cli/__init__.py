@@ -14,17 +14,9 @@ from typing import NoReturn
 
 from refgi.cli.group import SIGNALLED, VerbGroup
 
-__all__ = ["main"]
-
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Those of the process where absent.
-    """
+    """Run the command line, that of the process where absent, and exit."""
     _open_standard_files()
     try:
         VerbGroup.refgi().main(arguments, prog_name="refgi")

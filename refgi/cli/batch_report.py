@@ -27,22 +27,7 @@ class Done(NamedTuple):
 
 
 def say_done(session: Session, done: Done, form: str) -> int:
-    """Print what became of a batch.
-
-    Parameters
-    ----------
-    session : Session
-        Of the command.
-    done : Done
-        What is to be said.
-    form : str
-        "text", or "github" for annotations.
-
-    Returns
-    -------
-    int
-        Exit code.
-    """
+    """Print what became of a batch, as "text" or as annotations of "github"; return the exit code."""
     github = form == "github" and not session.as_json
     lines = [f"{done.jobs} jobs: {done.begun} done now, {done.jobs - done.begun} were there, "
              f"{len(done.failures)} without a picture -> {done.out}"]
@@ -66,27 +51,9 @@ def say_done(session: Session, done: Done, form: str) -> int:
 def say_what_would_be(
     session: Session, jobs: "Sequence[Job]", open_jobs: "Sequence[Job]", common: "Common", workers: int, tell: "Tell"
 ) -> int:
-    """Print what a batch would do, in how much time and memory.
+    """Print what a batch would do, in how much time and memory; return the exit code.
 
-    Parameters
-    ----------
-    session : Session
-        Of the command.
-    jobs : sequence of Job
-        All that are asked for.
-    open_jobs : sequence of Job
-        Those without a result.
-    common : Common
-        What they share.
-    workers : int
-        Processes.
-    tell : callable
-        Called with (what runs, share done).
-
-    Returns
-    -------
-    int
-        Exit code.
+    `jobs` are all that are asked for, `open_jobs` those without a result.
     """
     from refgi.batch.estimate import estimate
 
@@ -105,20 +72,8 @@ def say_what_would_be(
 
 
 def duration(seconds: float) -> str:
-    """Return a time in the unit that suits it.
+    """Return a time, s, in the unit that suits it.
 
-    Parameters
-    ----------
-    seconds : float
-        The time.
-
-    Returns
-    -------
-    str
-        With its unit.
-
-    Examples
-    --------
     >>> duration(3.21), duration(200), duration(20000)
     ('3.2 s', '3.3 min', '5.6 h')
     """
@@ -129,22 +84,7 @@ def duration(seconds: float) -> str:
 
 
 def memory_needed(jobs: "Sequence[Job]", common: "Common", workers: int) -> int:
-    """Estimate the memory that jobs take.
-
-    Parameters
-    ----------
-    jobs : sequence of Job
-        Those to do.
-    common : Common
-        What they share.
-    workers : int
-        Processes.
-
-    Returns
-    -------
-    int
-        Bytes: the most that a job takes, in every process.
-    """
+    """Estimate the memory that jobs take, bytes: the most that a job takes, in every one of `workers` processes."""
     from refgi.batch.jobs import scene_at
     from refgi.cli.memory import map_count, needed_bytes
     from refgi.method import Extent
@@ -164,22 +104,7 @@ def memory_needed(jobs: "Sequence[Job]", common: "Common", workers: int) -> int:
 
 
 def require_memory(jobs: "Sequence[Job]", common: "Common", workers: int) -> None:
-    """Refuse more processes than there is memory for.
-
-    Parameters
-    ----------
-    jobs : sequence of Job
-        Those to do.
-    common : Common
-        What they share.
-    workers : int
-        Processes.
-
-    Raises
-    ------
-    InputError
-        If more is needed than available; names both.
-    """
+    """Refuse more processes than there is memory for; an InputError names what is needed and what is available."""
     from refgi import memory
     from refgi.errors import expect
 

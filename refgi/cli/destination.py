@@ -39,24 +39,8 @@ class Pictures(NamedTuple):
 def picture_files(out: str, stem: str, permission: Permission) -> Pictures:
     """Return the files for --out and make sure that they can be written.
 
-    Parameters
-    ----------
-    out : str
-        A name that ends in .exr or .png, or a folder, which then gets both.
-    stem : str
-        Name of the files in a folder.
-    permission : Permission
-        What may be made and overwritten.
-
-    Returns
-    -------
-    Pictures
-        One or both.
-
-    Raises
-    ------
-    InputError
-        If the name ends otherwise, or its folder or file cannot be written or must not.
+    `out`: a name that ends in .exr or .png, or a folder, which then gets both, named by `stem`. InputError if the name
+    ends otherwise, or its folder or file cannot be written or must not.
     """
     path = Path(out)
     suffix = path.suffix.lower()
@@ -75,24 +59,7 @@ def picture_files(out: str, stem: str, permission: Permission) -> Pictures:
 def folder(out: str, permission: Permission, names: Iterable[str] = ()) -> Path:
     """Make sure that files can be written into a folder; a missing one is not made yet.
 
-    Parameters
-    ----------
-    out : str
-        The folder.
-    permission : Permission
-        What may be made and overwritten.
-    names : iterable of str
-        The files.
-
-    Returns
-    -------
-    Path
-        The folder.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made or written, or a file in it is another program's.
+    InputError if it cannot be made or written, or a file in it is another program's.
     """
     expect(out != "", "--out", "a name", out)
     path = Path(out)
@@ -104,17 +71,9 @@ def folder(out: str, permission: Permission, names: Iterable[str] = ()) -> Path:
 
 
 def make(folder: Path) -> None:
-    """Make a folder that `folder` or `picture_files` found possible.
+    """Make a folder that `folder` or `picture_files` found possible, unless it is there.
 
-    Parameters
-    ----------
-    folder : Path
-        It may be there.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made any more.
+    InputError if it cannot be made any more.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -110,18 +110,7 @@ class Line:
 
 
 def summed(runs: "list[Run]") -> list[Line]:
-    """Add up the calls of each stage, in the order of first appearance.
-
-    Parameters
-    ----------
-    runs : list of Run
-        A log.
-
-    Returns
-    -------
-    list of Line
-        One a stage.
-    """
+    """Add up the calls of each stage, in the order of first appearance."""
     lines: dict[str, Line] = {}
     for run in runs:
         line = lines.get(run.name, Line(run.name, run.depth, 0, 0, 0, ""))

@@ -62,22 +62,9 @@ class FrameFiles(NamedTuple):
                                               lobe_variance), record)
 
     def done(self, frames: int) -> int:
-        """Return how many frames, from the first on, are there.
+        """Return how many of `frames`, from the first on, are there: up to one with a file missing or EXR damaged.
 
-        Parameters
-        ----------
-        frames : int
-            How many there should be.
-
-        Returns
-        -------
-        int
-            Number of the first of which a file is missing or the EXR damaged.
-
-        Raises
-        ------
-        InputError
-            If a frame found is one of another sequence.
+        InputError if a frame found is one of another sequence.
         """
         for number in range(frames):
             file = self._exr(number)
@@ -113,28 +100,9 @@ def _is_damaged(file: Path) -> bool:
 
 
 def resumed(sequence: Sequence, scenes: Iterable[Scene], files: FrameFiles, done: int) -> Iterator[SequenceFrame]:
-    """Render the frames of a sequence that are not there yet, to the bit as if it had not been interrupted.
+    """Render the frames of a sequence after the first `done`, to the bit as if it had not been interrupted.
 
-    Parameters
-    ----------
-    sequence : Sequence
-        How frames are rendered.
-    scenes : iterable of Scene
-        All frames, from the first.
-    files : FrameFiles
-        Where the frames are.
-    done : int
-        How many there are.
-
-    Yields
-    ------
-    Step
-        Frame `done` and those after it.
-
-    Raises
-    ------
-    InputError
-        If the frame before cannot be had back to the bit from its file.
+    `scenes` are all frames, from the first. InputError if the frame before cannot be had back to the bit from its file.
     """
     rest = iter(scenes)
     history = None

@@ -41,19 +41,9 @@ class Terminated(KeyboardInterrupt):
 
 
 def fault_of(error: BaseException, *, debug: bool = False) -> Fault:
-    """Return what went wrong, for people and for programs.
+    """Return what went wrong, for people and for programs: one line of message, or one for each fault of a file.
 
-    Parameters
-    ----------
-    error : BaseException
-        What was raised.
-    debug : bool
-        Whether the traceback is shown anyway.
-
-    Returns
-    -------
-    Fault
-        One line of message, or one for each fault of a file.
+    With `debug` the traceback is shown anyway.
     """
     if isinstance(error, Terminated):
         return Fault(TERMINATED, "terminated")

@@ -16,22 +16,9 @@ BESIDE = frozenset({"again", "scene_path", "exposure", "out", "threads", "parent
 
 
 def asked(options: dict[str, Any]) -> "Job":
-    """Return what the options say, with the scene loaded.
+    """Return what the verb's options, by parameter, say to render, with the scene loaded.
 
-    Parameters
-    ----------
-    options : dict
-        Those of the verb, by parameter.
-
-    Returns
-    -------
-    Job
-        What to render.
-
-    Raises
-    ------
-    InputError
-        If a setting, the scene, the camera or a light is not usable.
+    InputError if a setting, the scene, the camera or a light is not usable.
     """
     import dataclasses
 
@@ -48,24 +35,9 @@ def asked(options: dict[str, Any]) -> "Job":
 
 
 def recorded(file: str, scene: str | None) -> "Job":
-    """Return what the record of a picture says, with the scene loaded and found to be the same.
+    """Return what the record of an EXR that refgi wrote says, with the scene loaded and found to be the same.
 
-    Parameters
-    ----------
-    file : str
-        An EXR that refgi wrote.
-    scene : str or None
-        Where its scene is now.
-
-    Returns
-    -------
-    Job
-        What to render.
-
-    Raises
-    ------
-    InputError
-        If the file has no record or the scene is not the same any more.
+    `scene`: where it is now. InputError if the file has no record or the scene is not the same any more.
     """
     from refgi.provenance import job_of, read_record
 
@@ -74,18 +46,7 @@ def recorded(file: str, scene: str | None) -> "Job":
 
 
 def require_either(ctx: click.Context) -> None:
-    """Refuse a run without a scene, and one that is to make a picture again but otherwise.
-
-    Parameters
-    ----------
-    ctx : click.Context
-        Of the verb.
-
-    Raises
-    ------
-    click.UsageError
-        If an argument or option is missing or too many.
-    """
+    """Refuse (UsageError) a run without a scene, and one that is to make a picture again but otherwise."""
     given = {parameter.name: parameter for parameter in ctx.command.params
              if parameter.name and ctx.get_parameter_source(parameter.name) is ParameterSource.COMMANDLINE}
     by_name = {parameter.name: parameter for parameter in ctx.command.params}
@@ -103,19 +64,9 @@ def require_either(ctx: click.Context) -> None:
 
 
 def differences(file: Path, planes: dict[str, Any]) -> list[str]:
-    """Return in what a picture made again differs from the one in a file.
+    """Return in what a picture made again differs from the one in an EXR that refgi wrote.
 
-    Parameters
-    ----------
-    file : Path
-        An EXR that refgi wrote.
-    planes : dict of str to (h, w) ndarray
-        Planes by channel, as they would be written.
-
-    Returns
-    -------
-    list of str
-        One text a channel that is not the same to the bit; none where all are.
+    `planes`: (h, w) by channel, as they would be written. One text a channel that is not the same to the bit.
     """
     import numpy as np
 
@@ -132,18 +83,7 @@ def differences(file: Path, planes: dict[str, Any]) -> list[str]:
 
 
 def stem(scene: str) -> str:
-    """Return how files are named after a scene.
-
-    Parameters
-    ----------
-    scene : str
-        A built-in name with or without parameters, or a file.
-
-    Returns
-    -------
-    str
-        Name without folder, suffix and parameters.
-    """
+    """Return how files are named after a scene: its name without folder, suffix and parameters."""
     from refgi.scene import builtin_scenes
     from refgi.scene.files import text_of
 
@@ -152,22 +92,7 @@ def stem(scene: str) -> str:
 
 
 def require_view(covered: bool, scene: str, allowed: bool) -> None:
-    """Refuse a picture on which there is nothing, which nobody wants by intention.
-
-    Parameters
-    ----------
-    covered : bool
-        Whether the camera sees any surface.
-    scene : str
-        The scene's name.
-    allowed : bool
-        Whether an empty picture is as good as another.
-
-    Raises
-    ------
-    InputError
-        If it is empty and must not be.
-    """
+    """Refuse (InputError), unless allowed, a picture on which there is nothing, which nobody wants by intention."""
     if not (covered or allowed):
         raise InputError(f"scene {scene!r}: camera: expected a view of some surface, got one past all of it; "
                          "--allow-empty writes the black picture", key="camera")

@@ -23,18 +23,7 @@ def measured(
 
 
 def measured_text(report: "SkipReport | None") -> str:
-    """Return the tables of a report after an empty line; nothing where there is none.
-
-    Parameters
-    ----------
-    report : SkipReport or None
-        What was measured.
-
-    Returns
-    -------
-    str
-        Tables of skips, trades and what has no switch.
-    """
+    """Return the tables of a report after an empty line: skips, trades and what has no switch; nothing without one."""
     if report is None:
         return ""
     head = f"What {report.scene} does not need at {report.width} x {report.height}"

@@ -20,27 +20,10 @@ FACE_BYTES = 460  # vertices, faces, clusters, Embree's tree
 
 def needed_bytes(scene: Scene, width: int, height: int, *, float_bytes: int = 4, rsm_resolution: int = 512,
                  traced: bool = False, compared: int = 0) -> int:
-    """Estimate the memory that a picture takes.
+    """Estimate the memory that a picture takes, bytes, rather too many than too few.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    width, height : int
-        Pixels.
-    float_bytes : int
-        4 or 8.
-    rsm_resolution : int
-        Texels along a side.
-    traced : bool
-        Whether the truth is among the methods.
-    compared : int
-        How many methods are compared.
-
-    Returns
-    -------
-    int
-        Bytes, rather too many than too few.
+    `float_bytes`: 4 or 8; `rsm_resolution`: texels along a side; `traced`: whether the truth is among the methods;
+    `compared`: how many methods are compared.
     """
     pixel = PIXEL_FLOATS * float_bytes + traced * TRUTH_PIXEL_BYTES + compared * COMPARED_PIXEL_BYTES
     texels = map_count(scene) * rsm_resolution**2 * TEXEL_FLOATS * float_bytes
@@ -58,27 +41,9 @@ def map_count(scene: Scene) -> int:
 
 def require_memory(scene: Scene, dtype: str, rsm_resolution: int, *, traced: bool = False, compared: int = 0,
                    settings: Mapping[str, Any] | None = None) -> None:
-    """Refuse a picture of the camera's size that will not fit.
+    """Refuse a picture of the camera's size that will not fit; an InputError names what is needed and available.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    dtype : str
-        A float type of NumPy.
-    rsm_resolution : int
-        Texels along a side.
-    traced : bool
-        Whether the truth is among the methods.
-    compared : int
-        How many methods and references are compared.
-    settings : mapping of str to object, optional
-        Those of each method, which run one after the other.
-
-    Raises
-    ------
-    InputError
-        If more is needed than available; names both.
+    Arguments as of `needed_bytes`; `settings` are those of each method, which run one after the other.
     """
     width, height = scene.camera.width, scene.camera.height
     float_bytes = 8 if dtype == "float64" else 4

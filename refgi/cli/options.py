@@ -63,156 +63,80 @@ class Exposure(click.ParamType[float | str]):
             self.fail(f"expected a number or auto, got {value!r}", param, ctx)
 
 
-def speech(function: F) -> F:
-    """Add --json and --debug.
-
-    Parameters
-    ----------
-    function : callable
-        A verb.
-
-    Returns
-    -------
-    callable
-        The same, with the options.
-    """
-    def keep(name: str) -> Callable[[click.Context, click.Parameter, bool], None]:
-        def store(ctx: click.Context, _: click.Parameter, value: bool) -> None:
-            session = ctx.find_object(Session)
-            if session is not None and value:
-                setattr(session, name, True)
-        return store
-
-    flag: dict[str, Any] = {"is_flag": True, "is_eager": True, "expose_value": False}
-    function = click.option("--debug", help="Show the traceback of an error.", callback=keep("debug"), **flag)(function)
-    return click.option("--json", help="Put one JSON object on stdout.", callback=keep("as_json"), **flag)(function)
+def _adding(*decorators: Callable[[Any], Any]) -> Callable[[F], F]:
+    """Return what gives a verb some options and arguments, in the order of its help."""
+    def add(function: F) -> F:
+        for decorate in reversed(decorators):
+            function = decorate(function)
+        return function
+    return add
 
 
-def writing(function: F) -> F:
-    """Add what may be done to put results where --out says, as the parameters of a `Permission`.
-
-    Parameters
-    ----------
-    function : callable
-        A verb.
-
-    Returns
-    -------
-    callable
-        The same, with the options.
-    """
-    function = click.option("--force", is_flag=True, help="Overwrite files that are not from refgi.")(function)
-    return click.option("--parents", is_flag=True, help="Make every missing folder of --out, not the last alone."
-                        )(function)
+def _keep(name: str) -> dict[str, Any]:
+    """Return how a flag, wherever it stands, becomes the session's value of that name and no parameter of the verb."""
+    def store(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+        session = ctx.find_object(Session)
+        if session is not None and value:
+            setattr(session, name, True)
+    return {"callback": store, "is_flag": True, "is_eager": True, "expose_value": False}
 
 
-def view(function: F) -> F:
-    """Add the scene and what is seen of it: size, camera, lights.
+speech = _adding(
+    click.option("--json", help="Put one JSON object on stdout.", **_keep("as_json")),
+    click.option("--debug", help="Show the traceback of an error.", **_keep("debug")),
+)
 
-    Parameters
-    ----------
-    function : callable
-        A verb.
+# what may be done to put results where --out says: the parameters of a `Permission`
+writing = _adding(
+    click.option("--parents", is_flag=True, help="Make every missing folder of --out, not the last alone."),
+    click.option("--force", is_flag=True, help="Overwrite files that are not from refgi."),
+)
 
-    Returns
-    -------
-    callable
-        The same, with the argument and the options.
-    """
-    return click.argument("scene")(seen(function))
+# what is seen of a scene: size, camera, lights
+seen = _adding(
+    click.option("--size", type=Size(), help="Picture size in pixels; the scene's own where absent."),
+    click.option("--eye", type=Triple(), help="Where the camera is, m."),
+    click.option("--target", type=Triple(), help="What it looks at, m."),
+    click.option("--up", type=Triple(), help="Which way is up."),
+    click.option("--vfov-deg", type=float, help="Full vertical field of view."),
+    click.option("--light", "lights", multiple=True, metavar="KIND:KEY=VALUE:...",
+                 help="A light instead of the scene's own; repeatable. spot:position=0,2,0:target=0,0,0:"
+                      "outer_deg=35:intensity=20, point:position=0,2,0:intensity=20 (W/sr) or "
+                      "directional:direction=0,-1,0:irradiance=3 (W/m^2)."),
+    click.option("--strict", is_flag=True,
+                 help="Refuse a mesh that lacks material files, images or normals that it names."),
+    click.option("--light-unit", type=click.Choice(["cd", "lm", "W/sr"]), default="cd", show_default=True,
+                 help="What glTF's lights are in; exporters write cd (the format's), lm or W/sr."),
+    click.option("--emissive", type=click.Choice(["seen", "lamps"]), default="seen", show_default=True,
+                 help="Emissive surfaces are seen and light nothing, or each part gets a lamp, an approximation."),
+)
 
+# the scene and what is seen of it
+view = _adding(click.argument("scene"), seen)
 
-def seen(function: F) -> F:
-    """Add what is seen of a scene: size, camera, lights.
+# how it is computed
+machine = _adding(
+    click.option("--dtype", type=click.Choice(["float32", "float64"]), default="float32", show_default=True,
+                 help="Element type of every buffer and kernel."),
+    click.option("--rsm-resolution", type=click.IntRange(1, 16384), default=512, show_default=True,
+                 help="Texels along one side of a reflective shadow map."),
+    click.option("--threads", type=click.IntRange(1), help="Threads of compiled kernels; all where absent."),
+    click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Which random numbers, where a method has any."),
+)
 
-    Parameters
-    ----------
-    function : callable
-        A verb.
-
-    Returns
-    -------
-    callable
-        The same, with the options.
-    """
-    for decorate in reversed((
-        click.option("--size", type=Size(), help="Picture size in pixels; the scene's own where absent."),
-        click.option("--eye", type=Triple(), help="Where the camera is, m."),
-        click.option("--target", type=Triple(), help="What it looks at, m."),
-        click.option("--up", type=Triple(), help="Which way is up."),
-        click.option("--vfov-deg", type=float, help="Full vertical field of view."),
-        click.option("--light", "lights", multiple=True, metavar="KIND:KEY=VALUE:...",
-                     help="A light instead of the scene's own; repeatable. spot:position=0,2,0:target=0,0,0:"
-                          "outer_deg=35:intensity=20, point:position=0,2,0:intensity=20 (W/sr) or "
-                          "directional:direction=0,-1,0:irradiance=3 (W/m^2)."),
-        click.option("--strict", is_flag=True,
-                     help="Refuse a mesh that lacks material files, images or normals that it names."),
-        click.option("--light-unit", type=click.Choice(["cd", "lm", "W/sr"]), default="cd", show_default=True,
-                     help="What glTF's lights are in; exporters write cd (the format's), lm or W/sr."),
-        click.option("--emissive", type=click.Choice(["seen", "lamps"]), default="seen", show_default=True,
-                     help="Emissive surfaces are seen and light nothing, or each part gets a lamp, an approximation."),
-    )):
-        function = decorate(function)
-    return function
-
-
-def machine(function: F) -> F:
-    """Add how it is computed: element type, size of the shadow maps, threads, seed.
-
-    Parameters
-    ----------
-    function : callable
-        A verb.
-
-    Returns
-    -------
-    callable
-        The same, with the options.
-    """
-    for decorate in reversed((
-        click.option("--dtype", type=click.Choice(["float32", "float64"]), default="float32", show_default=True,
-                     help="Element type of every buffer and kernel."),
-        click.option("--rsm-resolution", type=click.IntRange(1, 16384), default=512, show_default=True,
-                     help="Texels along one side of a reflective shadow map."),
-        click.option("--threads", type=click.IntRange(1), help="Threads of compiled kernels; all where absent."),
-        click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Which random numbers, where a method has any."),
-    )):
-        function = decorate(function)
-    return function
-
-
-def still(function: F) -> F:
-    """Add the frames that a still picture is blended of.
-
-    Parameters
-    ----------
-    function : callable
-        A verb.
-
-    Returns
-    -------
-    callable
-        The same, with the options.
-    """
-    function = click.option("--temporal", "filtering", multiple=True, metavar="KEY=VALUE",
-                            help="A setting of the temporal filter of --frames, such as weight=0.8; repeatable."
-                            )(function)
-    return click.option("--frames", type=click.IntRange(1, 100_000),
-                        help="Frames of other random numbers that a method with a temporal filter blends.")(function)
+# the frames that a still picture is blended of
+still = _adding(
+    click.option("--frames", type=click.IntRange(1, 100_000),
+                 help="Frames of other random numbers that a method with a temporal filter blends."),
+    click.option("--temporal", "filtering", multiple=True, metavar="KEY=VALUE",
+                 help="A setting of the temporal filter of --frames, such as weight=0.8; repeatable."),
+)
 
 
 def shadows(default: str) -> Callable[[F], F]:
-    """Add where the direct light's shadows come from.
+    """Return what adds where the direct light's shadows come from.
 
-    Parameters
-    ----------
-    default : str
-        "exact" where rays are traced in any case; "auto", which gives the verb None, where the method decides.
-
-    Returns
-    -------
-    callable
-        Adds the option to a verb.
+    `default`: "exact" where rays are traced in any case; "auto", which gives the verb None, where the method decides.
     """
     names = ["auto", "map", "exact"] if default == "auto" else ["map", "exact"]
     auto = "; auto: by rays where the method traces some anyway" if default == "auto" else ""
@@ -222,23 +146,7 @@ def shadows(default: str) -> Callable[[F], F]:
 
 
 def on_threads(count: int | None) -> AbstractContextManager[None]:
-    """Run kernels on `count` threads inside the block.
-
-    Parameters
-    ----------
-    count : int or None
-        Threads; all where None.
-
-    Returns
-    -------
-    context manager
-        Restores the number at its end.
-
-    Raises
-    ------
-    InputError
-        If there are not so many.
-    """
+    """Run kernels on `count` threads, all where None, inside the block; InputError if there are not so many."""
     import numba
 
     from refgi.jit import threads

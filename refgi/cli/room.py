@@ -18,12 +18,9 @@ THREADS, MOST_THREADS = "NUMBA_NUM_THREADS", 4096  # a million end the process
 
 
 def require_threads() -> None:
-    """Refuse a value of NUMBA_NUM_THREADS that Numba cannot read or start.
+    """Refuse (InputError) a value of NUMBA_NUM_THREADS that Numba cannot read or start.
 
-    Raises
-    ------
-    InputError
-        If it is no whole number, or too small or large.
+    It is no whole number, or too small or large.
     """
     asked = os.environ.get(THREADS)
     usable = asked is None or (asked.strip().isdecimal() and 1 <= int(asked[:20]) <= MOST_THREADS)
@@ -31,18 +28,7 @@ def require_threads() -> None:
 
 
 def require_room(verb: str) -> None:
-    """Refuse a verb that computes where the address space left is too small for what it loads.
-
-    Parameters
-    ----------
-    verb : str
-        Of the command line.
-
-    Raises
-    ------
-    InputError
-        If there is a limit, and too little left below it.
-    """
+    """Refuse (InputError) a verb that computes where the address space left is too small for what it loads."""
     left = _left()
     needed = KERNELS if "scipy.spatial" in sys.modules else LIBRARIES
     if verb in COMPUTING and left is not None and left < needed:

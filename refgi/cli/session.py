@@ -97,26 +97,14 @@ class Fault(NamedTuple):
 
 
 def say(text: str) -> None:
-    """Print one line to stderr, after the command's name; where nobody listens the work goes on.
-
-    Parameters
-    ----------
-    text : str
-        The line.
-    """
+    """Print one line to stderr, after the command's name; where nobody listens the work goes on."""
     with contextlib.suppress(OSError):
         click.echo(f"refgi: {text}", file=sys.stderr)
 
 
 @contextmanager
 def progress() -> Iterator[Tell]:
-    """Show how far long work is while the block runs.
-
-    Yields
-    ------
-    callable
-        To be called with (what runs, fraction done).
-    """
+    """Show how far long work is while the block runs: yield what is to be called with (what runs, fraction done)."""
     if sys.stderr.isatty():
         with _bar() as tell:
             yield tell

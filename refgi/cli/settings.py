@@ -17,28 +17,10 @@ preset = click.option("--preset", default="default", show_default=True, metavar=
 
 
 def settings_for(method: str, pairs: Iterable[str], seed: int | None = None, preset: str = "default") -> Any:
-    """Make a method's settings from text.
+    """Make a method's settings from a preset and texts.
 
-    Parameters
-    ----------
-    method : str
-        Its short name.
-    pairs : iterable of str
-        Such as ``lights=1024``, ``visibility=csm`` or ``as_published=sii_no_pi,sii_widening``.
-    seed : int, optional
-        Value of the key ``seed``.
-    preset : str
-        Named settings to start from.
-
-    Returns
-    -------
-    Settings
-        Of the method.
-
-    Raises
-    ------
-    InputError
-        If a key is unknown or a value not usable; names all of them.
+    Texts such as ``lights=1024``, ``visibility=csm`` or ``as_published=sii_no_pi,sii_widening``; `seed`: value of the
+    key ``seed``. An InputError names all unknown keys and values that are not usable.
     """
     from refgi.methods import find_method
     from refgi.settings import from_text
@@ -51,18 +33,7 @@ def settings_for(method: str, pairs: Iterable[str], seed: int | None = None, pre
 
 
 def has_seed(method: str) -> bool:
-    """Return whether a method draws random numbers.
-
-    Parameters
-    ----------
-    method : str
-        Its short name.
-
-    Returns
-    -------
-    bool
-        Whether any of its settings is a seed.
-    """
+    """Return whether a method draws random numbers: whether any of its settings is a seed."""
     from refgi.methods import find_method
     from refgi.settings import leaves
 
@@ -72,26 +43,10 @@ def has_seed(method: str) -> bool:
 def still_frames(
     methods: Iterable[str], frames: int | None, pairs: Iterable[str]
 ) -> "StillFrames | None":
-    """Return how many frames of a resting scene methods are to blend, and by which filter.
+    """Return how many frames of a resting scene methods are to blend, and by which filter, set by `pairs`.
 
-    Parameters
-    ----------
-    methods : iterable of str
-        Short names.
-    frames : int or None
-        Of --frames.
-    pairs : iterable of str
-        Settings of the filter.
-
-    Returns
-    -------
-    StillFrames or None
-        None where --frames is absent.
-
-    Raises
-    ------
-    InputError
-        If none of the methods has a temporal filter, or a setting is wrong or of no use.
+    None where --frames is absent. InputError if none of the methods has a temporal filter, or a setting is wrong or of
+    no use.
     """
     from refgi.methods import require_filter
     from refgi.settings import from_text
@@ -108,24 +63,9 @@ def still_frames(
 
 
 def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[str]]:
-    """Sort ``method.key=value`` by method.
+    """Sort texts such as ``sii.lights=1024`` by method: ``key=value`` for each.
 
-    Parameters
-    ----------
-    pairs : iterable of str
-        Such as ``sii.lights=1024``.
-    methods : iterable of str
-        Methods there are.
-
-    Returns
-    -------
-    dict of str to list of str
-        ``key=value`` texts for each method.
-
-    Raises
-    ------
-    InputError
-        If a method is missing or unknown; names all of them.
+    An InputError names all whose method is missing or unknown.
     """
     from refgi.scene.files import did_you_mean
 

@@ -23,22 +23,10 @@ INNER_SHARE = 0.9  # of the outer half-angle, where the inner is not given
 
 
 def read_lights(texts: Sequence[str]) -> list[Light] | None:
-    """Make lights from text.
+    """Make lights from texts such as ``spot:position=0,2,0:target=0,0,0:outer_deg=35:intensity=20``.
 
-    Parameters
-    ----------
-    texts : sequence of str
-        Such as ``spot:position=0,2,0:target=0,0,0:outer_deg=35:intensity=20``.
-
-    Returns
-    -------
-    list of Light or None
-        None where there are no texts: the scene keeps its own.
-
-    Raises
-    ------
-    InputError
-        If a kind, key or value is not usable; names the light.
+    None where there are none: the scene keeps its own. InputError, which names the light, if a kind, key or value is
+    not usable.
     """
     return [_read(text) for text in texts] if texts else None
 
@@ -123,17 +111,9 @@ class View:
     emissive: str = "seen"
 
     def load(self) -> Scene:
-        """Return the scene with its camera and lights changed as asked.
+        """Return the scene with its camera, of the picture's size, and lights changed as asked.
 
-        Returns
-        -------
-        Scene
-            Its camera's size is the picture's size.
-
-        Raises
-        ------
-        InputError
-            If the scene, the camera or a light is not usable.
+        InputError if the scene, the camera or a light is not usable.
         """
         changes = self._camera_changes()
         lights = read_lights(self.lights)

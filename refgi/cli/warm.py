@@ -41,17 +41,7 @@ command = _warm
 
 
 def warm_up(methods: Iterable[str], dtype: str, tell: Callable[[str, float], None]) -> None:
-    """Compile in several processes what methods at their defaults would have to compile first.
-
-    Parameters
-    ----------
-    methods : iterable of str
-        Their short names.
-    dtype : str
-        Element type of their kernels.
-    tell : callable
-        Progress.
-    """
+    """Compile in several processes what methods at their defaults would have to compile first."""
     from refgi.jit.ahead import compile_ahead, cores
 
     if cores() > 1 and len(lacking := _lacking(methods, dtype)) >= FEW:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.clustering.kmeans import cluster
+from refgi.cluster.clustering.kmeans import clusters_of
 from refgi.cluster.clustering.rectangle import AreaLights, area_lights
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.occluders import ends_of
@@ -46,32 +46,12 @@ BACK = 0.75  # of the area lights that were enough: the one step back
 def group_lights(
     frame: "Frame", lights: "PixelLights", settings: "ValSettings", count: int, footprint: Array | None = None
 ) -> tuple[AreaLights, ShadowMaps | None]:
-    """Group pixel lights into area lights and draw what occludes them.
+    """Group N pixel lights into M (`count`) area lights, one for each cluster, and draw what each sees.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene.
-    lights : PixelLights
-        N pixel lights.
-    settings : ValSettings
-        Kind of clusters and of maps.
-    count : int
-        M, how many area lights.
-    footprint : (N,) ndarray, optional
-        Surface area of each light, m^2, where a cluster of one light is its footprint.
-
-    Returns
-    -------
-    AreaLights
-        One for each cluster.
-    ShadowMaps or None
-        What each sees; None where the kind of visibility does not ask.
+    No maps (None) where the kind of visibility does not ask. `footprint` (N,) is each light's surface, m^2, where a
+    cluster of one light is its footprint.
     """
-    kind = settings.clusters
-    clusters = cluster(lights.position, lights.normal, count, distance=kind.distance,
-                       weights=(kind.position_weight, kind.normal_weight), diagonal=frame.illuminated_extent.diagonal,
-                       rounds=kind.rounds)
+    clusters = clusters_of(lights.position, lights.normal, count, settings.clusters, frame.illuminated_extent)
     areas = area_lights(lights, clusters, settings.area, footprint)
     if settings.visibility is None or isinstance(settings.visibility, WITHOUT_MAPS):
         chosen = "none" if settings.visibility is None else settings.visibility.name()
@@ -117,7 +97,7 @@ class PixelSamples(NamedTuple):
     share: float  # of the picture's surface that they are
 
 
-@stage("cluster.adaptive")
+@stage("cluster.adaptive", steps="inside")
 def count_for_error(
     frame: "Frame", lights: "PixelLights", settings: "ValSettings", footprint: Array | None = None
 ) -> Adaptive:
@@ -204,18 +184,48 @@ def _light_samples(
 def _samples(frame: "Frame", lights: "PixelLights", settings: "ValSettings") -> PixelSamples:
     """Draw pixels, one from each of as many equal parts of the surface seen, and light them by rays."""
     position, normal, triangle_id, covered = frame.gbuffer.resolve("position", "normal", "triangle_id", "covered")
-    surface = np.flatnonzero(covered)
-    drawn = np.arange(min(SAMPLES, len(surface)))
-    if len(drawn) < len(surface):
-        spread = (drawn + draws(settings.lights.seed, AREA_LIGHT_SAMPLES, len(drawn))) * (len(surface) / len(drawn))
-        drawn = np.minimum(spread.astype(np.int64), len(surface) - 1)
-    at = surface[drawn]
-    points, normals = (np.ascontiguousarray(plane.reshape(3, -1)[:, None, at]) for plane in (position, normal))
-    receivers = Receivers(points, normals, np.ones((1, len(at)), np.bool_))
-    facing = facing_normals(frame.scene.geometry, triangle_id.reshape(-1)[None, at], normals)
+    surface = int(np.count_nonzero(covered))
+    count = min(SAMPLES, surface)
+    points, normals, seen = sampled_pixels(position, normal, triangle_id, draws(
+        settings.lights.seed, AREA_LIGHT_SAMPLES, count))
+    receivers = Receivers(points, normals, np.ones((1, count), np.bool_))
+    facing = facing_normals(frame.scene.geometry, seen, normals)
     area = footprints(frame, settings.lights, settings.pairs)
     exact = _by_rays(frame, lights, settings, receivers, facing, area)
-    return PixelSamples(receivers, facing, exact, area, len(at) / max(1, len(surface)))
+    return PixelSamples(receivers, facing, exact, area, count / max(1, surface))
+
+
+@stage("cluster.sampled_pixels", kept=False)
+def sampled_pixels(position: Array, normal: Array, triangle_id: Array, shifts: Array) -> tuple[Array, Array, Array]:
+    """Take one pixel of each of as many equal parts of the surface that is seen, row by row (docs/methods/val).
+
+    Parameters
+    ----------
+    position : (3, h, w) ndarray
+        Surface points, m.
+    normal : (3, h, w) ndarray
+        Unit normals.
+    triangle_id : (h, w) int ndarray
+        Which triangle a pixel sees; -1 for none.
+    shifts : (sample,) ndarray
+        Random numbers, places within the parts, [0, 1).
+
+    Returns
+    -------
+    position : (3, one, sample) ndarray
+        Surface points, m.
+    normal : (3, one, sample) ndarray
+        Unit normals.
+    triangle_id : (one, sample) int ndarray
+        Which triangle each sees.
+    """
+    surface = np.flatnonzero(triangle_id >= 0)
+    drawn = np.arange(len(shifts))
+    if len(drawn) < len(surface):
+        drawn = np.minimum(((drawn + shifts) * (len(surface) / len(drawn))).astype(np.int64), len(surface) - 1)
+    at = surface[drawn]
+    points, normals = (np.ascontiguousarray(plane.reshape(3, -1)[:, None, at]) for plane in (position, normal))
+    return points, normals, np.ascontiguousarray(triangle_id.reshape(-1)[None, at])
 
 
 def _by_rays(
@@ -223,8 +233,8 @@ def _by_rays(
     footprint: Array | None,
 ) -> Array:
     """Return the light of all lights with a ray for each: every light is its own cluster."""
-    alone = cluster(lights.position, lights.normal, max(1, lights.position.shape[1]),
-                    diagonal=frame.illuminated_extent.diagonal)
+    alone = clusters_of(lights.position, lights.normal, max(1, lights.position.shape[1]), settings.clusters,
+                        frame.illuminated_extent)
     areas = area_lights(lights, alone, dataclasses.replace(settings.area, single_light="point"))
     with threads(1):  # a thousand clusters of one light each: waking threads would cost more than their work
         light = clustered_irradiance(receivers, facing, lights, areas, None, settings, footprint=footprint,

@@ -59,7 +59,7 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
         skip("cluster.blur", "every pixel sums all lights" if block == 1 else "off in the settings")
         return light
     # Sec. 6, geometry-aware blur
-    return blur(light, receivers_of(frame), block, settings.blur, frame.visible_extent.diagonal)
+    return blur(light, receivers_of(frame), block, settings.blur, frame.visible_extent)
 
 
 def val_lobes(frame: "Frame", settings: ValSettings) -> Array:
@@ -90,33 +90,10 @@ def glossy_under(
     frame: "Frame", points: GlossyPoints, triangle_id: Array, lights: "PixelLights", areas: AreaLights,
     maps: ShadowMaps | None, settings: ValSettings, footprint: Array | None, width: int = 0,
 ) -> Array:
-    """Light glossy receivers by pixel lights that are clustered already.
+    """Light n glossy receivers by pixel lights that are clustered already: radiance towards the eye, (3, n), W/m^2/sr.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene with its buffers.
-    points : GlossyPoints
-        n receivers.
-    triangle_id : (n,) ndarray of int
-        Which triangle each lies on.
-    lights : PixelLights
-        The pixel lights.
-    areas : AreaLights
-        Their area lights.
-    maps : ShadowMaps or None
-        What each sees.
-    settings : ValSettings
-        How visibility is found.
-    footprint : (N,) ndarray or None
-        Surface area each light stands for, m^2.
-    width : int
-        As for `clustered_radiance`.
-
-    Returns
-    -------
-    (3, n) ndarray
-        Radiance towards the eye, W/m^2/sr.
+    `triangle_id` (n,) is what each lies on, `maps` what each area light sees, `footprint` (N,) the surface each light
+    stands for, m^2, `width` as for `clustered_radiance`.
     """
     facing = facing_normals(frame.scene.geometry, triangle_id[None], points.normal[:, None])[:, 0]
     return clustered_radiance(
@@ -128,27 +105,9 @@ def glossy_under(
 def light_pixels(
     frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: ShadowMaps | None, settings: ValSettings, block: int
 ) -> Array:
-    """Light every pixel by pixel lights that are clustered already.
+    """Light every pixel by pixel lights that are clustered already: indirect irradiance (3, h, w), W/m^2, not blurred.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene with its buffers.
-    lights : PixelLights
-        The pixel lights.
-    areas : AreaLights
-        Their area lights.
-    maps : ShadowMaps or None
-        What each sees.
-    settings : ValSettings
-        How visibility is found.
-    block : int
-        Side of the blocks of pixels that share the lights out among themselves.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Indirect irradiance, W/m^2, not blurred.
+    `block` is the side of the blocks of pixels that share the lights out among themselves.
     """
     footprint = footprints(frame, settings.lights, settings.pairs)
     warn_of_clamp(receivers_of(frame), lights, settings.pairs, footprint, "val")
@@ -164,21 +123,7 @@ def cluster_lights(
 ) -> tuple[AreaLights, ShadowMaps | None]:
     """Group pixel lights into as many area lights as asked for, or as an error asks for, and draw their maps.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene.
-    lights : PixelLights
-        The pixel lights.
-    settings : ValSettings
-        Number and kind of clusters, and of their maps.
-
-    Returns
-    -------
-    AreaLights
-        One for each cluster.
-    ShadowMaps or None
-        What each sees; None where nothing asks for it.
+    No maps (None) where nothing asks for them.
     """
     if isinstance(settings.clusters, AdaptiveClusters):
         chosen = count_for_error(frame, lights, settings, _areas_of_single(frame, settings))
@@ -193,58 +138,19 @@ def _areas_of_single(frame: "Frame", settings: ValSettings) -> Array | None:
 
 
 def block_side(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> int:
-    """Return the side of the blocks of pixels that share the lights out among themselves; 1: each sums all.
-
-    Parameters
-    ----------
-    frame : Frame
-        Says how many pixels there are.
-    lights : PixelLights
-        Says how many lights.
-    settings : ValSettings
-        May say the side.
-
-    Returns
-    -------
-    int
-        Pixels.
-    """
+    """Return the side of the blocks of pixels that share the lights out among themselves; 1: each sums all."""
     if settings.interleaving.block is not None:
         return settings.interleaving.block
     return 1 if frame.width * frame.height * lights.flux.shape[1] <= PAIRS_IN_FULL else PUBLISHED_BLOCK
 
 
 def receivers_of(frame: "Frame") -> Receivers:
-    """Return the points that a frame's pixels see.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene with its buffers.
-
-    Returns
-    -------
-    Receivers
-        Positions and shading normals.
-    """
+    """Return the points that a frame's pixels see, with shading normals."""
     return Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
 
 
 def extra_bytes(settings: ValSettings, extent: Extent) -> int:
-    """Estimate the memory that area lights add to a picture: shadow maps, and these filtered.
-
-    Parameters
-    ----------
-    settings : ValSettings
-        How many area lights, and what their maps are.
-    extent : Extent
-        Of the picture.
-
-    Returns
-    -------
-    int
-        Bytes, rather too many than too few.
-    """
+    """Estimate the bytes that area lights add to a picture: shadow maps, and these filtered; rather too many."""
     size, float_bytes = extent.size, extent.float_bytes
     texels, count = settings.maps.resolution**2, _most_maps(settings, extent)
     sides = 2 if settings.maps.behind == "dual_paraboloid" else 1

@@ -220,21 +220,9 @@ def _settings(names: Sequence[str], truth: Any, given: Mapping[str, Any]) -> dic
 
 
 def limited(settings: Any, name: str, limits: Mapping[str, Any]) -> Any:
-    """Return how a truth is traced that shares limits of a method.
+    """Return how a truth is traced that shares limits of a method, such as `WITHOUT_VISIBILITY`.
 
-    Parameters
-    ----------
-    settings : TruthSettings
-        Of the truth itself.
-    name : str
-        What it is called.
-    limits : mapping of str to object
-        Settings that differ, such as `WITHOUT_VISIBILITY`.
-
-    Returns
-    -------
-    TruthSettings
-        With a checkpoint file of its own, where there is one.
+    With a checkpoint file of its own, named by `name`, where there is one.
     """
     checkpoint = settings.checkpoint
     if checkpoint and not Path(checkpoint).is_dir():  # a folder has a file for each
@@ -243,18 +231,7 @@ def limited(settings: Any, name: str, limits: Mapping[str, Any]) -> Any:
 
 
 def require_folder(folder: Path) -> None:
-    """Make a folder where it is missing.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made.
-    """
+    """Make a folder where it is missing; InputError if it cannot be made."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

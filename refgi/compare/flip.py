@@ -37,19 +37,9 @@ class Flip(NamedTuple):
 
 
 def flip(image: Array, reference: Array, covered: Array) -> Flip:
-    """Compare two pictures as a viewer would, over a range of exposures.
+    """Compare two pictures, (3, h, w), linear radiance, as a viewer would, over a range of exposures.
 
-    Parameters
-    ----------
-    image, reference : (3, h, w) ndarray
-        Linear radiance in one unit; negative values count as 0.
-    covered : (h, w) ndarray of bool
-        Pixels of which the mean is taken.
-
-    Returns
-    -------
-    Flip
-        Mean and map, or the reason why there is none.
+    Negative values count as 0; the mean is over covered pixels. The mean and the map, or the reason why there is none.
     """
     if importlib.util.find_spec("flip_evaluator") is None:
         return Flip(skipped="flip-evaluator is not installed: pip install 'refgi[flip]'")
@@ -68,17 +58,7 @@ def flip(image: Array, reference: Array, covered: Array) -> Flip:
 def choose_exposures(reference: Array, covered: Array) -> tuple[float, float, int] | None:
     """Choose exposures from one that keeps the brightest 1 % at white to one that lifts the median there.
 
-    Parameters
-    ----------
-    reference : (3, h, w) ndarray
-        Linear radiance.
-    covered : (h, w) ndarray of bool
-        Pixels that count; black ones do not.
-
-    Returns
-    -------
-    tuple of (float, float, int) or None
-        First and last exposure in stops and how many; None for a black reference.
+    First and last in stops and how many, over covered pixels that are not black; None for a black reference.
     """
     luminance = np.tensordot(LUMINANCE, reference[:, covered].astype(np.float64), 1)
     lit = luminance[luminance > 0]

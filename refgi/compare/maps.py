@@ -35,37 +35,16 @@ class Scale(NamedTuple):
 
 
 def luminance(rgb: Array) -> Array:
-    """Return the luminance of linear sRGB, 0.2126 R + 0.7152 G + 0.0722 B.
-
-    Parameters
-    ----------
-    rgb : (3, h, w) ndarray
-        Linear RGB.
-
-    Returns
-    -------
-    (h, w) ndarray of float64
-        In the same unit.
-    """
+    """Return the luminance of linear sRGB, (3, h, w), in its unit: 0.2126 R + 0.7152 G + 0.0722 B, float64 (h, w)."""
     weights = np.array(LUMINANCE)
     weighted: Array = np.einsum("c,chw->hw", weights, rgb.astype(np.float64))
     return weighted
 
 
 def indirect_exposure(reference: Array, covered: Array) -> float:
-    """Return the exposure at which a reference's irradiance just fits.
+    """Return the factor before the sRGB curve at which a reference's irradiance, (3, h, w), just fits.
 
-    Parameters
-    ----------
-    reference : (3, h, w) ndarray
-        Irradiance, W/m^2.
-    covered : (h, w) ndarray of bool
-        Pixels that count.
-
-    Returns
-    -------
-    float
-        Factor before the sRGB curve; 1 for a black picture.
+    1 for a black picture.
     """
     values = luminance(reference)[covered]
     values = values[np.isfinite(values)]
@@ -74,19 +53,9 @@ def indirect_exposure(reference: Array, covered: Array) -> float:
 
 
 def error_scale(errors: list[Array], covered: Array) -> Scale:
-    """Choose one symmetric scale for all error maps.
+    """Choose one symmetric scale for all maps, (h, w), of signed luminance errors.
 
-    Parameters
-    ----------
-    errors : list of (h, w) ndarray
-        Signed luminance errors.
-    covered : (h, w) ndarray of bool
-        Pixels that count.
-
-    Returns
-    -------
-    Scale
-        From -s to s; s is 1, 2 or 5 times a power of ten and holds 95 % of the pixels.
+    From -s to s; s is 1, 2 or 5 times a power of ten and holds 95 % of the covered pixels.
     """
     magnitudes = np.abs(np.concatenate([error[covered] for error in errors] or [np.zeros(1)]))
     magnitudes = magnitudes[np.isfinite(magnitudes)]
@@ -98,17 +67,7 @@ def error_scale(errors: list[Array], covered: Array) -> Scale:
 def luminance_scale(reference: Array, covered: Array) -> Scale:
     """Choose one logarithmic scale for all false-colour pictures.
 
-    Parameters
-    ----------
-    reference : (3, h, w) ndarray
-        The truth's irradiance.
-    covered : (h, w) ndarray of bool
-        Pixels that count.
-
-    Returns
-    -------
-    Scale
-        Six stops up to the 99.5th percentile of its luminance.
+    Six stops up to the 99.5th percentile of the luminance of the truth's irradiance, (3, h, w), over covered pixels.
     """
     values = luminance(reference)[covered]
     values = values[np.isfinite(values) & (values > 0)]
@@ -117,22 +76,7 @@ def luminance_scale(reference: Array, covered: Array) -> Scale:
 
 
 def paint(values: Array, covered: Array, scale: Scale) -> Pixels:
-    """Colour a map.
-
-    Parameters
-    ----------
-    values : (h, w) ndarray
-        One number a pixel.
-    covered : (h, w) ndarray of bool
-        Pixels with a surface.
-    scale : Scale
-        Range and colours.
-
-    Returns
-    -------
-    (h, w, 3) ndarray of uint8
-        Display colours.
-    """
+    """Colour a map, (h, w), by a scale: display colours (h, w, 3), uint8."""
     finite = np.isfinite(values)
     positions = _position(np.where(finite, values, scale.low), scale)
     pixels: Pixels = (_colours(scale)(positions)[..., :3] * 255 + 0.5).astype(np.uint8)
@@ -142,20 +86,7 @@ def paint(values: Array, covered: Array, scale: Scale) -> Pixels:
 
 
 def gradient(scale: Scale, stops: int = 9) -> list[str]:
-    """Return evenly spaced colours of a scale as CSS writes them, low to high.
-
-    Parameters
-    ----------
-    scale : Scale
-        The colours.
-    stops : int
-        How many.
-
-    Returns
-    -------
-    list of str
-        Such as ``#b2182b``.
-    """
+    """Return evenly spaced colours of a scale as CSS writes them, such as ``#b2182b``, low to high."""
     from matplotlib.colors import to_hex
 
     colours = _colours(scale)
@@ -163,22 +94,7 @@ def gradient(scale: Scale, stops: int = 9) -> list[str]:
 
 
 def with_legend(pixels: Pixels, scale: Scale, title: str) -> bytes:
-    """Return a PNG of a painted map beside its colour bar.
-
-    Parameters
-    ----------
-    pixels : (h, w, 3) ndarray of uint8
-        What `paint` gave.
-    scale : Scale
-        What it was painted by.
-    title : str
-        A line above.
-
-    Returns
-    -------
-    bytes
-        The file's content.
-    """
+    """Return a PNG of a map that `paint` painted by `scale`, beside its colour bar and below its title."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm, Normalize

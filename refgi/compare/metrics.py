@@ -230,79 +230,29 @@ def count_non_finite(image: Array, covered: Array | None = None) -> int:
 
 
 def relative_scale(r: Array) -> Array:
-    """Return what squared errors are divided by in relMSE, r^2 + (0.1 mean r)^2.
-
-    Parameters
-    ----------
-    r : (n,) ndarray
-        Samples of the reference.
-
-    Returns
-    -------
-    (n,) ndarray
-        All zero for a black reference.
-    """
+    """Return what squared errors are divided by in relMSE, r^2 + (0.1 mean r)^2, (n,); all 0 for a black reference."""
     scale: Array = r**2 + (RELATIVE_FLOOR * r.mean()) ** 2
     return scale
 
 
 def over_magnitude(difference: Array, x: Array, r: Array) -> Array:
-    """Return ``difference / (|x| + |r|)``, 0 where both are 0.
-
-    Parameters
-    ----------
-    difference, x, r : (n,) ndarray
-        Samples.
-
-    Returns
-    -------
-    (n,) ndarray
-        Without unit.
-    """
+    """Return ``difference / (|x| + |r|)``, (n,), 0 where both are 0."""
     magnitude = np.abs(x) + np.abs(r)
     quotient: Array = np.divide(difference, magnitude, out=np.zeros_like(magnitude), where=magnitude > 0)
     return quotient
 
 
 def decibels(peak: float, squared_error: float) -> float:
-    """Return 10 log10(peak^2 / squared error).
-
-    Parameters
-    ----------
-    peak : float
-        The largest value.
-    squared_error : float
-        Mean squared error.
-
-    Returns
-    -------
-    float
-        Infinite without error, nan without a positive peak.
-    """
+    """Return 10 log10(peak^2 / squared error): infinite without error, nan without a positive peak."""
     if peak <= 0:
         return math.nan
     return math.inf if squared_error == 0 else 10 * math.log10(peak**2 / squared_error)
 
 
 def checked_mask(image: Array, reference: Array, covered: Array | None) -> Array:
-    """Check shapes and return the pixels to compare.
+    """Return the pixels to compare, (h, w), all where `covered` is None.
 
-    Parameters
-    ----------
-    image, reference : (3, h, w) ndarray
-        Linear RGB in one unit.
-    covered : (h, w) ndarray of bool or None
-        Pixels to compare; all where None.
-
-    Returns
-    -------
-    (h, w) ndarray of bool
-        At least one is true.
-
-    Raises
-    ------
-    InputError
-        If shapes differ or no pixel is covered.
+    InputError if the pictures' shapes differ or no pixel is covered.
     """
     expect(reference.ndim == 3 and reference.shape[0] == 3, "reference", "shape (3, h, w)", reference.shape)
     expect(image.shape == reference.shape, "image", f"shape {reference.shape}", image.shape)
@@ -314,24 +264,9 @@ def checked_mask(image: Array, reference: Array, covered: Array | None) -> Array
 
 
 def samples(image: Array, reference: Array, covered: Array | None) -> tuple[Array, Array]:
-    """Return the compared pixels and channels of both pictures in a row.
+    """Return the compared pixels of both pictures, float64 (n,), channel after channel.
 
-    Parameters
-    ----------
-    image, reference : (3, h, w) ndarray
-        Linear RGB in one unit.
-    covered : (h, w) ndarray of bool or None
-        Pixels to compare; all where None.
-
-    Returns
-    -------
-    x, r : (n,) ndarray of float64
-        Channel after channel.
-
-    Raises
-    ------
-    InputError
-        If shapes differ, no pixel is covered or one is not finite.
+    InputError if shapes differ, no pixel is covered or one is not finite.
     """
     mask = checked_mask(image, reference, covered)
     for name, pixels in (("image", image), ("reference", reference)):

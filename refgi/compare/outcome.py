@@ -102,22 +102,8 @@ def noise_figures(image: Array, reference: Array, variance: Array, covered: Arra
                   mean_variance: Array | None = None) -> dict[str, float]:
     """Return what each figure would be if the picture were perfect and the reference as noisy as it is.
 
-    Parameters
-    ----------
-    image, reference : (3, h, w) ndarray
-        Linear RGB in one unit.
-    variance : (3, h, w) ndarray
-        Variance of the reference's mean, the unit squared.
-    covered : (h, w) ndarray of bool, optional
-        Pixels to compare; all where absent.
-    mean_variance : (3,) ndarray, optional
-        Variance of the mean over covered pixels of each channel; from independent pixels where absent.
-
-    Returns
-    -------
-    dict of str to float
-        By metric; `bias` is the standard error of the reference's mean. With `mean_variance` the channels count as
-        fully correlated, as they are where they share their samples.
+    `bias` is the standard error of the reference's mean. Arguments as of `measure`; with `mean_variance` the channels
+    count as fully correlated, as they are where they share their samples.
     """
     mask = checked_mask(image, reference, covered)
     expect(variance.shape == reference.shape, "variance", f"shape {reference.shape}", variance.shape)

@@ -50,21 +50,9 @@ class Axes(NamedTuple):
 
 
 def time_against_error(points: list[Point], noise: float, error_name: str = "relMSE") -> str:
-    """Draw methods by run time and error, both logarithmic.
+    """Draw methods by run time and error, both logarithmic, and the truth's noise as a dashed line where positive.
 
-    Parameters
-    ----------
-    points : list of Point
-        Those whose time or error is not a positive finite number are left out.
-    noise : float
-        What the truth's noise alone gives, drawn as a dashed line where it is positive.
-    error_name : str
-        The axis label.
-
-    Returns
-    -------
-    str
-        An ``<svg>`` element without references to anything outside; the same for equal input.
+    As `figure_svg`; points whose time or error is not a positive finite number are left out.
     """
     axes = Axes("run time, s", f"{error_name} of indirect irradiance", log_x=True, log_y=True)
     shown = [p for p in points if _drawable(p.seconds, p.error, axes)]
@@ -72,19 +60,9 @@ def time_against_error(points: list[Point], noise: float, error_name: str = "rel
 
 
 def curves_plot(curves: Sequence[Curve], axes: Axes) -> str:
-    """Draw curves with a legend beside them.
+    """Draw curves with a legend beside them, as `figure_svg`.
 
-    Parameters
-    ----------
-    curves : sequence of Curve
-        Points that are not finite, or not positive on a logarithmic axis, are left out.
-    axes : Axes
-        Labels and scales.
-
-    Returns
-    -------
-    str
-        An ``<svg>`` element without references to anything outside; the same for equal input.
+    Points that are not finite, or not positive on a logarithmic axis, are left out.
     """
     svg = _svg(lambda plot: _draw_curves(plot, curves, axes), axes, 9.2, f"{axes.y} over {axes.x}")
     return _linked(svg, dict(link for curve in curves for link in curve.links))
@@ -109,21 +87,9 @@ def style_plot(plot: Any) -> None:
 
 
 def figure_svg(draw: Callable[[Any], None], size: tuple[float, float], label: str) -> str:
-    """Draw a figure in the page's colours.
+    """Draw a figure in the page's colours: an ``<svg>`` without references to anything outside, equal for equal input.
 
-    Parameters
-    ----------
-    draw : callable
-        Called with an empty figure of Matplotlib.
-    size : tuple of 2 floats
-        Width and height, inches.
-    label : str
-        What a screen reader says.
-
-    Returns
-    -------
-    str
-        An ``<svg>`` element without references to anything outside; the same for equal input.
+    `draw` is called with an empty figure of Matplotlib; `size` in inches; a screen reader says `label`.
     """
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG

@@ -16,18 +16,7 @@ SIMD = ("sse2", "avx", "avx2", "fma", "avx512f", "avx512vl", "neon", "sve")
 
 
 def provenance_rows(record: Record) -> list[tuple[str, str]]:
-    """Return what a record says, as text by name.
-
-    Parameters
-    ----------
-    record : dict
-        What `scene_record` gave.
-
-    Returns
-    -------
-    list of (str, str)
-        Name and value, in the order in which one asks.
-    """
+    """Return what a record says, as (name, text), in the order in which one asks."""
     scene, program = record["scene"], record["refgi"]
     return [
         ("scene", "made in Python" if scene["source"] is None else text_of(scene["source"])),
@@ -52,13 +41,7 @@ def _value(value: Sequence[float] | float) -> str:
 
 
 def environment() -> dict[str, Any]:
-    """Return versions, platform, SIMD features and threads as JSON values.
-
-    Returns
-    -------
-    dict
-        With the keys versions, platform, cpu, simd and threads.
-    """
+    """Return versions, platform, cpu, simd (features of the processor) and threads as JSON values."""
     import llvmlite.binding
 
     from refgi.jit import thread_count

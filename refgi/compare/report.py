@@ -35,36 +35,12 @@ COLUMNS = {
 
 
 def write_report(comparison: Comparison, folder: Path) -> None:
-    """Write index.html, whole or not at all.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        What `compare` gave.
-    folder : Path
-        An existing folder.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    """
+    """Write index.html, whole or not at all; InputError if it cannot be written."""
     write_text(Path(folder) / "index.html", page(comparison))
 
 
 def templates(*folders: Path) -> "jinja2.Environment":
-    """Return the templates of a page: everything escaped, and nothing left out in silence.
-
-    Parameters
-    ----------
-    *folders : Path
-        Where they lie, besides those of this package, among them `base.html.j2`.
-
-    Returns
-    -------
-    jinja2.Environment
-        Its templates by file name.
-    """
+    """Return the templates of this package and of `folders` by file name: all escaped, nothing left out in silence."""
     import jinja2
 
     return jinja2.Environment(loader=jinja2.FileSystemLoader([*folders, PAGE]), autoescape=True, trim_blocks=True,
@@ -72,31 +48,14 @@ def templates(*folders: Path) -> "jinja2.Environment":
 
 
 def script() -> "Markup":
-    """Return the script of a page: its viewers and its tables.
-
-    Returns
-    -------
-    Markup
-        JavaScript that asks for nothing else.
-    """
+    """Return the script of a page, its viewers and its tables: JavaScript that asks for nothing else."""
     from markupsafe import Markup
 
     return Markup("\n".join((PAGE / f"{name}.js").read_text("utf-8") for name in SCRIPTS))
 
 
 def page(comparison: Comparison) -> str:
-    """Return the page as HTML that refers to nothing outside itself.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        What `compare` gave.
-
-    Returns
-    -------
-    str
-        The same text for equal input.
-    """
+    """Return the page as HTML that refers to nothing outside itself; the same for equal input."""
     from markupsafe import Markup
 
     return templates().get_template("report.html.j2").render(
@@ -115,20 +74,8 @@ def page(comparison: Comparison) -> str:
 
 
 def number(value: float) -> str:
-    r"""Write a figure with three significant digits.
+    r"""Write a figure with three significant digits, a dash for nan.
 
-    Parameters
-    ----------
-    value : float
-        Any number.
-
-    Returns
-    -------
-    str
-        A dash for nan.
-
-    Examples
-    --------
     >>> [ascii(number(value)) for value in (0.0123456, -1234.5, 2.5e-7)]
     ["'0.0123'", "'\\u22121230'", "'2.5e\\u22127'"]
     """
@@ -146,67 +93,26 @@ def number(value: float) -> str:
 
 
 def sort_key(value: float | None) -> str:
-    """Return what a table sorts a number by; nothing where it is not known, which stands last.
-
-    Parameters
-    ----------
-    value : float or None
-        Any number.
-
-    Returns
-    -------
-    str
-        All its digits.
-    """
+    """Return what a table sorts a number by, all its digits; nothing where it is not known, which stands last."""
     return "" if value is None or math.isnan(value) else repr(float(value)).replace("inf", "Infinity")
 
 
 def machine(environment: Mapping[str, Any]) -> str:
-    """Return what a result was made on, in a line.
-
-    Parameters
-    ----------
-    environment : mapping
-        What `refgi.compare.environment.environment` gave.
-
-    Returns
-    -------
-    str
-        Platform, processor, threads.
-    """
+    """Return what a result was made on, in a line: platform, processor, threads."""
     return f"{environment['platform']}, {environment['cpu']}, {environment['threads']} threads"
 
 
 def require_environment(environment: Mapping[str, Any]) -> None:
-    """Refuse what a result was made on where it is not all that a page needs.
-
-    Parameters
-    ----------
-    environment : mapping
-        Of a results.json.
-
-    Raises
-    ------
-    ValueError
-        If something is missing.
-    """
+    """Refuse (ValueError) what a result was made on where it is not all that a page needs."""
     missing = [key for key in ("platform", "cpu", "threads", "versions") if key not in environment]
     if missing or not isinstance(environment["versions"], dict) or "refgi" not in environment["versions"]:
         raise ValueError(f"environment: expected {', '.join(missing) or 'versions, that of refgi among them'}")
 
 
 def ledger_cells(ledger: Any) -> list[tuple[str, ...]]:
-    """Write a ledger as cells of a table.
+    """Write a ledger as cells of a table: name, R, G, B in W, percent of the first row, meaning.
 
-    Parameters
-    ----------
-    ledger : object
-        What a method's ledger function gave.
-
-    Returns
-    -------
-    list of tuple of str
-        Name, R, G, B in W, percent of the first row, meaning; the last row is what the sum is off by.
+    The last row is what the sum is off by.
     """
     whole = float(np.sum(ledger.rows[0].watts))
     rows = [(row.name.replace("_", " "), row.watts, row.meaning) for row in ledger.rows]

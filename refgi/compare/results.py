@@ -28,17 +28,7 @@ SCHEMA = 1
 def write_results(comparison: Comparison, folder: Path) -> None:
     """Write an EXR and a PNG a method and reference, maps a method, and at last results.json.
 
-    Parameters
-    ----------
-    comparison : Comparison
-        What `compare` gave.
-    folder : Path
-        An existing folder.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be written.
+    InputError if a file cannot be written.
     """
     for reference in comparison.references.values():
         _write_picture(comparison, folder, reference)
@@ -57,18 +47,7 @@ def write_results(comparison: Comparison, folder: Path) -> None:
 
 
 def file_names(methods: Sequence[str]) -> list[str]:
-    """Return the names of all files that a comparison may write.
-
-    Parameters
-    ----------
-    methods : sequence of str
-        The methods compared.
-
-    Returns
-    -------
-    list of str
-        Without folder.
-    """
+    """Return the names, without folder, of all files that a comparison of methods may write."""
     pictures = [f"{name}{suffix}" for name in (*methods, TRUTH, UNOCCLUDED) for suffix in (".exr", ".png")]
     maps_of = [name for method in methods
                for name in (_false_colour_name(method), *(_error_name(method, j) for j in (TRUTH, UNOCCLUDED)))]
@@ -76,18 +55,7 @@ def file_names(methods: Sequence[str]) -> list[str]:
 
 
 def as_json(comparison: Comparison) -> dict[str, Any]:
-    """Return everything but the pixels as JSON values.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        What `compare` gave.
-
-    Returns
-    -------
-    dict
-        The content of results.json.
-    """
+    """Return everything but the pixels as JSON values, the content of results.json."""
     scene = comparison.scene
     content: dict[str, Any] = plain({
         "schema": SCHEMA,
@@ -109,20 +77,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
 
 
 def record_of(comparison: Comparison, made: Reference | MethodResult) -> Record:
-    """Return the record of one picture of a comparison.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        What `compare` gave.
-    made : Reference or MethodResult
-        One of its pictures.
-
-    Returns
-    -------
-    dict
-        All that is needed to make it again.
-    """
+    """Return the record of one picture of a comparison: all that is needed to make it again."""
     if isinstance(made, Reference):
         return {**comparison.record, **method_record(TRUTH, made.settings), **made.estimate}
     still = {} if made.still is None else made.still.record
@@ -130,55 +85,24 @@ def record_of(comparison: Comparison, made: Reference | MethodResult) -> Record:
 
 
 def ledger_json(ledger: Any) -> dict[str, Any]:
-    """Return a ledger as values for JSON.
+    """Return a ledger as JSON values.
 
-    Parameters
-    ----------
-    ledger : object
-        What a method's ledger function gave.
-
-    Returns
-    -------
-    dict
-        The rows by name, R, G, B in W; which of them sum to the first; and what the sum is off by.
+    The rows by name, R, G, B in W; which of them sum to the first; and what the sum is off by.
     """
     return {"rows": {row.name: row.watts for row in ledger.rows},
             "parts": [row.name for row in ledger.rows if row.is_part], "difference": ledger.difference}
 
 
 def signed_error(comparison: Comparison, result: MethodResult, judge: str = TRUTH) -> Array:
-    """Return the luminance of a method's indirect irradiance less the reference's.
+    """Return the luminance of a method's indirect irradiance less that of the reference named `judge`, (h, w), W/m^2.
 
-    Parameters
-    ----------
-    comparison : Comparison
-        Holds the reference.
-    result : MethodResult
-        The method.
-    judge : str
-        Name of the reference.
-
-    Returns
-    -------
-    (h, w) ndarray
-        W/m^2; positive where the method is too bright.
+    Positive where the method is too bright.
     """
     return maps.luminance(result.irradiance) - maps.luminance(comparison.references[judge].irradiance)
 
 
 def error_scale(comparison: Comparison) -> maps.Scale:
-    """Choose the scale that all error maps of a comparison share.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        What `compare` gave.
-
-    Returns
-    -------
-    Scale
-        Symmetric about 0.
-    """
+    """Choose the scale, symmetric about 0, that all error maps of a comparison share."""
     errors = [signed_error(comparison, r, judge) for r in comparison.results.values() for judge in r.against]
     return maps.error_scale(errors, comparison.covered)
 

@@ -23,17 +23,8 @@ K1, K2 = 0.01, 0.03
 def mean_ssim(image: Array, reference: Array, covered: Array) -> float:
     """Return the mean over covered pixels and channels of the similarity of the windows around them.
 
-    Parameters
-    ----------
-    image, reference : (3, h, w) ndarray
-        Finite on the covered pixels.
-    covered : (h, w) ndarray of bool
-        Pixels that count.
-
-    Returns
-    -------
-    float
-        1 for equal pictures; nan where the reference's maximum is not positive.
+    Pictures (3, h, w) are finite where covered. 1 for equal pictures; nan where the reference's maximum is not
+    positive.
     """
     c1, c2 = _constants(reference, covered)
     if not c1 > 0:
@@ -55,21 +46,9 @@ def mean_ssim(image: Array, reference: Array, covered: Array) -> float:
 
 
 def ssim_of_noise(reference: Array, variance: Array, covered: Array) -> float:
-    """Return the similarity a perfect picture would have with a reference of this noise.
+    """Return the similarity a perfect picture would have with a reference, (3, h, w), of this variance a pixel.
 
-    Parameters
-    ----------
-    reference : (3, h, w) ndarray
-        The noisy reference.
-    variance : (3, h, w) ndarray
-        Variance of its pixels.
-    covered : (h, w) ndarray of bool
-        Pixels that count.
-
-    Returns
-    -------
-    float
-        The mean of (2 s + C2) / (2 s + n + C2): n is the window's mean noise variance, s its variance without noise.
+    The mean of (2 s + C2) / (2 s + n + C2): n is the window's mean noise variance, s its variance without noise.
     """
     c1, c2 = _constants(reference, covered)
     if not c1 > 0:

@@ -21,68 +21,34 @@ from refgi.jit import by_type
 
 
 def exp2(x: Any) -> Any:
-    """Return 2^x; 0 below the smallest normal number, infinity where that is what is left.
+    """Return 2^x; 0 below the smallest normal number, inf where that is what is left.
 
-    Parameters
-    ----------
-    x : float
-        Any number.
-
-    Returns
-    -------
-    float
-        Within 1.3 units in the last place; exact for whole x. NaN for NaN.
+    Within 1.3 ULP, exact for whole x; NaN for NaN.
     """
     return np.exp2(x)
 
 
 def log2(x: Any) -> Any:
-    """Return the logarithm to base 2.
+    """Return the logarithm to base 2 of x >= 0, subnormal numbers among them.
 
-    Parameters
-    ----------
-    x : float
-        0 or more, subnormal numbers among them.
-
-    Returns
-    -------
-    float
-        Within 0.6 units in the last place; exact for powers of 2. -infinity at 0, NaN below 0 and for NaN.
+    Within 0.6 ULP, exact for powers of 2; -inf at 0, NaN below 0 and for NaN.
     """
     return np.log2(x)
 
 
 def log2p1(x: Any) -> Any:
-    """Return log2(1 + x), with full relative accuracy near 0: what `log2` cannot know of a rounded 1 + x.
+    """Return log2(1 + x) for finite x > -1, with full relative accuracy near 0.
 
-    Parameters
-    ----------
-    x : float
-        Above -1, finite.
-
-    Returns
-    -------
-    float
-        Within 3 units in the last place. Takes a third of the time of `log2`.
+    Within 3 ULP, in a third of the time of `log2`, which cannot know what a rounded 1 + x has lost.
     """
     return np.log1p(x) / math.log(2.0)
 
 
 def pow(x: Any, y: Any) -> Any:
-    """Return x^y for x >= 0; 0 below the smallest normal number, infinity where that is what is left.
+    """Return x^y for x >= 0, subnormal numbers among them, y of the same type; 0 below the smallest normal number.
 
-    Parameters
-    ----------
-    x : float
-        Base, 0 or more, subnormal numbers among them.
-    y : float
-        Exponent, of the same type.
-
-    Returns
-    -------
-    float
-        Within 2.5 (float64: 15) units in the last place, however large y is. x^0 = 1 for every number x >= 0; NaN for
-        x < 0 and for NaN.
+    Within 2.5 ULP (float64: 15), however large y is; inf where that is what is left. 1 for y = 0 and every number x;
+    NaN for x < 0 and for NaN.
     """
     return np.power(x, y)
 

@@ -101,23 +101,10 @@ def read_exr(path: str | Path) -> tuple[Channels, dict[str, Any]]:
 
 
 def read_parts(path: Path) -> list[Part]:
-    """Read all parts of an EXR, with their planes as the file has them.
+    """Read all parts of an EXR of any program, with their planes as the file has them.
 
-    Parameters
-    ----------
-    path : Path
-        Any program's.
-
-    Returns
-    -------
-    list of Part
-        One or more.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, is not an EXR, was cut short, is deep, has channels without a value for each pixel, or
-        says that it holds more than memory does.
+    Raises InputError if the file is missing, is not an EXR, was cut short, is deep, has channels without a value for
+    each pixel, or says that it holds more than memory does.
     """
     expect(path.is_file(), "path", "a file", str(path))
     import OpenEXR

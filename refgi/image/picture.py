@@ -44,33 +44,12 @@ class Colour(NamedTuple):
 def read_colour(
     path: Path, wanted: Sequence[str] = ("",), layer: str | None = None, part: str | None = None
 ) -> Colour:
-    """Read one colour picture.
+    """Read one colour picture of an EXR, cut to the display window, in the primaries of Rec. 709.
 
-    Parameters
-    ----------
-    path : Path
-        An EXR of one or several parts.
-    wanted : sequence of str
-        Beginnings of the channels `R`, `G`, `B` in the layer; the first that is there is read.
-    layer : str, optional
-        What the channels' names begin with: "ViewLayer.Combined". Without: nothing.
-    part : str, optional
-        Name or number, from 0, of a part. Without: the one that has the channels.
-
-    Returns
-    -------
-    Colour
-        Cut to the display window, converted to the primaries of Rec. 709.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or no part, or several, have such channels; names what there is.
-
-    Warns
-    -----
-    RefgiWarning
-        If colours are converted, pixels are not square, or the file was changed after refgi wrote it.
+    `wanted`: beginnings of the channels R, G, B; the first that is there is read. `layer`: what channels' names begin
+    with ("ViewLayer.Combined"). `part`: name or number from 0; None: the one that has the channels. Raises InputError
+    if the file cannot be read, or not exactly one part has such channels. Warns of converted colours, pixels that are
+    not square and a file changed after refgi wrote it.
     """
     parts = read_parts(path)
     chosen, names = _channels(_asked(parts, part, path), wanted, layer, path, ask=part is None)
@@ -155,22 +134,9 @@ def _numbers(header: dict[str, Any], key: str, count: int, path: Path) -> tuple[
 
 
 def xyz_of(chromaticities: Sequence[float]) -> Array:
-    """Return the matrix from linear RGB to CIE XYZ, Y of white 1.
+    """Return the (3, 3) float64 matrix from linear RGB to CIE XYZ, Y of white 1, without adaptation to another white.
 
-    Parameters
-    ----------
-    chromaticities : sequence of 8 float
-        The x, y of red, green, blue and white.
-
-    Returns
-    -------
-    (3, 3) ndarray
-        Float64; no adaptation to another white.
-
-    Raises
-    ------
-    ValueError
-        If white or a primary has no place in the diagram, or primaries lie on a line.
+    `chromaticities`: x, y of red, green, blue and white. Raises ValueError where they make no triangle with a white.
     """
     pairs = np.asarray(chromaticities, np.float64).reshape(4, 2)
     places = np.column_stack([pairs, 1 - pairs.sum(axis=1)])  # x, y, z

@@ -105,13 +105,7 @@ def is_dead(name: str) -> bool:
 
 @cache
 def remove_dead(folder: Path) -> None:
-    """Remove temporary files of ended processes from a folder, when it is first written to.
-
-    Parameters
-    ----------
-    folder : Path
-        It may be missing.
-    """
+    """Remove temporary files of ended processes from a folder, which may be missing, when it is first written to."""
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
             if is_dead(entry.name):

@@ -37,18 +37,7 @@ class Specialisation(NamedTuple):
 
 
 def read_list(path: Path = LIST) -> list[Specialisation]:
-    """Return what a list holds.
-
-    Parameters
-    ----------
-    path : Path
-        The list.
-
-    Returns
-    -------
-    list of Specialisation
-        In the list's order.
-    """
+    """Return the specialisations of a list file, in its order."""
     found = []
     for line in path.read_text(encoding="utf-8").splitlines():
         call, _, needed_by = line.rpartition("  ")
@@ -58,18 +47,7 @@ def read_list(path: Path = LIST) -> list[Specialisation]:
 
 
 def missing(wanted: Iterable[Specialisation]) -> list[Specialisation]:
-    """Return those of some specialisations that are not on disk.
-
-    Parameters
-    ----------
-    wanted : iterable of Specialisation
-        What will be called.
-
-    Returns
-    -------
-    list of Specialisation
-        What calls would have to compile first.
-    """
+    """Return those specialisations that are not on disk: what calls would have to compile first."""
     return [one for one in wanted if not _is_kept(one)]
 
 
@@ -86,16 +64,9 @@ def _is_kept(one: Specialisation) -> bool:
 def compile_ahead(
     wanted: Sequence[Specialisation], progress: Progress | None = None, processes: int | None = None
 ) -> None:
-    """Compile specialisations and keep them on disk.
+    """Compile specialisations and keep them on disk; those that are there cost next to nothing.
 
-    Parameters
-    ----------
-    wanted : sequence of Specialisation
-        What to compile; those that are on disk cost next to nothing.
-    progress : callable, optional
-        Called with (what is done, share done).
-    processes : int, optional
-        How many work at a time; one a core where absent.
+    `progress` is called with (what is done, share done); without `processes`, one a core works.
     """
     groups: dict[str, list[Specialisation]] = defaultdict(list)
     for one in wanted:  # kernels of a module share callees, which each process lowers for itself
@@ -116,11 +87,5 @@ def _compile(group: Sequence[Specialisation]) -> int:
 
 
 def cores() -> int:
-    """Return how many cores this process may use.
-
-    Returns
-    -------
-    int
-        1 or more.
-    """
+    """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -62,22 +62,10 @@ def most_threads() -> int:
 
 
 def in_bands(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that does what a parallel kernel says, by calls of serial kernels.
+    """Return a function of the same parameters that does what a parallel kernel says, by calls of serial kernels.
 
-    Parameters
-    ----------
-    function : callable
-        Ends with its one loop over `prange`.
-
-    Returns
-    -------
-    callable
-        Of the same parameters: finds how many iterations there are, and launches a kernel of bands of them.
-
-    Raises
-    ------
-    TypeError
-        If there is another parallel loop, or something after it.
+    It counts the iterations and launches a kernel on bands of them. Raises TypeError unless `function` has one loop
+    over `prange` and ends with it.
     """
     tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
     ast.increment_lineno(tree, function.__code__.co_firstlineno - 1)

@@ -48,13 +48,7 @@ def cache_root() -> Path:
 
 
 class KernelCache:
-    """The specialisations of one kernel on disk, as Numba's dispatchers ask for them.
-
-    Parameters
-    ----------
-    function : callable
-        The kernel before it is compiled.
-    """
+    """The specialisations on disk of one kernel, given as a Python function, as Numba's dispatchers ask for them."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function

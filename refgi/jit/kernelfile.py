@@ -28,22 +28,9 @@ Signature: Any = UntypedSignature
 
 
 def packed(compiled: Any) -> bytes:
-    """Return the content of a specialisation's file.
+    """Return the content of a specialisation's file: format, head, codes, digest.
 
-    Parameters
-    ----------
-    compiled : CompileResult
-        What Numba made.
-
-    Returns
-    -------
-    bytes
-        Format, head, codes, digest.
-
-    Raises
-    ------
-    TypeError
-        If it needs what the format has no words for.
+    `compiled`: Numba's CompileResult. Raises TypeError if it needs what the format has no words for.
     """
     library, start = compiled.library, compiled.reload_init
     if any(function is not start_threads for function in start) or compiled.lifted or compiled.objectmode:
@@ -61,28 +48,11 @@ def packed(compiled: Any) -> bytes:
 
 
 def unpacked(content: bytes, function: Callable[..., Any], signature: Any, target: Any) -> Any:
-    """Return the specialisation that a file holds.
+    """Return the specialisation that a file's `content` holds: a CompileResult, ready to be called.
 
-    Parameters
-    ----------
-    content : bytes
-        The file's.
-    function : callable
-        The kernel before it is compiled.
-    signature : tuple of numba types
-        Of its arguments.
-    target : numba target context
-        What takes the code up.
-
-    Returns
-    -------
-    CompileResult
-        Ready to be called.
-
-    Raises
-    ------
-    ValueError
-        If the file is damaged, or not of this format; other exceptions where its words mean nothing here.
+    `function`: the kernel before it is compiled; `signature`: Numba types of its arguments; `target`: the target
+    context. Raises ValueError if the file is damaged or not of this format; other exceptions where its words mean
+    nothing here.
     """
     entry = verified(content)
     end = content.index(b"\n", len(FORMAT)) + 1

@@ -30,18 +30,7 @@ EXACT = (bool, int, float, complex, str, bytes, type(None), type(...), np.generi
 
 
 def code_key(function: Callable[..., Any]) -> str:
-    """Return the key of a kernel's code.
-
-    Parameters
-    ----------
-    function : callable
-        The Python function that is compiled.
-
-    Returns
-    -------
-    str
-        32 hexadecimal digits.
-    """
+    """Return the key of a kernel's code, 32 hexadecimal digits; `function` is the Python function that is compiled."""
     digest = hashlib.sha256(_platform().encode())
     for part in _function(function, set()):
         digest.update(part.encode() + b"\0")

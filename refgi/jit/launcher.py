@@ -42,10 +42,7 @@ _forked: list[int] = []  # processes that have lost the threads of the one they 
 def start_threads() -> None:
     """Start Numba's threads and make the record known to LLVM.
 
-    Raises
-    ------
-    InputError
-        If the threading layer that NUMBA_THREADING_LAYER asks for is not there.
+    Raises InputError if the threading layer that NUMBA_THREADING_LAYER asks for is not there.
     """
     if not _launcher.parallel_for and not _forked:
         try:
@@ -86,16 +83,8 @@ with contextlib.suppress(AttributeError):  # a platform without fork
 def emit_launch(builder: Any, worker: Any, data: Any, several: Any, workers: Any) -> None:
     """Emit the call of a worker with the record of its bands: on all threads, or by this thread alone.
 
-    Parameters
-    ----------
-    builder : IRBuilder
-        Where the code goes.
-    worker : ir.Function
-        Takes four pointers, the last of them `data`; claims bands until none is left.
-    data : ir.Value
-        Address of the bands' record.
-    several, workers : ir.Value
-        Whether there are several bands, and the number of threads.
+    `worker` takes four pointers, the last of them `data`, the record's address, and claims bands until none is left.
+    `several`: whether there are several bands; `workers`: the number of threads.
     """
     launcher = cgutils.add_global_variable(builder.module, RECORD, SYMBOL) if (
         SYMBOL not in builder.module.globals) else builder.module.globals[SYMBOL]

@@ -21,23 +21,7 @@ PLAIN: dict[str, Any] = {
 
 
 def text_of(kind: Any) -> str:
-    """Write a type as text.
-
-    Parameters
-    ----------
-    kind : numba type
-        The type.
-
-    Returns
-    -------
-    str
-        What `types_of` reads.
-
-    Raises
-    ------
-    TypeError
-        If there is no text for it.
-    """
+    """Write a Numba type as the text that `types_of` reads. Raises TypeError if there is no text for it."""
     if isinstance(kind, types.Array) and kind.aligned:
         first, last = LAYOUTS[kind.layout]
         axes = [last] if kind.ndim == 1 else [first, *[":"] * (kind.ndim - 2), last]
@@ -58,24 +42,9 @@ def text_of(kind: Any) -> str:
 
 
 def types_of(text: str, module: Callable[[str], ModuleType] = sys.modules.__getitem__) -> tuple[Any, ...]:
-    """Read types.
+    """Read Numba types from their texts, with commas between them. Raises ValueError if a text is not that of a type.
 
-    Parameters
-    ----------
-    text : str
-        Texts of types with commas between them.
-    module : callable
-        Returns the module of a name, which holds the class of a named tuple; only one that is loaded where absent.
-
-    Returns
-    -------
-    tuple of numba types
-        The types.
-
-    Raises
-    ------
-    ValueError
-        If a text is not that of a type.
+    `module` returns the module that holds the class of a named tuple, by name; by default only one that is loaded.
     """
     whole: Any = ast.parse(f"({text},)" if text else "()", mode="eval").body
     return tuple(_type(node, module) for node in whole.elts)

@@ -98,6 +98,13 @@ def texel_areas(rsm: "Rsm", texel: Array) -> Array:
     source = np.asarray(light.direction if isinstance(light, DirectionalLight) else light.position, np.float64)
     position, normal, solid_angle, flux = rsm.at(texel, "position", "normal", "solid_angle", "flux")
     lobe = None if rsm.lobe_flux is None else values_at(rsm.lobe_flux, texel)
+    return areas_of(position, normal, solid_angle, flux, lobe, source, far)
+
+
+def areas_of(
+    position: Array, normal: Array, solid_angle: Array, flux: Array, lobe: Array | None, source: Array, far: bool
+) -> Array:
+    """Return the surface behind texels (n,), m^2, of those that reflect; `far`: `source` (3,) is a direction."""
     areas = np.zeros_like(solid_angle)
     _fill_areas(position, normal, solid_angle, flux, lobe, source, far, areas)
     return areas
@@ -139,26 +146,10 @@ def with_equal_solid_angles(rsm: "Rsm") -> "Rsm":
 
 
 def demo_footprints(lights: "PixelLights", sources: "Sequence[Light]", shares: "Sequence[int]") -> Array:
-    """Return the disc that each light stands for in the authors' demo: pi L^2 / (1.5 N).
+    """Return the disc that each light of maps stands for in the authors' demo: pi L^2 / (1.5 N), (N',), m^2.
 
-    Parameters
-    ----------
-    lights : PixelLights
-        Of maps.
-    sources : sequence of Light
-        The light of each map.
-    shares : sequence of int
-        N: how many texels were drawn from each map.
-
-    Returns
-    -------
-    (N',) ndarray
-        Area, m^2: that of equal shares of a square 90 degree frustum, at normal incidence.
-
-    Raises
-    ------
-    InputError
-        If a light is directional and so has no distance L.
+    That is the area of equal shares of a square 90 degree frustum, at normal incidence. `sources` are the light of each
+    map, `shares` N: how many texels were drawn from each. `InputError` if a light is directional: it has no distance L.
     """
     area = np.zeros(lights.position.shape[1])
     for index, (source, count) in enumerate(zip(sources, shares, strict=True)):

@@ -25,17 +25,39 @@ Array = npt.NDArray[Any]
 Kind = Literal["flux", "peak", "openness"]
 
 
-@stage("lights.importance")
-def importance(
-    rsm: Rsm, kind: Kind = "flux", openness: Array | None = None, floor: float = 0.05, defensive: float = 0.0,
-    as_printed: bool = False,
-) -> Array:
-    """Return the importance of each texel for `warp_samples`.
+def importance(rsm: Rsm, *kind: Any, **options: Any) -> Array:
+    """Return the importance of each texel of a map for `warp_samples`.
 
     Parameters
     ----------
     rsm : Rsm
         The map.
+    *kind, **options : object
+        Those of `flux_importance`.
+
+    Returns
+    -------
+    (H, W) ndarray
+        W, dtype of the map.
+    """
+    return flux_importance(rsm.flux, rsm.lobe_flux, rsm.lobe_exponent, *kind, **options)
+
+
+@stage("lights.importance", each="lamp")
+def flux_importance(
+    flux: Array, lobe_flux: Array | None, lobe_exponent: Array | None, kind: Kind = "flux",
+    openness: Array | None = None, floor: float = 0.05, defensive: float = 0.0, as_printed: bool = False,
+) -> Array:
+    """Compute the importance of each texel for `warp_samples`: the largest channel of its flux (SII Sec. 3.5).
+
+    Parameters
+    ----------
+    flux : (3, H, W) ndarray
+        Flux of the diffuse part, W.
+    lobe_flux : (3, H, W) ndarray or None
+        Flux of the lobe, W.
+    lobe_exponent : (H, W) ndarray or None
+        Its exponent P.
     kind : {"flux", "peak", "openness"}
         Phi; Phi g(P); or Phi g(P) max(floor, 1 - O).
     openness : (H, W) ndarray, optional
@@ -50,7 +72,7 @@ def importance(
     Returns
     -------
     (H, W) ndarray
-        W, dtype of the map.
+        Importance of each texel, W, in the dtype of the flux.
 
     Raises
     ------
@@ -70,15 +92,15 @@ def importance(
     expect(kind in get_args(Kind), "kind", " or ".join(get_args(Kind)), kind)
     expect(0 <= floor <= 1, "floor", "0 to 1", floor)
     expect(0 <= defensive <= 1, "defensive", "0 to 1", defensive)
-    real = rsm.flux.dtype.type
-    if rsm.lobe_flux is None or rsm.lobe_exponent is None:
-        result: Array = rsm.flux.max(axis=0)
+    real = flux.dtype.type
+    if lobe_flux is None or lobe_exponent is None:
+        result: Array = flux.max(axis=0)
     else:
-        result = np.empty_like(rsm.flux[0])
+        result = np.empty_like(flux[0])
         growth, least = (0.0, 1.0) if kind == "flux" else (1.0, 0.0) if as_printed else (0.5, 0.5)
-        _add_lobes(rsm.flux, rsm.lobe_flux, rsm.lobe_exponent, real(growth), real(least), result)
+        _add_lobes(flux, lobe_flux, lobe_exponent, real(growth), real(least), result)
     if kind == "openness":
-        result = result * _hidden(rsm, openness, real(floor))
+        result = result * _hidden(openness, real(floor), result)
     if defensive:
         result = real(1 - defensive) * result + real(defensive * result.mean(dtype=np.float64))
     return result
@@ -97,14 +119,14 @@ def _add_lobes(flux: Array, lobe_flux: Array, exponent: Array, growth: Any, leas
             result[row, column] = most
 
 
-def _hidden(rsm: Rsm, openness: Array | None, floor: Any) -> Array:
+def _hidden(openness: Array | None, floor: Any, like: Array) -> Array:
     """Return max(floor, 1 - O)."""
-    if openness is None or np.shape(openness) != rsm.depth.shape:
-        expect(False, "openness", f"shape {rsm.depth.shape} for the kind 'openness'",
+    if openness is None or np.shape(openness) != like.shape:
+        expect(False, "openness", f"shape {like.shape} for the kind 'openness'",
                None if openness is None else np.shape(openness))
         raise AssertionError
     expect(bool(((openness >= 0) & (openness <= 1)).all()), "openness", "numbers from 0 to 1", "others")
-    hidden: Array = np.maximum(1 - openness, floor).astype(rsm.flux.dtype)
+    hidden: Array = np.maximum(1 - openness, floor).astype(like.dtype)
     return hidden
 
 

@@ -12,7 +12,7 @@ no light from one map to another.
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +29,9 @@ from refgi.rsm.buffers.reflective import Rsm
 from refgi.sampling import grid, halton
 from refgi.stages import stage
 
+if TYPE_CHECKING:
+    from refgi.lights.steps import MapPlanes
+
 Array = npt.NDArray[Any]
 
 
@@ -36,13 +39,19 @@ class Drawn(NamedTuple):
     """Texels of one map, drawn as pixel lights; those without flux included."""
 
     texel: Array  # (n,) row * W + column
-    weight: float | Array  # T/N, or (n,) T/N w where they are warped
+    weight: Array  # (n,) T/N, times w where they are warped
     cell: Array | None  # (H * W,) index of the drawn texel whose light carries a texel's flux; None: own flux alone
     gain: float = 1.0  # what lights of cells carry beside the flux of their cell; weights contain it
     half: Array | None = None  # (n,) bool, whether it is of the second half of the draw; None: no draw
 
 
-@stage("lights.draw")
+def _draw_steps(rsms: Sequence[Rsm], **options: Any) -> dict[str, Array]:
+    from refgi.lights.steps import draw_steps
+
+    return draw_steps(rsms, **options)
+
+
+@stage("lights.draw", steps=_draw_steps)
 def draw_texels(
     rsms: Sequence[Rsm],
     *,
@@ -100,9 +109,9 @@ def draw_texels(
     drawn = []
     for index, (rsm, (share, gain, place)) in enumerate(zip(rsms, map_shares(rsms, count, pattern, seed), strict=True)):
         if share == 0:
-            drawn.append(Drawn(np.zeros(0, np.int64), 1.0, None))
+            drawn.append(Drawn(np.zeros(0, np.int64), np.zeros(0), None))
             continue
-        weight: float | Array = rsm.texels / share * gain
+        weight = np.full(share, rsm.texels / share * gain)
         if warp is None:
             texel = _choose(rsm, share, pattern, seed, place)
         else:
@@ -117,7 +126,13 @@ def draw_texels(
     return drawn
 
 
-@stage("lights.choose")
+def _light_steps(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> dict[str, Array | None]:
+    from refgi.lights.steps import light_steps
+
+    return light_steps(rsms, drawn)
+
+
+@stage("lights.choose", steps=_light_steps)
 def lights_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> PixelLights:
     """Return drawn texels as pixel lights.
 
@@ -138,6 +153,11 @@ def lights_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> PixelLights:
     A filtered light whose own texel has no flux moves to the nearest texel of its cell that has. Where its texel has no
     lobe, what the cell's lobes reflect leaves it diffusely: flux alone is filtered, in the paper as here.
     """
+    return gathered_lights(rsms, drawn)
+
+
+def gathered_lights(rsms: "Sequence[Rsm | MapPlanes]", drawn: Sequence[Drawn]) -> PixelLights:
+    """Return drawn texels as pixel lights, those with flux: `lights_of` unobserved, or of plain arrays."""
     parts = []
     for index in _drawn_from(drawn):
         rsm, (texel, weight, cell, gain, half) = rsms[index], drawn[index]
@@ -170,7 +190,13 @@ def choose_pixel_lights(rsms: Sequence[Rsm], **options: Any) -> PixelLights:
     return lights_of(rsms, draw_texels(rsms, **options))
 
 
-@stage("lights.footprints")
+def _area_steps(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> Array:
+    from refgi.lights.steps import area_steps
+
+    return area_steps(rsms, drawn)
+
+
+@stage("lights.areas", steps=_area_steps)
 def footprints_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> Array:
     """Return the surface area that each pixel light of `lights_of` stands for.
 
@@ -191,7 +217,7 @@ def footprints_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> Array:
         rsm, (texel, weight, cell, gain, _) = rsms[index], drawn[index]  # a gain is flux of other lamps, not surface
         if cell is None:
             own = texel_areas(rsm, texel)
-            area = own * np.asarray(weight / gain).astype(own.dtype)
+            area = own * (weight / gain).astype(own.dtype)
         else:
             (area,) = cell_sums(texel_areas(rsm, np.arange(rsm.texels))[None], cell, len(texel))
         parts.append(area[area != 0])
@@ -247,15 +273,17 @@ def _warped(rsm: Rsm, points: Array, importance: Array, warp: Warp) -> tuple[Arr
     return texel_of(warped[:, 1], height) * width + texel_of(warped[:, 0], width), weight
 
 
-def _weighted_lights(rsm: Rsm, texel: Array, weight: float | Array, half: Array | None) -> PixelLights:
+def _weighted_lights(rsm: "Rsm | MapPlanes", texel: Array, weight: Array, half: Array | None) -> PixelLights:
     """Return the texels as lights with T/N, or T/N w, times their flux."""
     (flux,) = rsm.at(texel, "flux")
-    scale = np.asarray(weight).astype(flux.dtype)
+    scale = weight.astype(flux.dtype)
     lobe = None if rsm.lobe_flux is None else values_at(rsm.lobe_flux, texel) * scale
     return _lights(rsm, texel, flux * scale, lobe, half)
 
 
-def _filtered_lights(rsm: Rsm, texel: Array, cell: Array, gain: float, half: Array | None) -> PixelLights:
+def _filtered_lights(
+    rsm: "Rsm | MapPlanes", texel: Array, cell: Array, gain: float, half: Array | None
+) -> PixelLights:
     by = rsm.flux.dtype.type(gain)
     flux = cell_sums(rsm.flux, cell, len(texel)) * by
     power = rsm.flux.sum(axis=0) if rsm.lobe_flux is None else (rsm.flux + rsm.lobe_flux).sum(axis=0)
@@ -267,7 +295,7 @@ def _filtered_lights(rsm: Rsm, texel: Array, cell: Array, gain: float, half: Arr
     return _lights(rsm, texel, flux + np.where(glossy, 0, lobe), np.where(glossy, lobe, 0), half)
 
 
-def _lights(rsm: Rsm, texel: Array, flux: Array, lobe: Array | None, half: Array | None) -> PixelLights:
+def _lights(rsm: "Rsm | MapPlanes", texel: Array, flux: Array, lobe: Array | None, half: Array | None) -> PixelLights:
     """Gather the chosen texels, leaving out those without flux."""
     has_flux = flux.any(axis=0) if lobe is None else flux.any(axis=0) | lobe.any(axis=0)
     chosen = texel[has_flux]

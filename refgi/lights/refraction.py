@@ -38,21 +38,10 @@ Mode = Literal["back_face", "two_interface"]
 def refract(direction: Array, normal: Array, eta: Array) -> tuple[Array, Array]:
     """Bend rays at smooth interfaces (Snell) and return what passes (Fresnel, unpolarised).
 
-    Parameters
-    ----------
-    direction : (3, n) ndarray
-        Unit vectors of the incoming light.
-    normal : (3, n) ndarray
-        Unit normals on the side that light goes to.
-    eta : (n,) ndarray
-        Index of refraction on the near side over that on the far side.
-
-    Returns
-    -------
-    direction : (3, n) ndarray
-        Unit vectors behind the interface; the incoming ones where nothing passes.
-    transmittance : (n,) ndarray
-        Share of the flux that passes; 0 at total reflection and for light that comes from the normal's side.
+    Unit vectors of the incoming light and unit normals on the side that light goes to are (3, n), `eta` (n,) is the
+    index of refraction on the near side over that on the far side. Returns unit vectors behind the interface (3, n),
+    the incoming ones where nothing passes, and the share of the flux that passes (n,); 0 at total reflection and for
+    light that comes from the normal's side.
     """
     cos_in = (direction * normal).sum(axis=0)
     sin2 = eta**2 * (1 - cos_in**2)

@@ -23,20 +23,7 @@ Array = npt.NDArray[Any]
 
 
 def choose_lights(frame: "Frame", settings: LightSettings) -> "PixelLights":
-    """Return the pixel lights of a frame.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its buffers.
-    settings : LightSettings
-        Where lights come from, and how many.
-
-    Returns
-    -------
-    PixelLights
-        Lights with their share of the flux.
-    """
+    """Return the pixel lights of a frame, with their share of the flux."""
     source = settings.source
     if isinstance(source, PathLights):
         lights = _walked(frame, settings.count, source.bounces, settings.seed)
@@ -49,20 +36,7 @@ def choose_lights(frame: "Frame", settings: LightSettings) -> "PixelLights":
 
 
 def light_maps(frame: "Frame", settings: MapLights) -> "tuple[Rsm, ...]":
-    """Return the maps that lights are taken from: those of the frame, with what glass lets through.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its buffers.
-    settings : MapLights
-        Says how glass refracts.
-
-    Returns
-    -------
-    tuple of Rsm
-        One a light.
-    """
+    """Return the maps that lights are taken from, one a lamp: those of the frame, with what glass lets through."""
     from refgi.lights.refraction import refracted
 
     rsms = frame.rsms
@@ -77,21 +51,9 @@ def light_maps(frame: "Frame", settings: MapLights) -> "tuple[Rsm, ...]":
 
 
 def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: LightSettings) -> list[Array] | None:
-    """Return the importance of each texel for the warp (Sec. 3.5).
+    """Return the importance of each texel for the warp (Sec. 3.5), (H, W) a map; None where no pattern is warped.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene, whose triangles block what is not open.
-    rsms : sequence of Rsm
-        Reflective shadow maps, one a light.
-    settings : LightSettings
-        Says the kind of importance.
-
-    Returns
-    -------
-    list of (H, W) ndarray, or None
-        None where no pattern is warped.
+    The frame's triangles block what is not open.
     """
     from refgi.lights.importance import importance
 
@@ -147,21 +109,9 @@ def _walked(frame: "Frame", count: int, bounces: int, seed: int) -> "PixelLights
 def pixel_lights(
     rsms: "Sequence[Rsm]", settings: LightSettings, importance: "Sequence[Array] | None" = None
 ) -> "PixelLights":
-    """Choose pixel lights from maps as the settings say.
+    """Choose pixel lights from maps, one a lamp, as the settings say, with their share of the flux.
 
-    Parameters
-    ----------
-    rsms : sequence of Rsm
-        Reflective shadow maps, one a light.
-    settings : LightSettings
-        Number, pattern, seed, filtering and warp.
-    importance : sequence of (H, W) ndarray, optional
-        Importance of each texel for the warp.
-
-    Returns
-    -------
-    PixelLights
-        Lights with their share of the flux.
+    `importance`, (H, W) a map, steers the warp.
     """
     from refgi.lights.pixel_lights import lights_of
 
@@ -212,20 +162,7 @@ def footprints(frame: "Frame", settings: LightSettings, pairs: "PairSettings") -
 
 
 def light_areas(frame: "Frame", settings: LightSettings) -> Array:
-    """Return the surface area that each light of `choose_lights` stands for.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its buffers.
-    settings : LightSettings
-        The settings that the lights were chosen by; their source is maps.
-
-    Returns
-    -------
-    (N,) ndarray
-        Area, m^2, in the order of the lights.
-    """
+    """Return the surface that each light of `choose_lights` from maps stands for, (N,), m^2."""
     from refgi.lights.pixel_lights import footprints_of
 
     rsms = light_maps(frame, _map_lights(settings))

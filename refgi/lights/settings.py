@@ -141,22 +141,7 @@ class LightSettings(Settings):
 
 
 def most_lights(lights: LightSettings, maps: int, texels: int) -> int:
-    """Return how many pixel lights there may be.
-
-    Parameters
-    ----------
-    lights : LightSettings
-        Which.
-    maps : int
-        Shadow maps of all lamps.
-    texels : int
-        Of a map.
-
-    Returns
-    -------
-    int
-        At most.
-    """
+    """Return how many pixel lights there may be at most, by shadow maps of all lamps and texels of a map."""
     if isinstance(lights.source, PathLights):
         return lights.count * lights.source.bounces
     if lights.source.pattern == "all":
@@ -166,20 +151,7 @@ def most_lights(lights: LightSettings, maps: int, texels: int) -> int:
 
 
 def clamped_pairs(lights: LightSettings, pairs: PairSettings) -> PairSettings:
-    """Return pairs with the clamp that "auto" stands for.
-
-    Parameters
-    ----------
-    lights : LightSettings
-        Where lights come from.
-    pairs : PairSettings
-        The clamp.
-
-    Returns
-    -------
-    PairSettings
-        The clamp "auto" is "disc", and none where lights have no footprints.
-    """
+    """Return pairs with the clamp that "auto" stands for: "disc", and none where lights have no footprints."""
     if not isinstance(pairs.clamp, AutoClamp):
         return pairs
     return dataclasses.replace(pairs, clamp=DiscClamp() if lights.has_footprints else None)
@@ -191,20 +163,7 @@ def with_clamp(settings: S) -> S:
 
 
 def expect_footprints(lights: LightSettings, pairs: PairSettings) -> None:
-    """Check that lights have the footprints that a clamp needs.
-
-    Parameters
-    ----------
-    lights : LightSettings
-        Where lights come from.
-    pairs : PairSettings
-        The clamp.
-
-    Raises
-    ------
-    InputError
-        If they have none.
-    """
+    """Raise `InputError` unless lights have the footprints that a clamp needs."""
     if pairs.needs_footprints:
         expect(isinstance(lights.source, MapLights), "pairs.clamp", "one without footprints with the source 'walk'",
                pairs.clamp and pairs.clamp.name())

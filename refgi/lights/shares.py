@@ -53,7 +53,7 @@ def map_flux(rsm: "Rsm") -> float:
     float
         W, from a grid of texels, 128 x 128 of each face; of all texels where those have none.
     """
-    texel = texel_grid(rsm, SIDE)
+    texel = texel_grid(rsm.covered, SIDE)
     found = _flux_at(rsm, texel) * (rsm.texels / len(texel))
     return found if found > 0 else _flux_at(rsm, np.arange(rsm.texels))
 
@@ -110,22 +110,9 @@ def map_shares(rsms: "Sequence[Rsm]", count: int | None, pattern: Pattern, seed:
 def lamp_shares(count: int, flux: Array, seed: int = 0) -> tuple[list[int], list[float]]:
     """Return the number of lights of each lamp, which sum to the count, and what they carry beside their share.
 
-    Parameters
-    ----------
-    count : int
-        Of lights.
-    flux : (n,) ndarray
-        Of the lamps, W; lamps without any share the count equally where none has any.
-    seed : int
-        Which lamps are drawn where there are fewer lights than lamps with flux.
+    `flux` (n,) is the lamps', W; lamps without any share the count equally where none has any. `seed`: which lamps are
+    drawn where there are fewer lights than lamps with flux.
 
-    Returns
-    -------
-    list of int and list of float
-        One a lamp.
-
-    Examples
-    --------
     >>> lamp_shares(8, np.array([3.0, 0.0, 1.0]))[0]
     [6, 0, 2]
     """
@@ -157,11 +144,6 @@ def _systematic(quota: Array, start: float) -> Array:
     ends = np.cumsum(quota)
     ends[-1] = round(ends[-1])
     return np.asarray(np.diff(np.ceil(np.concatenate([[0.0], ends]) - start).astype(np.int64)))
-
-
-def equal_shares(count: int, parts: int) -> list[int]:
-    """Return `parts` shares of `count` things, the first ones one more where it does not divide."""
-    return [count // parts + (index < count % parts) for index in range(parts)]
 
 
 def _nearest_grid(share: int, maps: int) -> int:

@@ -39,13 +39,13 @@ class Warp:
                self.levels)
 
 
-@stage("lights.warp")
+@stage("lights.warp", each="lamp")
 def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tuple[Array, Array]:
-    """Warp points of the unit square over several maps that are stacked along rows.
+    """Warp points of the unit square over several maps that are stacked along rows (SII Sec. 3.5, Eq. 5 and 6).
 
     Parameters
     ----------
-    points : (n, 2) array_like
+    points : (point, uv) array_like
         Points (u, v) in [0, 1).
     importance : (k h, w) ndarray
         Importance of each texel, >= 0.
@@ -56,10 +56,10 @@ def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tup
 
     Returns
     -------
-    points : (n, 2) ndarray of float64
+    warped : (point, uv) ndarray of float64
         Warped points in [0, 1) over the stacked maps.
-    weights : (n,) ndarray of float64
-        1 / density.
+    density_weight : (point,) ndarray of float64
+        Weight w of each point, 1 / density over the unit square.
 
     Notes
     -----

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from refgi.literal.colours import tint
+
 NEAREST = 1e-9  # share of a triangle's size: a hit that is nearer to the eye is rounding
 
 
@@ -86,12 +88,12 @@ def owns_border(edge: Any) -> Any:
 
 def surface(
     triangle_id: Any, vertices: Any, faces: Any, material_of_face: Any, diffuse: Any, origin: Any, frame: Any,
-    half: Any, rows: int, columns: int, parallel: bool, vertex_normals: Any = None,
+    half: Any, rows: int, columns: int, parallel: bool, vertex_normals: Any = None, colours: Any = None,
 ) -> Any:
     """Return depth (H, W), m, and position, m, unit normal and albedo (3, H, W) of what every texel sees.
 
     Without a surface depth is infinite and all else 0. Depth is along the view's axis, normals are on the side that is
-    seen: of the triangle, or interpolated where vertices have their own.
+    seen: of the triangle, or interpolated where vertices have their own. `colours` (m, 3, 3) multiply the albedo.
     """
     seen = triangle_id >= 0
     face = np.where(seen, triangle_id, 0)
@@ -108,6 +110,8 @@ def surface(
         share = barycentric(corner, flat, position)
         normal = interpolated(share, np.moveaxis(vertex_normals[faces[face]], (2, 3), (0, 1)), flat)
     albedo = np.moveaxis(diffuse[material_of_face[face]], -1, 0)
+    if colours is not None:
+        albedo = albedo * tint(triangle_id, position, vertices, faces, colours)
     return (np.where(seen, depth, np.inf), np.where(seen, position, 0), np.where(seen, normal, 0),
             np.where(seen, albedo, 0))
 

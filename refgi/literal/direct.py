@@ -56,11 +56,12 @@ def lamp_irradiance(
 
 def shadow_map(
     position: Any, normal: Any, triangle_id: Any, origin: Any, frame: Any, half: Any, depth: Any, map_position: Any,
-    rows: int, columns: int, parallel: bool,
+    rows: int, columns: int, parallel: bool, place: Any = None, direction: Any = None, interpolated: bool = False,
 ) -> Any:
     """Return where a lamp arrives (h, w): the point at the nearest texel does not lie above the receiver's plane.
 
     `normal` is that of the receiver's face. `depth` (H, W), m, and `map_position` (3, H, W), m, are what the lamp sees.
+    Faces turned away from the lamp, at a place (3,) or against its direction, are dark where normals are interpolated.
     """
     row, column, away = map_texels(position, origin, frame, half, rows, columns, parallel)
     on_map = row >= 0
@@ -68,7 +69,14 @@ def shadow_map(
     above = (normal * (map_position[:, row, column] - position)).sum(axis=0)
     bias = plane_bias(position, normal, origin, frame, half, row // rows, rows, columns, parallel)
     visible = (away <= stored) | (above <= bias + 1e-6 * away)
+    if interpolated:
+        visible &= (normal * to_lamp(position, place, direction)).sum(axis=0) > 0
     return (triangle_id >= 0) & on_map & visible
+
+
+def to_lamp(x: Any, place: Any, direction: Any) -> Any:
+    """Return vectors (3, h, w) from points to a lamp at a place (3,), m, or against its direction."""
+    return -direction.reshape(3, 1, 1) + 0 * x if place is None else place.reshape(3, 1, 1) - x
 
 
 def map_texels(position: Any, origin: Any, frame: Any, half: Any, rows: int, columns: int, parallel: bool) -> Any:
@@ -124,3 +132,17 @@ def shadow_rays(
         t = ((c - a) * along).sum(axis=0) / volume
         blocked |= (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < reach)
     return (triangle_id >= 0) & faced & ~blocked
+
+
+def leaving_radiance(irradiance: Any, extra: Any = None, *, albedo: Any, emission: Any = None) -> Any:
+    """Return what the camera receives of diffuse surfaces, L (3, h, w), W/m^2/sr: L_e + albedo/pi (E + extra)."""
+    arriving = irradiance + (0 if extra is None else extra)
+    # L = albedo/pi E
+    reflected = albedo / np.pi * arriving
+    return reflected + (0 if emission is None else emission)
+
+
+def emission(triangle_id: Any, material_of_face: Any, emission: Any) -> Any:
+    """Return what each pixel's surface emits (3, h, w), W/m^2/sr, of the radiance (m, 3) of materials."""
+    own = np.moveaxis(emission[material_of_face[triangle_id]], -1, 0)
+    return np.where(triangle_id >= 0, own, 0)

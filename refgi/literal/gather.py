@@ -103,15 +103,17 @@ def all_maps(irradiance: Any) -> Any:
 
 
 def interpolate(
-    position: Any, normal: Any, triangle_id: Any, irradiance: Any, grid: int, least_cosine: float, reach: float
+    position: Any, normal: Any, triangle_id: Any, irradiance: Any, visible: Any, grid: int, least_cosine: float,
+    reach: float,
 ) -> Any:
     """Return where light is interpolated between coarse pixels, (h, w), and the light, (3, h, w): else the pixel's sum.
 
     Coarse pixels are the middles of grid x grid cells; three of the four around a pixel must be similar: the cosine
-    of the normals at least `least_cosine`, the distance at most `reach` diagonals of what is seen.
+    of the normals at least `least_cosine`, the distance at most `reach` diagonals of `visible`: the least and largest
+    coordinates of what is seen.
     """
     covered = triangle_id >= 0
-    limit = reach * np.sqrt((np.ptp(position[:, covered], axis=1) ** 2).sum())
+    limit = reach * np.sqrt(((visible[1] - visible[0]) ** 2).sum())
     rows, columns = middles(covered.shape[0], grid), middles(covered.shape[1], grid)
     similar, weights, mean = np.zeros(covered.shape, int), np.zeros(covered.shape), np.zeros_like(irradiance)
     for row, wy in around(rows, covered.shape[0]):

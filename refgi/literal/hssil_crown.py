@@ -120,6 +120,21 @@ def gather(position: Any, normal: Any, radiance: Any, area: Any, offsets: Any, w
     return (form * light).sum(axis=-1)
 
 
+def gather_shared(
+    position: Any, normal: Any, sender_position: Any, sender_normal: Any, radiance: Any, area: Any, offsets: Any,
+    weight: Any, share: float,
+) -> Any:
+    """Return E (3, h, w) of texels by samples of the same texels as senders, whose discs cover a share of their texels.
+
+    Senders may stand elsewhere than the receivers of their texels.
+    """
+    i, j, texels = samples_at(area.shape, offsets, weight)
+    y, m = sender_position[:, i, j], sender_normal[:, i, j]
+    form = shared_disc_form_factor(position[..., None], normal[..., None], y, m, area[i, j], texels, share)
+    # Eq. (1)
+    return (form * radiance[:, i, j]).sum(axis=-1)
+
+
 def samples_at(shape: tuple[int, int], offsets: Any, weight: Any) -> tuple[Any, Any, Any]:
     """Return row, column and number of texels (h, w, n) of the samples of each texel, by its place in its tile.
 

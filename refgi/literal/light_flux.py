@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from refgi.literal.buffers import rays, surface, texels, unit
+from refgi.literal.colours import tint
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)
 
@@ -20,13 +21,13 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)
 def reflected_flux(
     triangle_id: Any, vertices: Any, faces: Any, material_of_face: Any, diffuse: Any, specular: Any, exponent: Any,
     origin: Any, frame: Any, half: Any, strength: Any, rows: int, columns: int, parallel: bool,
-    half_angles: Any = None, falloff: str = "smoothstep", vertex_normals: Any = None,
+    half_angles: Any = None, falloff: str = "smoothstep", vertex_normals: Any = None, colours: Any = None,
 ) -> Any:
     """Return solid angle, sr, flux (3, H, W), W, and the lobe's flux, W, axis (3, H, W) and exponent of each texel.
 
     `strength` (3,): intensity, W/sr; of a directional light (parallel rays) irradiance, W/m^2, and areas, m^2, stand
     for solid angles. `half_angles` (2,): inner and outer, rad, of a spot. Lobes are 0, axis and exponent as well, where
-    the surface has none and where no light arrives.
+    the surface has none and where no light arrives. Vertex `colours` (m, 3, 3) multiply the diffuse flux.
     """
     x0, x1, y0, y1 = texel_sides(half, len(origin), rows, columns)
     angle = (x1 - x0) * (y1 - y0) if parallel else solid_angle(x0, x1, y0, y1)
@@ -36,12 +37,14 @@ def reflected_flux(
         through = spot_integral(x0, x1, y0, y1, inner, outer, falloff)
     seen = triangle_id >= 0
     _, d = rays(origin, frame, half, rows, columns, parallel)
-    _, _, n, _ = surface(triangle_id, vertices, faces, material_of_face, diffuse, origin, frame, half, rows, columns,
-                         parallel, vertex_normals)
+    _, point, n, _ = surface(triangle_id, vertices, faces, material_of_face, diffuse, origin, frame, half, rows,
+                             columns, parallel, vertex_normals)
     w = unit(d)
     arriving = strength.reshape(3, 1, 1) * np.where(seen, through, 0)
     material = material_of_face[triangle_id]
     flux = np.moveaxis(diffuse[material], -1, 0) * arriving
+    if colours is not None:
+        flux = flux * tint(triangle_id, point, vertices, faces, colours)
     lobe_flux = np.moveaxis(specular[material], -1, 0) * arriving
     glossy = (lobe_flux > 0).any(axis=0)
     axis = w - 2 * (n * w).sum(axis=0) * n

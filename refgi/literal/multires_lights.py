@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from refgi.literal.pairs import irradiance, pair
+from refgi.literal.vpl import facing, shadowed_sum, visible
 
 # subsplats of all lights: where they are evaluated, their light
 
@@ -48,6 +49,47 @@ def subsplat_irradiance(
     return total[:, 0]
 
 
+# the same under shadow rays: faces, what each subsplat sees, the sum of that
+
+
+def subsplat_facing(vertices: Any, faces: Any, point_normal: Any, triangle_id: Any, pixel: Any) -> Any:
+    """Return the normals (3, n) of the faces that subsplats lie on, on the side of theirs."""
+    return facing(vertices, faces, point_normal, triangle_id.ravel()[pixel])
+
+
+def lights_seen(
+    vertices: Any, faces: Any, point: Any, point_normal: Any, triangle_id: Any, pixel: Any, face_normal: Any,
+    light_position: Any, light_normal: Any,
+) -> Any:
+    """Return V (N, n): which lights reach which subsplats."""
+    own = triangle_id.ravel()[pixel]
+    return visible(vertices, faces, point, point_normal, own, face_normal, light_position, light_normal)
+
+
+def seen_irradiance(
+    point: Any, point_normal: Any, seen: Any, light_position: Any, light_normal: Any, flux: Any, lobe_flux: Any = None,
+    lobe_axis: Any = None, lobe_exponent: Any = None,
+) -> Any:
+    """Return E (3, n) of the lights that each subsplat sees (N, n), without albedo/pi (Eq. 2 with V)."""
+    x, n, surface = point[:, None], point_normal[:, None], np.zeros((1, point.shape[1]), np.int32)
+    lights = light_position, light_normal, flux, lobe_flux, lobe_axis, lobe_exponent
+    return shadowed_sum(x, n, surface, seen[:, None], *lights)[:, 0]
+
+
+# the same under soft shadows: those of pictures, on a picture of one row
+
+
+def one_row(position: Any, normal: Any, triangle_id: Any, pixel: Any) -> tuple[Any, Any, Any]:
+    """Return position and normal (3, 1, n) and triangle (1, n) of the pixels of subsplats, a picture of one row."""
+    point, up = points(position, normal, triangle_id, None, None, None, pixel, mean=False)
+    return point[:, None], up[:, None], triangle_id.ravel()[None, pixel]
+
+
+def of_row(irradiance: Any) -> Any:
+    """Return E (3, n) of a picture of one row."""
+    return irradiance[:, 0]
+
+
 # lists of each light: samples at quadrants decide
 
 
@@ -72,13 +114,20 @@ def samples(
     return made
 
 
-def splits(pixels: Any, sampled: Any, finest: int, threshold: float, relative: bool) -> list[Any]:
+def splits(
+    pixels: Any, sampled: Any, finest: int, threshold: float, form: str, start: Any = None
+) -> list[Any]:
     """Return which cells of levels 1 to top each light's list splits, (N, h_l, w_l) bool (AMS Sec. 3.3.1).
 
-    E-AMS-07: T is a share of the largest sample that the light has taken so far, or W/m^2 if not relative. False where
-    the list does not come to a cell.
+    E-AMS-07: T is "relative", a share of the largest sample that the light has taken so far; "absolute", W/m^2; or of
+    the "brightest", a share of the largest sum of all lights at the coarsest cells, over their number. `start`: level,
+    row and column of a list whose coarser cells are split in any case (Sec. 6). False where the list does not come to
+    a cell.
     """
     top, shown = len(sampled) - 1, [pixel >= 0 for pixel in pixels]
+    relative, refined = form == "relative", refined_by(start, shown)
+    if form == "brightest":
+        threshold = threshold * sampled[top].sum(axis=0).max() / len(sampled[top])
     split = [np.zeros((len(sample), *sample.shape[2:]), bool) for sample in sampled]
     visited = split[top] | shown[top]
     largest = largest_sample(sampled[top], visited)
@@ -90,9 +139,18 @@ def splits(pixels: Any, sampled: Any, finest: int, threshold: float, relative: b
         most = quadrants(np.where(known, children, -np.inf), -np.inf).max(axis=0)
         least = quadrants(np.where(known, children, np.inf), np.inf).min(axis=0)
         differ = (most - least > limit).any(axis=1)
-        split[level] = visited & differ
+        split[level] = visited & (differ | refined[level])
         visited = doubled(split[level], known.shape) & known
     return split[1:]
+
+
+def refined_by(start: Any, planes: Any) -> list[Any]:
+    """Return which cells (h_l, w_l) a list of subsplats (level, row, column) refines: all that are coarser than one."""
+    refined = [np.zeros_like(plane) for plane in planes]
+    for level, row, column in zip(*start, strict=True) if start is not None else ():
+        for coarser in range(level + 1, len(planes)):
+            refined[coarser][row >> (coarser - level), column >> (coarser - level)] = True
+    return refined
 
 
 def largest_sample(sample: Any, visited: Any) -> Any:

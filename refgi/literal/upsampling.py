@@ -58,8 +58,9 @@ def upsample(
     weight = spread * close * alike
     light, total = coarse[:, i, j], weight.sum(axis=-1)
     mean = (weight * light).sum(axis=-1) / np.where(total > LEAST_WEIGHT, total, 1)
-    best = np.where(there, np.abs(delta), np.inf).argmin(axis=-1)[None, ..., None]
-    in_depth = np.take_along_axis(light * there, best, -1)[..., 0]
+    # of texels as near in depth the closest: by rows, then by columns
+    order = np.broadcast_arrays(np.abs(dx - tx), np.abs(dy - ty), np.where(there, np.abs(delta), np.inf))
+    in_depth = np.take_along_axis(light * there, np.lexsort(order, axis=-1)[None, ..., :1], -1)[..., 0]
     return np.where(seen[..., 0], np.where(total > LEAST_WEIGHT, mean, in_depth), 0)
 
 

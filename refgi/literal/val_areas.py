@@ -17,23 +17,24 @@ NO_SPREAD = 1e-9  # of the whole: as little more spread along one axis than anot
 RUNS = 3  # of lights next to each other that a pixel takes where they are dealt out by cluster
 
 
-def extents(position: Any, triangle_id: Any, map_positions: Any, map_fluxes: Any, map_lobe_fluxes: Any = None) -> Any:
-    """Return the boxes (2, 3), m, of what pixels see and of what reflects light in any light's map.
+def visible_extent(position: Any, triangle_id: Any) -> Any:
+    """Return the box of what pixels see, m: position (3, h, w), triangle_id (h, w), -1 without surface."""
+    seen = position[:, triangle_id >= 0]
+    return box(seen)
 
-    Position (3, h, w), triangle_id (h, w), -1 without surface; a list of (3, h, w) of all maps each.
-    """
+
+def illuminated_extent(map_positions: Any, map_fluxes: Any, map_lobe_fluxes: Any = None) -> Any:
+    """Return the box, m, of what reflects light in any light's map: a list of (3, h, w) of all maps each."""
     lobes = map_fluxes if map_lobe_fluxes is None else map_lobe_fluxes
     lit = [flux.any(axis=0) | lobe.any(axis=0) for flux, lobe in zip(map_fluxes, lobes, strict=True)]
     reflecting = [place[:, here] for place, here in zip(map_positions, lit, strict=True)]
-    seen = position[:, triangle_id >= 0]
-    visible, illuminated = box(seen), box(np.concatenate(reflecting, axis=1))
-    return visible, illuminated
+    return box(np.concatenate(reflecting, axis=1))
 
 
 def box(points: Any) -> Any:
-    """Return least and greatest of each coordinate, (2, 3), of points (3, n)."""
+    """Return least and greatest of each coordinate, (3,), of points (3, n)."""
     least, greatest = points.min(axis=1), points.max(axis=1)
-    return np.stack([least, greatest])
+    return least, greatest
 
 
 def kmeans_start(position: Any, normal: Any, count: int) -> Any:
@@ -85,7 +86,7 @@ def kmeans_means(position: Any, normal: Any, of: Any, center: Any, axis: Any) ->
     return center, axis
 
 
-def kmeans(
+def kmeans_rounds(
     position: Any, normal: Any, illuminated: Any, center: Any, axis: Any, distance: str, w_x: float, w_a: float,
     rounds: int,
 ) -> Any:
@@ -107,12 +108,15 @@ def kmeans_each(position: Any, normal: Any) -> Any:
     return position, normal / length, of
 
 
-def areas(position: Any, center: Any, normal: Any, of: Any, axes: str, extent: str, unbiased: bool) -> Any:
+def areas(
+    position: Any, center: Any, normal: Any, of: Any, axes: str, extent: str, unbiased: bool, footprint: Any = None,
+) -> Any:
     """Return the rectangle around each cluster's lights, projected along its normal (Sec. 6, E-VAL-10).
 
     Frames of maps (M, 3, 3); axes of rectangles (M, 2, 3), the map's ("fixed"), along the lights' spread ("pca") or of
     least area ("min_area"); sides, and middles from the centres (2, M), m; Delta (M,), m, the "root" of both sides'
     product, the "longer" or the "shorter"; distances of the farthest lights (M,), m; numbers of lights (M,).
+    A cluster of one light is a point, or a square of its footprint (N,), m^2.
     """
     frame, count = map_frames(normal), center.shape[1]
     along, members = frame[:, :2].copy(), np.bincount(of, minlength=count)
@@ -130,6 +134,9 @@ def areas(position: Any, center: Any, normal: Any, of: Any, axes: str, extent: s
     side = np.where(side < FLAT * radius, 0, side)
     if unbiased:  # E-VAL-10: n lights span (n - 1) / (n + 1) of a side on average
         side = side * ((members + 1) / np.maximum(members - 1, 1)).astype(side.dtype)
+    if footprint is not None:
+        single = members[of] == 1
+        side[:, of[single]] = np.sqrt(footprint[single])
     sizes = {"root": np.sqrt(side[0] * side[1]), "longer": side.max(axis=0), "shorter": side.min(axis=0)}
     delta = sizes[extent]
     return frame, along, side, offset, delta, radius, members
@@ -180,6 +187,19 @@ def facing(normal: Any, triangle_id: Any, vertices: Any = None, faces: Any = Non
     own = np.moveaxis(flat[triangle_id], 2, 0)
     turned = np.where((own * normal).sum(axis=0) < 0, -own, own)
     return np.where(triangle_id >= 0, turned, 0)
+
+
+def sampled_pixels(position: Any, normal: Any, triangle_id: Any, shifts: Any) -> Any:
+    """Return position, normal (3, 1, n) and triangle (1, n) of pixels, one of each of n equal parts of the surface.
+
+    Pixels without surface, triangle_id < 0, do not count; shifts (n,) are places within the parts, in rows.
+    """
+    surface, n = np.flatnonzero(triangle_id >= 0), len(shifts)
+    part = len(surface) / n
+    place = np.floor((np.arange(n) + shifts) * part).astype(int)
+    at = surface[np.minimum(place, len(surface) - 1)]
+    x, up = position.reshape(3, -1), normal.reshape(3, -1)
+    return x[:, None, at], up[:, None, at], triangle_id.reshape(-1)[None, at]
 
 
 def interleaving(of: Any, side: int, assignment: str) -> Any:

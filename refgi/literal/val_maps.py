@@ -21,7 +21,7 @@ def map_views(visible: Any, illuminated: Any, center: Any, normal: Any, radius: 
     """Return where maps look from (K, 3), within what no surface blocks, and the farthest there can be (K,), m.
 
     A centre is lifted off its surface; what is nearer than a share of the cluster's radius is ignored, as the centre
-    may lie inside of it (Sec. 5.1, E-VAL-12). Boxes (2, 3); center, normal (3, K).
+    may lie inside of it (Sec. 5.1, E-VAL-12). Boxes: least, greatest; center, normal (3, K).
     """
     largest = np.abs(illuminated).max()
     place = (center + LIFT * largest * normal).T
@@ -31,14 +31,19 @@ def map_views(visible: Any, illuminated: Any, center: Any, normal: Any, radius: 
     return place, ball, np.sqrt((corner**2).sum(axis=1))
 
 
-def blockers(
-    vertices: Any, faces: Any, triangle_id: Any, light_position: Any, visible: Any, illuminated: Any, touching: bool,
+def seen_vertices(vertices: Any, faces: Any, triangle_id: Any) -> Any:
+    """Return the vertices (n, 3), m, of the triangles that pixels see (h, w), -1 without surface."""
+    face = triangle_id[triangle_id >= 0]
+    return vertices[np.unique(faces[face])]
+
+
+def occluders(
+    vertices: Any, faces: Any, seen: Any, light_position: Any, visible: Any, illuminated: Any, touching: bool,
 ) -> Any:
     """Return which triangles (F,) may lie between pixel lights and what is seen: those with both on either side.
 
     Light ends at lights and within the triangles that are seen. `touching`: planes that all of it lies on count too.
     """
-    seen = vertices[faces[triangle_id[triangle_id >= 0]]].reshape(-1, 3)
     ends = np.concatenate([seen, light_position.T])
     side = np.maximum(visible[1], illuminated[1]) - np.minimum(visible[0], illuminated[0])
     tolerance = TOLERANCE * np.sqrt((side**2).sum())
@@ -89,12 +94,9 @@ def depth_maps(
     return distance
 
 
-def depth_maps_behind(
-    vertices: Any, faces: Any, blocks: Any, center: Any, frame: Any, ball: Any, members: Any, texels: int,
-) -> Any:
-    """Return maps of the hemispheres behind area lights: right and forward are turned round (E-VAL-12)."""
-    turned = frame * np.array([[-1], [1], [-1]], frame.dtype)
-    return depth_maps(vertices, faces, blocks, center, turned, ball, members, texels)
+def frames_behind(frame: Any) -> Any:
+    """Return frames (K, 3, 3) of maps of the hemispheres behind: right and forward are turned round (E-VAL-12)."""
+    return frame * np.array([[-1], [1], [-1]], frame.dtype)
 
 
 def map_ranges(depth: Any) -> Any:

@@ -64,18 +64,7 @@ def glossy_radiance(
 
 
 def as_receivers(points: GlossyPoints) -> Receivers:
-    """Return glossy points as a picture of one row.
-
-    Parameters
-    ----------
-    points : GlossyPoints
-        n receivers.
-
-    Returns
-    -------
-    Receivers
-        (3, 1, n) and (1, n).
-    """
+    """Return n glossy points as a picture of one row, (3, 1, n) and (1, n)."""
     return Receivers(points.position[:, None], points.normal[:, None], np.ones((1, len(points.pixel)), np.bool_))
 
 
@@ -83,26 +72,11 @@ def summed(
     points: GlossyPoints, packed: Packed, ranges: tuple[Range | None, Range | None], width: int = 0,
     lists: Listing | None = None,
 ) -> Array:
-    """Sum packed lights at glossy receivers.
+    """Sum packed lights, in the dtype of the receivers, at n glossy receivers: (3, n), W/m^2/sr.
 
-    Parameters
-    ----------
-    points : GlossyPoints
-        The n receivers.
-    packed : Packed
-        The lights, in the dtype of the receivers.
-    ranges : tuple of 2 Range or None
-        Of the diffuse lights and of the lobes: which pairs count; None: all.
-    width : int
-        As for `glossy_radiance`.
-    lists : callable, optional
-        Returns which diffuse lights and which lobes may count for which tile of LANES receivers, of positions and
-        normals (3, m); None: any.
-
-    Returns
-    -------
-    (3, n) ndarray
-        W/m^2/sr.
+    `ranges` of the diffuse lights and of the lobes say which pairs count, None: all. `width` as for `glossy_radiance`.
+    `lists` returns which diffuse lights and which lobes may count for which tile of LANES receivers, of positions and
+    normals (3, m); None: any.
     """
     order = np.arange(len(points.pixel)) if width == 0 else block_order(points.pixel, width)
     tally("pairs", lambda: len(order) * packed.terms)
@@ -137,19 +111,9 @@ def _add_lights(
 
 
 def block_order(pixel: Array, width: int) -> Array:
-    """Return the order of pixels by blocks of 16 x 16, within these 8 x 8 after 8 x 8, then 4 x 4.
+    """Return the order of flat indices (n,) into a picture by blocks of 16 x 16, within these 8 x 8, then 4 x 4.
 
-    Parameters
-    ----------
-    pixel : (n,) ndarray of int
-        Flat indices into a picture.
-    width : int
-        Of the picture.
-
-    Returns
-    -------
-    (n,) ndarray of int
-        Tiles of receivers that follow each other in it are compact.
+    Tiles of receivers that follow each other in it are compact.
     """
     row, column = np.divmod(pixel, width)
     key = row // 16 * (width // 16 + 1) + column // 16

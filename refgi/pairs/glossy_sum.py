@@ -64,34 +64,15 @@ def add_diffuse_lights(
 ) -> None:
     """Add norm sum (Phi / pi) g <m . w>^P over diffuse lights to every receiver: radiance over its reflectance.
 
-    Parameters
-    ----------
-    position, normal : (3, n) ndarray
-        Receivers, world space; m and unit vectors.
-    of : ReceiverLobes
-        Their lobes.
-    lights : (9, N + 1) ndarray
-        Packed lights, the last one black.
-    clamp : Clamp or None
-        How near pairs are kept finite; None sums the plain term.
-    spheres : (N,) ndarray or None
-        Squared radii of lights that are virtual spherical lights, m^2; their lobe is that of the centre, and planes
-        cull none.
-    reach : Range or None
-        Which pairs count, and how much (procedure P3); None: all.
-    listed : (ceil(n / LANES), N) ndarray of bool or None
-        Lights that may count for each tile; the others must not count for any of its receivers. None: all may.
-    culls : Culls
-        What to pass over; planes where there are no lists.
-    radiance : (3, n) ndarray
-        Added to, W/m^2/sr.
-
-    Notes
-    -----
-    In float32, with U = 2^-24, p = <m . w>^P and L = -P log2(1 - h), a term t = (Phi / pi) g p is off by at most
-    U (t (20 + 5 L + 6.5 P (sqrt(2 h) + h) / (1 - h)) + 4 (Phi / pi) p (c_l + c_x) / r^2), with unit cosines: roundings
-    of w reach h, those of the cosines are absolute. A sum is off by at most 70 U of L_s more. Less than 2^-126 of the
-    peak is 0.
+    Position (m) and normal are (3, n), world space, `radiance` (3, n), W/m^2/sr; `lights` (9, N + 1) are packed, the
+    last one black. `spheres` (N,): squared radii of virtual spherical lights, m^2; their lobe is that of the centre,
+    and planes cull none. `reach`: which pairs count, and how much (procedure P3); None: all. `listed` (ceil(n / LANES),
+    N) bool: lights that may count for each tile (the others must not count for any of its receivers), None: all; planes
+    cull where there are no lists.
+    In float32, with U = 2^-24, p = <m . w>^P and L = -P log2(1 - h), a term t = (Phi / pi) g p is off by at most U (t
+    (20 + 5 L + 6.5 P (sqrt(2 h) + h) / (1 - h)) + 4 (Phi / pi) p (c_l + c_x) / r^2), with unit cosines: roundings of w
+    reach h, those of the cosines are absolute. A sum is off by at most 70 U of L_s more. Less than 2^-126 of the peak
+    is 0.
     """
     count, black = position.shape[1], lights.shape[1] - 1
     for block in prange((count + LANES - 1) // LANES):
@@ -125,30 +106,9 @@ def add_glossy_lights(
 ) -> None:
     """Add norm sum I(w) c_x / r^2 <m . w>^P over glossy lights to every receiver: radiance over its reflectance.
 
-    Parameters
-    ----------
-    position, normal : (3, n) ndarray
-        Receivers, world space; m and unit vectors.
-    of : ReceiverLobes
-        Their lobes.
-    lights : (13, K) ndarray
-        Packed lights, as for `lobe_sum.add_lobes`.
-    clamp : Clamp
-        How near pairs are kept finite; the bound applies to c_x / r^2.
-    widening : Widening or None
-        How exponents fall near the light; None keeps them.
-    reach : Range or None
-        Which pairs count, and how much (procedure P3); None: all.
-    listed : (ceil(n / LANES), K) ndarray of bool or None
-        As for `add_diffuse_lights`.
-    culls : Culls
-        What to pass over; lobes that miss the tile where there are no lists.
-    radiance : (3, n) ndarray
-        Added to, W/m^2/sr.
-
-    Notes
-    -----
-    A term is off by at most the sum of the bounds of `add_diffuse_lights` and `lobe_sum.add_lobes`, over their factors.
+    As `add_diffuse_lights`, with lights (13, K) and `widening` as for `lobe_sum.add_lobes`; the clamp's bound applies
+    to c_x / r^2, and lobes that miss the tile are passed over where there are no lists. A term is off by at most the
+    sum of the bounds of both, over their factors.
     """
     count = position.shape[1]
     bounds = bound_lobes(lights[9], whole_from(widening))

@@ -80,6 +80,14 @@ def irradiance(
     are split into calls or on where a pixel stands in the picture, to the bit. With `lightcuts` they depend on which
     receivers follow each other, within the error.
     """
+    return summed(receivers, lights, settings, footprint, lightcuts)
+
+
+def summed(
+    receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None,
+    lightcuts: Lightcuts | None = None,
+) -> Array:
+    """Return what `irradiance` does, unobserved."""
     packed = checked(receivers, lights, settings, footprint, lightcuts)
 
     def add(here: Array, facing: Array, _: Array, sums: Array) -> None:
@@ -117,30 +125,9 @@ def checked(
     receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None,
     lightcuts: Lightcuts | None = None,
 ) -> Packed:
-    """Check the arguments of a sum over pairs and pack its lights.
+    """Check the arguments of a sum over pairs, as `irradiance`, and pack its lights in the dtype of the receivers.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        Points to light.
-    lights : PixelLights
-        Lights to sum.
-    settings : PairSettings
-        How one light lights one receiver.
-    footprint : (N,) ndarray or None
-        Surface area each light stands for, m^2.
-    lightcuts : Lightcuts, optional
-        Clusters to sum diffuse lights by.
-
-    Returns
-    -------
-    Packed
-        The lights, in the dtype of the receivers.
-
-    Raises
-    ------
-    InputError
-        As `irradiance`.
+    `footprint` (N,) is the surface each light stands for, m^2; `lightcuts` the clusters to sum diffuse lights by.
     """
     _check(receivers, lights, settings, footprint)
     packed = pack(lights, settings, footprint, receivers.position.dtype)
@@ -150,22 +137,10 @@ def checked(
 
 
 def over_receivers(receivers: Receivers, packed: Packed, add: Callable[[Array, Array, Array, Array], None]) -> Array:
-    """Sum something over the lights at every pixel with a surface, some pixels at a time.
+    """Sum something over the lights at every pixel with a surface, some pixels at a time; (3, h, w), 0 without surface.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        Points to light.
-    packed : Packed
-        The lights; their number says how many pixels go at a time.
-    add : callable
-        Called with positions and normals (3, n) of receivers, their flat indices (n,) in the picture and zeros (3, n),
-        to which it adds. All but the last call have whole tiles.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        The sums; 0 where there is no surface.
+    The number of lights says how many pixels go at a time. `add` is called with positions and normals (3, n), flat
+    indices (n,) in the picture and zeros (3, n), to which it adds. All but the last call have whole tiles.
     """
     position, covered = np.asarray(receivers.position), np.asarray(receivers.covered, np.bool_)
     normal = np.asarray(receivers.normal, position.dtype)

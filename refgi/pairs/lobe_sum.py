@@ -66,26 +66,11 @@ def add_lobes(
 ) -> None:
     """Add E = sum over glossy lights of I(w) c_x / r^2 to the irradiance of every receiver (SII Eq. 2 and 3).
 
-    Parameters
-    ----------
-    position, normal : (3, n) ndarray
-        Receivers, world space; m and unit vectors.
-    lights : (13, N) ndarray
-        Packed lights: position, reversed normal, reversed lobe axis, exponent, flux times norm.
-    clamp : Clamp
-        Clamp of near pairs; the bound applies to c_x / r^2.
-    widening : Widening or None
-        How exponents fall near the light; None keeps them.
-    reach : Range or None
-        Which pairs count, and how much (procedure P3); None: all.
-    listed : (ceil(n / LANES), N) ndarray of bool or None
-        Lights that may count for each tile; the others must not count for any of its receivers. None: all may, and
-        tiles are of TILE.
-    irradiance : (3, n) ndarray
-        Added to, W/m^2.
-
-    Notes
-    -----
+    Position (m) and normal are (3, n), world space, `irradiance` (3, n), W/m^2. `lights` (13, N): position, reversed
+    normal, reversed lobe axis, exponent, flux times norm. The clamp's bound applies to c_x / r^2; `widening` says how
+    exponents fall near the light, None keeps them; `reach` which pairs count, and how much (procedure P3), None: all.
+    `listed` (ceil(n / LANES), N) bool: lights that may count for each tile (the others must not count for any of its
+    receivers); None: all may, and tiles are of TILE.
     In float32, with U = 2^-24, a term t = flux s c_x / r^2 is off by at most U (t (17 + 5 L + 6.5 P (sqrt(2 h) + h) /
     (1 - h)) + 4 flux s / r^2), where L = -P log2(1 - h): roundings of w reach h, those of the cosine c_x are absolute.
     Less than 2^-126 of the peak is 0. Within 8 U of the light's plane or 1e-3 of h = 1, where lobes of P < 1 end

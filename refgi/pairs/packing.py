@@ -72,24 +72,9 @@ def pack(lights: "PixelLights", settings: PairSettings, footprint: Array | None,
 
 
 def with_tree(packed: Packed, lightcuts: Lightcuts) -> Packed:
-    """Return packed lights with a light tree over the diffuse ones.
+    """Return packed lights with a light tree over the diffuse ones, if any, for sums to the error of lightcuts.
 
-    Parameters
-    ----------
-    packed : Packed
-        The lights.
-    lightcuts : Lightcuts
-        The error of their sums.
-
-    Returns
-    -------
-    Packed
-        With `tree`, unless there is no diffuse light.
-
-    Raises
-    ------
-    InputError
-        If a light has a flux below 0, or lights are spheres.
+    `InputError` if a light has a flux below 0, or lights are spheres.
     """
     expect(packed.spheres is None, "clamp", "another one with lightcuts, which bound no spheres", "sphere")
     expect(bool((packed.diffuse[6:] >= 0).all()), "lights.flux", "numbers >= 0 with lightcuts",

@@ -110,18 +110,10 @@ def sum_pairs(
 ) -> None:
     """Add up E = sum over lights of (Phi / pi) g for every receiver (SII Eq. 1 and 2).
 
-    Parameters
-    ----------
-    position, normal : (3, n) ndarray
-        Receivers, world space; m and unit vectors.
-    lights : (9, N) ndarray
-        Packed lights: position, reversed normal, flux / pi. The last one is black and stands in for an odd partner.
-    clamp : Clamp or None
-        Clamp of near pairs; None sums the plain term.
-    culls : bool
-        Pass over lights that cannot reach a tile; without, each adds its zeros, to the same bits.
-    irradiance : (3, n) ndarray
-        Filled with W/m^2; without albedo/pi and visibility.
+    Position (m) and normal are (3, n), world space; `irradiance` (3, n) is filled with W/m^2, without albedo/pi and
+    visibility. `lights` (9, N): position, reversed normal, flux / pi; the last one is black and stands in for an odd
+    partner. No clamp sums the plain term. `culls` passes over lights that cannot reach a tile; without, each adds its
+    zeros, to the same bits.
     """
     count = position.shape[1]
     for block in prange((count + TILE - 1) // TILE):

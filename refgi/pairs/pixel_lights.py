@@ -5,8 +5,10 @@ B >= xi I_low. B = I(w) / r^2 is the irradiance that the light causes at most (t
 one absolute irradiance, and xi is 1, or drawn for each light by the stochastic range.
 """
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[Any]
@@ -25,6 +27,14 @@ class PixelLights(NamedTuple):
     texel: Array | None = None  # (N',) int32: row * W + column on the stacked maps; None: not from a map
     map_index: Array | None = None  # (N',) int32: which of the maps
     half: Array | None = None  # (N',) bool: of the second half of the draw, a sample like the first; None: no draw
+
+    def recorded(self) -> dict[str, Array | None]:
+        """Return what sums read of a light, by name, as logs keep it."""
+        return {name: getattr(self, name) for name in self._fields[:6]}
+
+    def with_channels(self, channels: Mapping[str, Any], _: np.dtype[Any]) -> "PixelLights":
+        """Return lights with other arrays, by name."""
+        return self._replace(**channels)
 
 
 class Range(NamedTuple):

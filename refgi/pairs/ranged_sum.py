@@ -76,20 +76,9 @@ def sum_pairs_in_range(
 ) -> None:
     """Add up E = sum over lights of (Phi / pi) g over the pairs with B >= I_low, for every receiver.
 
-    Parameters
-    ----------
-    position, normal : (3, n) ndarray
-        Receivers, world space; m and unit vectors.
-    lights : (9, N + 1) ndarray
-        Packed lights: position, reversed normal, flux / pi. The last one is black and stands in for an odd partner.
-    clamp : Clamp or None
-        How near pairs are kept finite; None sums the plain term.
-    reach : Range
-        Of all packed lights; xi counts as 1.
-    listed : (ceil(n / LANES), N) ndarray of bool
-        Lights that may count for each tile; the others must not count for any of its receivers.
-    irradiance : (3, n) ndarray
-        Filled with W/m^2; without albedo/pi and visibility.
+    As `pair_sum.sum_pairs`, with lights (9, N + 1), the last one black. `reach` is of all packed lights; xi counts as
+    1. `listed` (ceil(n / LANES), N) bool: lights that may count for each tile; the others must not count for any of its
+    receivers.
     """
     count = position.shape[1]
     for block in prange((count + LANES - 1) // LANES):

@@ -85,24 +85,10 @@ def sampling_error(
 
 
 def error_of_halves(first: Array, second: Array, samples: int, of: str = "pixel lights") -> SamplingError | None:
-    """Return the error of the sum of two halves (3, n) of a picture's light; None where there is none.
+    """Return the error of the sum of two halves (3, n) of a picture's light, not doubled; None where there is none.
 
-    Parameters
-    ----------
-    first, second : (3, n) ndarray
-        What each half of the samples gives, not doubled.
-    samples : int
-        Of both.
-    of : str
-        What they are.
+    It is |2 first - 2 second| / 2 over the mean of first + second; `samples` counts both halves.
 
-    Returns
-    -------
-    SamplingError or None
-        |2 first - 2 second| / 2 over the mean of first + second.
-
-    Examples
-    --------
     >>> error_of_halves(np.array([[1.0, 2.0]]), np.array([[2.0, 1.0]]), 8)[:2]
     (0.3333333333333333, 0.0)
     """

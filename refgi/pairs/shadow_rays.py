@@ -50,21 +50,9 @@ class RayReceivers(NamedTuple):
 def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: Array, grain: float) -> RayReceivers:
     """Return the covered pixels of a G-buffer, or any choice of them, as receivers of shadow rays.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    position, normal : (3, h, w) or (3, n) ndarray
-        The G-buffer's, world space.
-    triangle_id : (h, w) or (n,) int ndarray
-        Which triangle each pixel sees; -1 for none.
-    grain : float
-        The tracer's: rays start above the face by `ray_offset`, m.
-
-    Returns
-    -------
-    RayReceivers
-        In picture order; `pixel` counts through the given points.
+    Position (m) and normal are (3, h, w) or (3, n), world space, `triangle_id` (h, w) or (n,), -1 for none. Rays start
+    above the face by `ray_offset` with the tracer's `grain`, m. In picture order; `pixel` counts through the given
+    points.
     """
     pixel = np.flatnonzero(triangle_id.reshape(-1) >= 0)
     at = np.ascontiguousarray(position.reshape(3, -1)[:, pixel], np.float64)

@@ -54,15 +54,7 @@ def plain(value: Any) -> Any:
 def geometry_digest(scene: Scene) -> str:
     """Return SHA-256 over all triangles, their normals, texture coordinates and which material each has.
 
-    Parameters
-    ----------
-    scene : Scene
-        Any scene.
-
-    Returns
-    -------
-    str
-        Equal on every machine.
+    Equal on every machine.
     """
     shape, digest = scene.geometry, hashlib.sha256()
     for array, kind in ((shape.vertices, "<f8"), (shape.faces, "<i4"), (shape.material_of_face, "<i4"),
@@ -79,15 +71,7 @@ def geometry_digest(scene: Scene) -> str:
 def materials_digest(scene: Scene) -> str:
     """Return SHA-256 over all materials, their names and their order, and every texel of their images.
 
-    Parameters
-    ----------
-    scene : Scene
-        Any scene.
-
-    Returns
-    -------
-    str
-        Equal on every machine.
+    Equal on every machine.
     """
     return hashlib.sha256(canonical_json([_material_json(one) for one in scene.materials]).encode()).hexdigest()
 
@@ -108,17 +92,9 @@ def _material_json(material: Material) -> dict[str, Any]:
 
 
 def light_json(light: Light) -> dict[str, Any]:
-    """Return a light as JSON values.
+    """Return a light's type and fields as JSON values, angles in rad, so that no bit is lost.
 
-    Parameters
-    ----------
-    light : Light
-        Any light.
-
-    Returns
-    -------
-    dict
-        Its type and its fields, a spot's falloff where it is not the smoothstep; angles in rad, so that no bit is lost.
+    A spot's falloff is left out where it is the smoothstep.
     """
     kind = next(name for name, one in LIGHTS.items() if isinstance(light, one))
     fields: dict[str, Any] = plain(light)
@@ -128,23 +104,7 @@ def light_json(light: Light) -> dict[str, Any]:
 
 
 def light_from(content: Mapping[str, Any]) -> Light:
-    """Return the light that `light_json` wrote.
-
-    Parameters
-    ----------
-    content : mapping
-        What it gave.
-
-    Returns
-    -------
-    Light
-        Equal to the bit.
-
-    Raises
-    ------
-    InputError
-        If the content is not a light's.
-    """
+    """Return the light that `light_json` wrote, equal to the bit. Raises InputError if the content is not a light's."""
     kind = LIGHTS.get(str(content.get("type")), PointLight)
     usual = {"falloff": SpotLight.falloff} if kind is SpotLight else {}
     made: Light = _made(kind, usual | {key: value for key, value in content.items() if key != "type"}, "light")
@@ -152,23 +112,7 @@ def light_from(content: Mapping[str, Any]) -> Light:
 
 
 def camera_from(content: Mapping[str, Any]) -> Camera:
-    """Return the camera whose fields are given.
-
-    Parameters
-    ----------
-    content : mapping
-        What `plain` made of a camera.
-
-    Returns
-    -------
-    Camera
-        Equal to the bit.
-
-    Raises
-    ------
-    InputError
-        If the content is not a camera's.
-    """
+    """Return the camera that `plain` wrote, equal to the bit. Raises InputError if the content is not a camera's."""
     camera: Camera = _made(Camera, content, "camera")
     return camera
 

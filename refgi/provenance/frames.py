@@ -40,79 +40,32 @@ class StillFrames(NamedTuple):
 
 
 def path_record(path: str, of: int, temporal: TemporalSettings | None) -> Record:
-    """Return what all frames of a sequence share beyond scene and method.
+    """Return, as JSON values, what all `of` frames of a sequence share beyond scene and method.
 
-    Parameters
-    ----------
-    path : str
-        TOML file of the path.
-    of : int
-        How many frames there are.
-    temporal : TemporalSettings or None
-        The temporal filter.
-
-    Returns
-    -------
-    dict
-        JSON values.
+    `path`: TOML file of the path; `temporal`: the temporal filter.
     """
     return {"path": {"source": path, "sha256": _digest(path)}, "of": of, "temporal": plain(temporal)}
 
 
 def frame_record(scene: Scene, way: Way, number: int, of: int) -> Record:
-    """Return what one frame adds: its number, its camera and its lights in full.
+    """Return, as JSON values, what one frame adds: its number, its camera and its lights in full.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without the path.
-    way : Path
-        The path.
-    number, of : int
-        Which frame of how many.
-
-    Returns
-    -------
-    dict
-        JSON values.
+    `scene`: without the path `way`.
     """
     camera, lights = camera_and_lights(scene, way, number, of)
     return {"frame": number, "at_frame": {"camera": plain(camera), "lights": [light_json(light) for light in lights]}}
 
 
 def whole_record(scene: Scene, frame: SequenceFrame) -> Record:
-    """Return what a frame adds to the record of scene and method.
-
-    Parameters
-    ----------
-    scene : Scene
-        Without the path.
-    frame : SequenceFrame
-        Which frame.
-
-    Returns
-    -------
-    dict
-        JSON values of `path_record` and `frame_record`.
-    """
+    """Return what a frame adds to the record of a scene without its path: `path_record` and `frame_record`."""
     way, _ = read_path(frame.path, scene)
     return {**path_record(frame.path, frame.of, frame.temporal), **frame_record(scene, way, frame.number, frame.of)}
 
 
 def same_sequence(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[str]:
-    """Return in what two records of frames are not of one sequence.
+    """Return in which keys two records of frames are not of one sequence, those of objects after a dot.
 
     How scene and path were named, and what an estimate came to, does not count.
-
-    Parameters
-    ----------
-    a, b : mapping
-        Records.
-
-    Returns
-    -------
-    list of str
-        Keys, those of objects after a dot; none where nothing differs.
     """
     same = {"estimate": None}
     left, right = (_flat({**one, **same, **{key: {**one.get(key, {}), "source": None} for key in ("scene", "path")}})
@@ -123,15 +76,7 @@ def same_sequence(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[str]:
 def require_repeatable(settings: Any) -> None:
     """Refuse settings by which frames of a sequence would not be the same when they are made again.
 
-    Parameters
-    ----------
-    settings : dataclass
-        Those of a method.
-
-    Raises
-    ------
-    InputError
-        If frames end by the clock, or would share a checkpoint.
+    Raises InputError if frames end by the clock, or would share a checkpoint.
     """
     for key, why in (("seconds", "as the clock ends no frame of a sequence twice alike: say samples"),
                      ("checkpoint", "as a file holds the passes of one frame alone")):
@@ -142,28 +87,9 @@ def require_repeatable(settings: Any) -> None:
 def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame, options: Mapping[str, Any]) -> Picture:
     """Render one frame of a sequence, after those before it where the temporal filter needs them.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without the path.
-    method : str
-        Short name of a method.
-    settings : dataclass
-        Its settings in the first frame.
-    frame : SequenceFrame
-        Which frame.
-    options : mapping
-        Of every `Frame`.
-
-    Returns
-    -------
-    Picture
-        The same to the bit as in the whole sequence.
-
-    Raises
-    ------
-    InputError
-        If the path is not usable, or the frames before end by the clock.
+    `scene`: without the path; `settings`: the method's in the first frame; `options`: of every `Frame`. The picture is
+    the same to the bit as in the whole sequence. Raises InputError if the path is not usable, or frames end by the
+    clock.
     """
     require_repeatable(settings)
     way, _ = read_path(frame.path, scene)
@@ -178,30 +104,10 @@ def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame,
 
 
 def render_still(scene: Scene, method: str, settings: Any, still: StillFrames, options: Mapping[str, Any]) -> Picture:
-    """Render a resting scene by a method and its temporal filter.
+    """Render the last frame of a resting scene, by a method and its temporal filter.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    method : str
-        Short name of a method with a temporal filter.
-    settings : dataclass
-        Its settings in the first frame.
-    still : StillFrames
-        How many frames, and the filter.
-    options : mapping
-        Of every `Frame`; where `shadows` is absent those of `usual_shadows`.
-
-    Returns
-    -------
-    Picture
-        The last frame.
-
-    Raises
-    ------
-    InputError
-        If the method has no temporal filter.
+    `settings`: the method's in the first frame; `options`: of every `Frame`, `shadows` by default those of
+    `usual_shadows`. Raises InputError if the method has no temporal filter.
     """
     require_filter([method])
     options = {**options, "shadows": options.get("shadows") or usual_shadows(settings)}
@@ -213,20 +119,7 @@ def render_still(scene: Scene, method: str, settings: Any, still: StillFrames, o
 
 
 def require_same_path(record: Mapping[str, Any], found: str) -> None:
-    """Refuse a path that is not the one of a record.
-
-    Parameters
-    ----------
-    record : mapping
-        What `path_record` gave under `path`.
-    found : str
-        Where the path lies now.
-
-    Raises
-    ------
-    InputError
-        If its content is another.
-    """
+    """Raise InputError if the content of a path file is not the one of `record`, a `path_record`'s entry "path"."""
     if _digest(found) != record["sha256"]:
         raise InputError(f"{found}: expected the path of the sequence, got another (SHA-256)", file=found, key="path")
 

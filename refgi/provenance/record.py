@@ -64,18 +64,10 @@ def program() -> dict[str, str]:
 
 @functools.cache
 def git_id(package: Path) -> str | None:
-    """Return the commit of the checkout that a package is part of.
+    """Return the commit of the checkout that a package's folder is part of, with "-dirty" where a file in it differs.
 
-    Parameters
-    ----------
-    package : Path
-        Folder of the package.
-
-    Returns
-    -------
-    str or None
-        The commit's id, with "-dirty" where a file in the folder differs from it; None where git does not keep the
-        folder: an installed package inside another project's checkout is not of that project.
+    None where git does not keep the folder: a package installed inside another project's checkout is not of that
+    project.
     """
     if not _git(package, "ls-files", "__init__.py"):
         return None

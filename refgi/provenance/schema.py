@@ -104,19 +104,9 @@ class PictureRecord(_Entry):
 
 
 def require_sound(record: Mapping[str, Any], path: Path) -> None:
-    """Refuse a record that is not whole, or says more than this version knows.
+    """Raise InputError, with all keys that are missing, unknown or of another kind, if a picture's record is not whole.
 
-    Parameters
-    ----------
-    record : mapping
-        Of a picture.
-    path : Path
-        The picture, for messages.
-
-    Raises
-    ------
-    InputError
-        If a key is missing, unknown or of another kind; names all of them.
+    `path`: the picture, for messages.
     """
     try:
         PictureRecord.model_validate(dict(record))

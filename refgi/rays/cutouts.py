@@ -82,12 +82,7 @@ def mark_holes(holes: RayHoles, numbers: Array, origins: Array, directions: Arra
 class Filter:
     """What Embree is given: the address of the filter, and that of the record that it reads.
 
-    Parameters
-    ----------
-    holes : RayHoles
-        The triangles.
-    numbers : (p,) int ndarray
-        Which of them each triangle of Embree's mesh is.
+    `numbers`, (p,): which triangle of `holes` each triangle of Embree's mesh is.
     """
 
     def __init__(self, holes: RayHoles, numbers: Array) -> None:

@@ -68,16 +68,7 @@ def open_backend(vertices: Array, faces: Array, cut: Cut | None = None) -> Backe
 class AddressBackend:
     """Embree's C functions, called by address from compiled kernels.
 
-    Parameters
-    ----------
-    library : ctypes.CDLL
-        Embree.
-    vertices : (n, 3) float32 ndarray
-        Vertices, world space, m.
-    faces : (m, 3) int32 ndarray
-        Vertex indices.
-    cut : Cut, optional
-        Which of them may have holes.
+    `vertices`: (n, 3) float32, world space, m; `faces`: (m, 3) int32; `cut`: which of them may have holes.
     """
 
     def __init__(self, library: ctypes.CDLL, vertices: Array, faces: Array, cut: Cut | None = None) -> None:
@@ -102,19 +93,10 @@ class AddressBackend:
 
 
 class RunBackend:
-    """embreex's `run`, which releases the GIL, on as many Python threads as Numba uses.
+    """embreex's `run`, which releases the GIL, on as many Python threads as Numba uses; arrays as in `AddressBackend`.
 
     Where memory runs out embreex traces what Embree has not built and the process may end; only calls by address are
     asked for their errors.
-
-    Parameters
-    ----------
-    vertices : (n, 3) float32 ndarray
-        Vertices, world space, m.
-    faces : (m, 3) int32 ndarray
-        Vertex indices.
-    cut : Cut, optional
-        Which of them may have holes.
     """
 
     def __init__(self, vertices: Array, faces: Array, cut: Cut | None = None) -> None:

@@ -36,35 +36,14 @@ def grain_of(vertices: Array, faces: Array) -> float:
 
 @kernel
 def ray_offset(x: Any, y: Any, z: Any, grain: Any) -> Any:
-    """Return the offset of a ray's start from the surface at a point, against self-intersection.
+    """Return the offset, m, of a ray's start from the surface at a point, against self-intersection.
 
-    Parameters
-    ----------
-    x, y, z : float
-        The point, m.
-    grain : float
-        The tracer's, m.
-
-    Returns
-    -------
-    float
-        Length, m, of the type of x.
+    `x, y, z`: the point, m; `grain`: the tracer's, m. Of the type of x.
     """
     return type(x)(STEPS) * (abs(x) + abs(y) + abs(z) + grain)
 
 
 @kernel
 def far_offset(dx: Any, dy: Any, dz: Any) -> Any:
-    """Return how much farther off its surface a segment must end for its length.
-
-    Parameters
-    ----------
-    dx, dy, dz : float
-        From start to end, m.
-
-    Returns
-    -------
-    float
-        Length, m, of the type of dx.
-    """
+    """Return how much farther off its surface a segment (dx, dy, dz) must end for its length; m, of the type of dx."""
     return type(dx)(STEPS) * (abs(dx) + abs(dy) + abs(dz))

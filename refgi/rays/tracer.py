@@ -51,41 +51,15 @@ class Tracer:
         self._lock = threading.Lock()
 
     def offsets(self, points: Array) -> Array:
-        """Return how far ray ends must stay from a surface not to hit it.
-
-        Parameters
-        ----------
-        points : (..., 3) array_like
-            Where the ends are, world space, m.
-
-        Returns
-        -------
-        (...) ndarray of float64
-            Lengths, m.
-        """
+        """Return how far ray ends at `points`, (..., 3), must stay from a surface not to hit it; float64, m."""
         return np.asarray(STEPS * (np.abs(points).sum(axis=-1, dtype=np.float64) + self.grain))
 
     def closest(self, origins: Array, directions: Array, reach: Array | float = np.inf) -> Hits:
-        """Find the nearest triangle along each ray.
+        """Find the nearest triangle along each ray; distances are in lengths of the direction.
 
-        Parameters
-        ----------
-        origins : (n, 3) array_like
-            Ray origins, world space, m.
-        directions : (n, 3) array_like
-            Ray directions, not zero, any length.
-        reach : float or (n,) array_like
-            How far to look, in lengths of the direction.
-
-        Returns
-        -------
-        Hits
-            Triangle ids and distances in lengths of the direction.
-
-        Raises
-        ------
-        InputError
-            For shapes that do not fit, numbers that are not finite, or a direction of zero.
+        `origins`: (n, 3), world space, m; `directions`: (n, 3), not zero, any length; `reach`: (n,) or one, how far to
+        look, in lengths of the direction. Raises InputError for shapes that do not fit, numbers not finite, or a
+        direction of zero.
         """
         o, d, far = _checked(origins, directions, reach)
         triangle_id, distance = np.full(len(o), MISS, np.int32), np.full(len(o), np.inf, np.float32)
@@ -96,27 +70,7 @@ class Tracer:
         return Hits(triangle_id, exact)
 
     def occluded(self, origins: Array, directions: Array, distances: Array | float = np.inf) -> Array:
-        """Return whether anything lies on each ray before a distance.
-
-        Parameters
-        ----------
-        origins : (n, 3) array_like
-            Ray origins, world space, m.
-        directions : (n, 3) array_like
-            Ray directions, not zero, any length.
-        distances : float or (n,) array_like
-            How far to look, in lengths of the direction.
-
-        Returns
-        -------
-        (n,) bool ndarray
-            True where something blocks.
-
-        Raises
-        ------
-        InputError
-            For shapes that do not fit, numbers that are not finite, or a direction of zero.
-        """
+        """Return, (n,) bool, whether anything lies on each ray before a distance; input and errors as in `closest`."""
         o, d, far = _checked(origins, directions, distances)
         blocked = np.zeros(len(o), np.bool_)
         self.fill_occluded(o, d, far, blocked)
@@ -126,20 +80,10 @@ class Tracer:
 
     def segments_blocked(self, starts: Array, ends: Array, start_normals: Array | None = None,
                          end_normals: Array | None = None) -> Array:
-        """Return whether anything lies between pairs of surface points.
+        """Return, (n,) bool, whether anything lies between pairs of surface points, (n, 3), world space, m.
 
-        Parameters
-        ----------
-        starts, ends : (n, 3) array_like
-            Ends of the segments, world space, m.
-        start_normals, end_normals : (n, 3) array_like, optional
-            Unit normals on the side the segment leaves to: that end is lifted by its offset along it. Without, the
-            segment is cut short by as much at that end.
-
-        Returns
-        -------
-        (n,) bool ndarray
-            True where something blocks. Segments of no length are free.
+        `start_normals, end_normals`: (n, 3) unit normals on the side the segment leaves to: that end is lifted by its
+        offset along it; without, the segment is cut short by as much at that end. Segments of no length are free.
         """
         a, b = np.array(starts, np.float64).reshape(-1, 3), np.array(ends, np.float64).reshape(-1, 3)
         expect(a.shape == b.shape, "ends", f"shape {a.shape} as starts", b.shape)
@@ -154,21 +98,10 @@ class Tracer:
         return blocked
 
     def visible_from_light(self, position: Array, normal: Array, covered: Array, light: Light) -> Array:
-        """Return which points of a G-buffer a light reaches, by shadow rays.
+        """Return, (h, w) bool, which points of a G-buffer a light reaches, by shadow rays that know no cone.
 
-        Parameters
-        ----------
-        position, normal : (3, h, w) ndarray
-            Points, m, and the unit normals of their faces, world space.
-        covered : (h, w) bool ndarray
-            Where there is a surface.
-        light : Light
-            The light; its cone does not matter here.
-
-        Returns
-        -------
-        (h, w) bool ndarray
-            True where nothing blocks; False without surface and where the light is behind the face.
+        `position, normal`: (3, h, w), m, and unit normals of the faces, world space; `covered`: (h, w), where there is
+        a surface. False without surface and where the light is behind the face.
         """
         at, up = position[:, covered].T.astype(np.float64), normal[:, covered].T.astype(np.float64)
         origins = at + self.offsets(at)[:, None] * up
@@ -191,16 +124,8 @@ class Tracer:
                      distance: Array) -> None:
         """Fill nearest hits, unchecked and in float32 alone.
 
-        Parameters
-        ----------
-        origins, directions : (n, 3) float32 ndarray
-            Rays, world space.
-        reach : (n,) float32 ndarray
-            How far to look; rays of `reach` <= 0 miss untraced.
-        triangle_id : (n,) int32 ndarray
-            Filled with triangle ids, -1 for a miss.
-        distance : (n,) float32 ndarray
-            Filled with distances, inf for a miss.
+        `origins, directions`: (n, 3), world space; `reach`: (n,), rays of `reach` <= 0 miss untraced. `triangle_id`,
+        int32, is -1 and `distance` inf for a miss.
         """
         tally("rays", lambda: np.count_nonzero(reach > 0))
         if self._backend is None:
@@ -212,16 +137,9 @@ class Tracer:
                 triangle_id[hit] = self._pieces.face[triangle_id[hit]]
 
     def fill_occluded(self, origins: Array, directions: Array, reach: Array, blocked: Array) -> None:
-        """Fill whether rays are blocked, unchecked and in float32 alone.
+        """Fill whether rays are blocked, (n,) bool, unchecked and in float32 alone.
 
-        Parameters
-        ----------
-        origins, directions : (n, 3) float32 ndarray
-            Rays, world space.
-        reach : (n,) float32 ndarray
-            How far to look; rays of `reach` <= 0 count as blocked and are not traced.
-        blocked : (n,) bool ndarray
-            Filled with the answers.
+        As `fill_closest`, but rays of `reach` <= 0 count as blocked and are not traced.
         """
         tally("rays", lambda: np.count_nonzero(reach > 0))
         if self._backend is None:

@@ -38,15 +38,7 @@ class Clusters(NamedTuple):
 def clusters(geometry: "Geometry") -> Clusters:
     """Sort the triangles that have no holes along a Z-order curve, and cut it into pieces.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-
-    Returns
-    -------
-    Clusters
-        In the order of the curve; which triangles share a cluster changes no picture.
+    Which triangles share a cluster changes no picture.
     """
     vertices, faces = geometry.vertices, geometry.faces
     number = len(faces)

@@ -27,10 +27,7 @@ Key = tuple[tuple[Texture | None, float, float] | None, ...]  # of each material
 class CutOuts:
     """Which materials have holes; equal ones have the same object as long as it is in use.
 
-    Parameters
-    ----------
-    key : tuple
-        Texture, factor and cutoff of each material, None for one that has no holes.
+    `key`: texture, factor and cutoff of each material, None for one that has no holes.
     """
 
     def __init__(self, key: Key) -> None:
@@ -72,18 +69,7 @@ _in_use: "weakref.WeakValueDictionary[Key, CutOuts]" = weakref.WeakValueDictiona
 
 
 def cut_outs(materials: Sequence[Material]) -> CutOuts | None:
-    """Return where surfaces of some materials have holes.
-
-    Parameters
-    ----------
-    materials : sequence of Material
-        The scene's materials.
-
-    Returns
-    -------
-    CutOuts or None
-        None where none of them has any.
-    """
+    """Return where surfaces of some materials have holes; None where none of them has any."""
     key = tuple(_holes(material) for material in materials)
     if not any(one is not None for one in key):
         return None

@@ -77,23 +77,9 @@ def read_text(path: Path) -> str:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file.
+    """Read the tables of a TOML file. Raises InputError if it cannot be read or is no TOML.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    dict
-        Its tables by name.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read or is no TOML. A key of very many parts counts as damage: its parts take time that grows
-        with the square of their number.
+    A key of very many parts counts as damage: its parts take time that grows with the square of their number.
     """
     try:
         text = expect_utf8(read_bytes(path), path).decode()

@@ -40,19 +40,10 @@ MEANS: dict[Falloff, float] = {"smoothstep": 1 / 2, "squared_ramp": 1 / 3, "ramp
 
 
 def cone_row(inner: float, outer: float, falloff: Falloff = "smoothstep") -> Array:
-    """Return what kernels need of a spot's half-angles and falloff.
+    """Return what kernels need of a spot's falloff and half-angles, rad, 0 <= inner <= outer < pi/2.
 
-    Parameters
-    ----------
-    inner, outer : float
-        Half-angles, rad, 0 <= inner <= outer < pi/2.
-    falloff : str
-        What the intensity is between them.
-
-    Returns
-    -------
-    (8,) ndarray of float64
-        sin outer and cos outer, each a float64 and the rest; cos inner - cos outer; 1 - cos outer; two of `SHAPES`.
+    (8,) float64: sin outer and cos outer, each a float64 and the rest; cos inner - cos outer; 1 - cos outer; two of
+    `SHAPES`.
     """
     sine, cosine = sine_cosine_digits(outer)
     _, cosine_inner = sine_cosine_digits(inner)

@@ -86,18 +86,7 @@ class Material:
 
 
 def reflects_too_much(diffuse: Rgb, specular: Rgb) -> bool:
-    """Return whether a surface would reflect more than arrives in any channel.
-
-    Parameters
-    ----------
-    diffuse, specular : tuple of 3 floats
-        Reflectances.
-
-    Returns
-    -------
-    bool
-        False where the sum is over 1 by rounding alone.
-    """
+    """Return whether a surface reflects more than arrives in any channel, by more than rounding."""
     return any(d + s > 1 + ROUNDING for d, s in zip(diffuse, specular, strict=True))
 
 

@@ -23,24 +23,9 @@ COARSEST_STEP = 1 / 4096  # of the diagonal between neighbouring coordinates: th
 
 
 def faces_of(scene: Scene, material: str) -> Array:
-    """Return which faces of a scene show a material.
+    """Return, (m,) bool, which faces of a scene show a material.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    material : str
-        The material's name.
-
-    Returns
-    -------
-    (m,) ndarray of bool
-        For every face of its geometry.
-
-    Raises
-    ------
-    InputError
-        If there is no material of that name, or no face shows it.
+    Raises InputError if there is no material of that name, or no face shows it.
     """
     names = [one.name for one in scene.materials]
     if material not in names:
@@ -53,19 +38,9 @@ def faces_of(scene: Scene, material: str) -> Array:
 
 
 def with_own_vertices(geometry: Geometry, selected: Array) -> Geometry:
-    """Give some faces vertices of their own, so that they can move without pulling at others.
+    """Give the selected faces, (m,) bool, vertices of their own, so that they can move without pulling at others.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    selected : (m,) ndarray of bool
-        Which faces.
-
-    Returns
-    -------
-    Geometry
-        The same object where no vertex is shared; else shared vertices stand once more at the end.
+    Shared vertices stand once more at the end; the same object where none is shared.
     """
     shared = np.flatnonzero(_used(geometry, selected) & _used(geometry, ~selected))
     if not len(shared):
@@ -80,30 +55,10 @@ def with_own_vertices(geometry: Geometry, selected: Array) -> Geometry:
 
 
 def moved(geometry: Geometry, selected: Array, rotation: Array, center: Vector, translation: Vector) -> Geometry:
-    """Turn some faces about a point, then move them: x' = center + R (x - center) + translation.
+    """Turn the selected faces, (m,) bool, about a point, then move them: x' = center + R (x - center) + translation.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    selected : (m,) ndarray of bool
-        Which faces move.
-    rotation : (3, 3) ndarray
-        R, a proper rotation.
-    center : tuple of 3 floats
-        The point that it leaves where it is, m.
-    translation : tuple of 3 floats
-        Displacement afterwards, m.
-
-    Returns
-    -------
-    Geometry
-        With the same array of faces; other vertices keep their coordinates to the bit.
-
-    Raises
-    ------
-    InputError
-        If a face that rests shares a vertex with one that moves.
+    `rotation`: R, (3, 3), proper; `center, translation`: m. Other vertices keep their coordinates to the bit, and faces
+    their array. Raises InputError if a face that rests shares a vertex with one that moves.
     """
     moving = _used(geometry, selected)
     torn = int(np.count_nonzero(moving & _used(geometry, ~selected)))
@@ -121,27 +76,10 @@ def moved(geometry: Geometry, selected: Array, rotation: Array, center: Vector, 
 
 
 def rotation_about(axis: Vector, angle: float) -> Array:
-    """Return the rotation about an axis (Rodrigues).
+    """Return the (3, 3) rotation about an axis of any length (Rodrigues); InputError if it is no direction.
 
-    Parameters
-    ----------
-    axis : tuple of 3 floats
-        Direction, of any length.
-    angle : float
-        Counter-clockwise when viewed against the axis, rad.
+    `angle`: counter-clockwise when viewed against the axis, rad; exactly the identity for 0.
 
-    Returns
-    -------
-    (3, 3) ndarray
-        The matrix; exactly the identity where the angle is 0.
-
-    Raises
-    ------
-    InputError
-        If the axis is no direction.
-
-    Examples
-    --------
     >>> np.round(rotation_about((0, 0, 2), math.pi / 2) @ (1, 0, 0), 12).tolist()
     [0.0, 1.0, 0.0]
     """
@@ -161,26 +99,11 @@ def _used(geometry: Geometry, selected: Array) -> Array:
 
 
 def near_origin(scene: Scene) -> tuple[Scene, Vector]:
-    """Return a scene near the origin, and the place that became its origin.
+    """Return a scene near the origin, and what was subtracted from every place, m.
 
-    Parameters
-    ----------
-    scene : Scene
-        Any scene.
-
-    Returns
-    -------
-    Scene
-        The same object where its box lies within FAR diagonals of the origin; else moved as a whole, camera and
-        lights with it.
-    tuple of 3 floats
-        What was subtracted from every place, m: whole multiples of a power of 2 not below the diagonal, so that the
-        subtraction is exact and scenes moved by such a multiple become equal.
-
-    Warns
-    -----
-    RefgiWarning
-        If the scene is so small and so far off that float64 has too few steps for it.
+    The same object where its box lies within FAR diagonals of the origin; else moved as a whole, camera and lights with
+    it, by whole multiples of a power of 2 not below the diagonal, so that the subtraction is exact and scenes moved by
+    such a multiple become equal. Warns if float64 has too few steps for a scene so small and so far off.
     """
     low, high = scene.geometry.bounds
     diagonal, center = scene.geometry.diagonal, (low + high) / 2

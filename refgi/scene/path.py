@@ -59,22 +59,10 @@ class Path:
 
 
 def value_at(track: Track, time: float, curve: Curve) -> Array:
-    """Interpolate between keys; before the first and after the last their values hold.
+    """Return the (n,) values of a track at a time, 0 to 1; before the first key and after the last their values hold.
 
-    Parameters
-    ----------
-    track : Track
-        The keys.
-    time : float
-        0 to 1.
-    curve : {"linear", "catmull_rom"}
-        Straight from key to key, or a cubic through all of them with the slope of the chord between each key's
-        neighbours, which leaves values that lie on a line on it.
-
-    Returns
-    -------
-    (n,) ndarray
-        A key's value to the bit at its time.
+    Linear, or a cubic through all keys with the slope of the chord between each key's neighbours, which leaves values
+    that lie on a line on it. A key's value to the bit at its time.
     """
     at, values = track.at, track.values
     if time <= at[0] or time >= at[-1]:
@@ -92,26 +80,10 @@ def value_at(track: Track, time: float, curve: Curve) -> Array:
 
 
 def scenes_along(scene: Scene, path: Path, frames: int) -> Iterator[Scene]:
-    """Yield the scene of every frame of a path.
+    """Yield the scene of every frame of a path, the first at time 0, the last at time 1.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene at rest.
-    path : Path
-        Its animation.
-    frames : int
-        How many; the first is at time 0, the last at time 1.
-
-    Yields
-    ------
-    Scene
-        Frames between which nothing moves share one geometry.
-
-    Raises
-    ------
-    InputError
-        If a frame's camera, light or object is not usable; names the frame.
+    Frames between which nothing moves share one geometry. Raises InputError, which names the frame, if its camera, a
+    light or an object is not usable.
     """
     for motion in path.objects:
         scene = dataclasses.replace(scene, geometry=with_own_vertices(scene.geometry, motion.faces))
@@ -126,26 +98,9 @@ def scenes_along(scene: Scene, path: Path, frames: int) -> Iterator[Scene]:
 
 
 def camera_and_lights(scene: Scene, path: Path, frame: int, frames: int) -> tuple[Camera, tuple[Light, ...]]:
-    """Return the camera and the lights of a frame.
+    """Return the camera and the lights of a frame, the scene's own objects where nothing of them changes.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene at rest.
-    path : Path
-        Its animation.
-    frame, frames : int
-        Which frame of how many.
-
-    Returns
-    -------
-    tuple
-        The scene's own objects where nothing of them changes.
-
-    Raises
-    ------
-    InputError
-        If they are not usable; names the frame.
+    Raises InputError, which names the frame, if they are not usable.
     """
     time = frame_time(frame, frames)
     name = ""
@@ -161,44 +116,14 @@ def camera_and_lights(scene: Scene, path: Path, frame: int, frames: int) -> tupl
 
 
 def frame_time(frame: int, frames: int) -> float:
-    """Return when a frame is.
-
-    Parameters
-    ----------
-    frame, frames : int
-        Which frame of how many.
-
-    Returns
-    -------
-    float
-        0 to 1.
-    """
+    """Return when a frame is, 0 to 1."""
     return frame / max(1, frames - 1)
 
 
 def changed(element: Any, tracks: Mapping[str, Track], time: float, curve: Curve) -> Any:
-    """Return a camera or a light with the values that it has at a time.
+    """Return a camera or a light with the values that its tracks, by field, have at a time, 0 to 1.
 
-    Parameters
-    ----------
-    element : Camera or Light
-        As the scene has it.
-    tracks : mapping of str to Track
-        By field.
-    time : float
-        0 to 1.
-    curve : {"linear", "catmull_rom"}
-        As in `value_at`.
-
-    Returns
-    -------
-    Camera or Light
-        The same object where there is no track.
-
-    Raises
-    ------
-    InputError
-        If a value is not usable.
+    The same object where there is no track. Raises InputError if a value is not usable.
     """
     values = {key: value_at(track, time, curve).tolist() for key, track in tracks.items()}
     changes = {key: value[0] if len(value) == 1 else tuple(value) for key, value in values.items()}

@@ -39,18 +39,7 @@ class Points(NamedTuple):
 
 
 def default_camera(geometry: Geometry) -> Camera:
-    """Return a camera with the whole bounding box in view, and much of the mesh: into an open box from its open side.
-
-    Parameters
-    ----------
-    geometry : Geometry
-        Not empty.
-
-    Returns
-    -------
-    Camera
-        512 x 512 pixels.
-    """
+    """Return a camera with the whole bounding box in view and much of the mesh: into an open box from its open side."""
     middle, radius = _sphere(geometry)
     cameras = [Camera(_vector(middle + _unit(view) * (radius / math.sin(VFOV / 2))), _vector(middle), vfov=VFOV)
                for view in VIEWS]
@@ -63,17 +52,7 @@ def default_camera(geometry: Geometry) -> Camera:
 def default_light(geometry: Geometry, camera: Camera | None = None) -> SpotLight:
     """Return a spot light that lights what a camera sees: its cone holds the bounding box, or it is at an eye in there.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Not empty.
-    camera : Camera, optional
-        The camera; a placed one where absent.
-
-    Returns
-    -------
-    SpotLight
-        White, with an irradiance of pi W/m^2 at the middle.
+    White, with an irradiance of pi W/m^2 at the middle; the camera is `default_camera`'s where absent.
     """
     camera = default_camera(geometry) if camera is None else camera
     middle, radius = _sphere(geometry)

@@ -21,10 +21,7 @@ from refgi.scene.transform import affine
 class Names:
     """The file's materials by name, and how many names without one were met.
 
-    Parameters
-    ----------
-    materials : object
-        What stands under `materials` in the file, not yet validated.
+    `materials`: what stands under that key in the file, not yet validated.
     """
 
     def __init__(self, materials: Any) -> None:

@@ -73,18 +73,7 @@ class Settings:
 
 
 def hints(kind: type[Settings]) -> dict[str, Any]:
-    """Return the types of a class's fields.
-
-    Parameters
-    ----------
-    kind : type
-        Settings.
-
-    Returns
-    -------
-    dict
-        By name.
-    """
+    """Return the types of a class's fields, by name."""
     found: dict[str, Any] = _hints(kind)
     return found
 
@@ -93,35 +82,13 @@ _hints: Any = cache(get_type_hints)
 
 
 def members(hint: Any) -> tuple[Any, ...]:
-    """Return the types that a hint allows, without None.
-
-    Parameters
-    ----------
-    hint : type
-        A type or a union.
-
-    Returns
-    -------
-    tuple
-        One or more types.
-    """
+    """Return the types that a hint, a type or a union, allows, without None."""
     parts = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     return tuple(part for part in parts if part is not NoneType)
 
 
 def may_be_none(hint: Any) -> bool:
-    """Return whether a hint allows None.
-
-    Parameters
-    ----------
-    hint : type
-        A type or a union.
-
-    Returns
-    -------
-    bool
-        Whether it does.
-    """
+    """Return whether a hint allows None."""
     return get_origin(hint) in (Union, UnionType) and NoneType in get_args(hint)
 
 
@@ -143,37 +110,13 @@ def choices_of(hint: Any) -> dict[str, type[Settings]]:
 
 
 def is_choice(hint: Any) -> bool:
-    """Return whether a field holds one of several classes, or one or none.
-
-    Parameters
-    ----------
-    hint : type
-        The field's type.
-
-    Returns
-    -------
-    bool
-        False for a plain value and for a part that is always there.
-    """
+    """Return whether a field holds one of several classes, or one or none; not a part that is always there."""
     found = choices_of(hint)
     return len(found) > 1 or (len(found) == 1 and may_be_none(hint))
 
 
 def expected(field: Any, hint: Any) -> str:
-    """Say what a field takes.
-
-    Parameters
-    ----------
-    field : dataclasses.Field
-        The field.
-    hint : type
-        Its type.
-
-    Returns
-    -------
-    str
-        Such as "a whole number, 1 to 64".
-    """
+    """Say what a field of some type takes, such as "a whole number, 1 to 64"."""
     none = "none or " if may_be_none(hint) else ""
     if kinds := choices_of(hint):
         return f"{none}{' or '.join(kinds)}"
@@ -202,26 +145,9 @@ def _range(about: Any) -> str:
 
 
 def checked(owner: type[Settings], field: Any, value: Any) -> Any:
-    """Return what a field keeps of a value.
+    """Return what a field keeps of a value: names as a frozenset, all else as it is.
 
-    Parameters
-    ----------
-    owner : type
-        The settings class.
-    field : dataclasses.Field
-        One of its fields.
-    value : object
-        What it is given.
-
-    Returns
-    -------
-    object
-        The value; names as a frozenset.
-
-    Raises
-    ------
-    InputError
-        If the field does not take it.
+    Raises InputError if the field does not take it.
     """
     hint = hints(owner)[field.name]
     if value is None and may_be_none(hint):
@@ -244,20 +170,7 @@ def checked(owner: type[Settings], field: Any, value: Any) -> Any:
 
 
 def names_of(owner: type[Settings], hint: Any) -> frozenset[str]:
-    """Return the names that a set may hold.
-
-    Parameters
-    ----------
-    owner : type
-        The settings class.
-    hint : type
-        `frozenset` of a `Literal`, or of any text, which stands for the class's `SWITCHES`.
-
-    Returns
-    -------
-    frozenset of str
-        The names.
-    """
+    """Return the names that a set may hold: its `Literal`'s, or the class's `SWITCHES` where it takes any text."""
     (kind,) = get_args(members(hint)[0])
     return frozenset(get_args(kind)) if get_origin(kind) is Literal else owner.SWITCHES
 

@@ -95,13 +95,7 @@ def _printed_forms(settings: Settings, names: Any) -> dict[str, Any]:
 
 
 def raise_all(errors: Iterable[InputError]) -> None:
-    """Raise one error for all, if there are any.
-
-    Parameters
-    ----------
-    errors : iterable of InputError
-        What is wrong with settings.
-    """
+    """Raise one error for all, if there are any."""
     errors = list(errors)
     if not errors:
         return
@@ -110,24 +104,10 @@ def raise_all(errors: Iterable[InputError]) -> None:
 
 
 def find_key(settings: Settings, key: str) -> Leaf:
-    """Return what a key means.
+    """Return what a key means: whole, or shortened to its last parts; with dots or underscores.
 
-    Parameters
-    ----------
-    settings : Settings
-        Whose keys; where several choices have a field of one name, the chosen one's is meant.
-    key : str
-        Whole, or shortened to its last parts; with dots or underscores.
-
-    Returns
-    -------
-    Leaf
-        The key's place in the tree.
-
-    Raises
-    ------
-    InputError
-        If there is none, or more than one.
+    Where several choices have a field of one name, the one chosen in `settings` is meant. Raises InputError if there is
+    none, or more than one.
     """
     wanted = "." + key.replace("_", ".")
     ranked: list[dict[str, Leaf]] = [{}, {}, {}]  # whole keys; ends of keys; what parts stand for
@@ -154,21 +134,9 @@ def find_key(settings: Settings, key: str) -> Leaf:
 
 
 def meant(settings: Settings, leaf: Leaf, value: Any) -> Leaf:
-    """Return where a value belongs: a choice given what is none of its names stands for its most important setting.
+    """Return where a value, or the text of it, belongs: `leaf`, or a field of what `leaf` chooses.
 
-    Parameters
-    ----------
-    settings : Settings
-        Whose choices count.
-    leaf : Leaf
-        The key that was found.
-    value : object
-        Its value, or the text of it.
-
-    Returns
-    -------
-    Leaf
-        The same, or the principal setting of what is chosen now or by default.
+    A choice given what is none of its names stands for the principal setting of what is chosen now or by default.
     """
     kinds = choices_of(leaf.hint)
     if not kinds or value is None or isinstance(value, Settings) or value in (*kinds, "none"):

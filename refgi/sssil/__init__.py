@@ -48,7 +48,6 @@ __all__ = [
     "SenderSettings",
     "gather",
     "hssil",
-    "hssil_lobes",
     "pyramid",
     "upsample",
 ]

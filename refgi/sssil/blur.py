@@ -30,33 +30,50 @@ LINE = 14 * SPAN  # planes of a row: light, position x, normal n, n . x, its lar
 LIGHT, POSITION, NORMAL, PLANE, LIMIT, MEAN = 0, 3 * SPAN, 6 * SPAN, 9 * SPAN, 10 * SPAN, 11 * SPAN
 
 
-@stage("sssil.blur")
 def blur(irradiance: Array, level: Level, settings: GeometryBlur) -> Array:
-    """Average the irradiance of a level over windows of n x n texels of the same surface.
+    """Average the irradiance of a level, (3, h, w) W/m^2, over windows of texels of the same surface."""
+    return window_means(irradiance, level.position, level.normal, level.depth, settings.size, settings.plane_tolerance,
+                        settings.cosine)
+
+
+@stage("sssil.blur", each="level")
+def window_means(
+    light: Array, position: Array, normal: Array, depth: Array, size: int, plane_tolerance: float, cosine: float
+) -> Array:
+    """Average over a window of texels on the texel's tangent plane that face as it does (docs/methods/hssil).
+
+    The mean over a row, then over a column (after Keller and Heidrich 2001).
 
     Parameters
     ----------
-    irradiance : (3, h, w) ndarray
-        Of the level's texels, W/m^2.
-    level : Level
-        Positions, depths and normals of the texels.
-    settings : GeometryBlur
-        Size of the window, and what is one surface.
+    light : (3, h, w) ndarray
+        Irradiance of a level's texels, W/m^2.
+    position : (3, h, w) ndarray
+        Their surface points, m.
+    normal : (3, h, w) ndarray
+        Their unit normals.
+    depth : (h, w) ndarray
+        Their depths, m; inf without surface.
+    size : int
+        n: the window has n x n texels.
+    plane_tolerance : float
+        Largest distance from the tangent plane, a share of the depth.
+    cosine : float
+        Least cosine between normals.
 
     Returns
     -------
     (3, h, w) ndarray
-        W/m^2, in the dtype of the level; 0 where there is no surface. Equal irradiance stays as it is, to the bit.
+        Irradiance by this level, averaged, W/m^2; 0 without surface. Equal irradiance stays as it is, to the bit.
 
     Notes
     -----
     Not in the paper. The mean is taken of differences to the texel itself. Texels outside the picture do not count.
     """
-    real = level.position.dtype.type
-    values = np.ascontiguousarray(irradiance, level.position.dtype)
+    real = position.dtype.type
+    values = np.ascontiguousarray(light, position.dtype)
     result = plane(values.shape, values.dtype)
-    _blur(values, level.position, level.normal, level.depth, settings.size, real(settings.plane_tolerance),
-          real(settings.cosine), result)
+    _blur(values, position, normal, depth, size, real(plane_tolerance), real(cosine), result)
     return result
 
 

@@ -29,21 +29,9 @@ class Points(NamedTuple):
 
 
 def equal_flux_points(frame: Frame, count: int = LIT_POINTS) -> tuple[Points, float]:
-    """Return points of equal reflected flux on directly lit surfaces.
+    """Return points of equal reflected flux on directly lit surfaces, and the flux of each.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its lights.
-    count : int
-        Number of points.
-
-    Returns
-    -------
-    points : Points
-        The points, denser where more is reflected; none where no light falls.
-    flux : float
-        Flux of each, sum of the three channels, W.
+    Points are denser where more is reflected; none where no light falls. The flux is the sum of the three channels, W.
     """
     maps = [reflective_shadow_map(frame.scene.geometry, frame.materials, light, MAP_RESOLUTION, frame.dtype)
             for light in frame.scene.lights]  # fmt: skip
@@ -57,20 +45,7 @@ def equal_flux_points(frame: Frame, count: int = LIT_POINTS) -> tuple[Points, fl
 
 
 def visible_points(frame: Frame, count: int = RECEIVERS) -> Points:
-    """Return surface points evenly spread over the picture.
-
-    Parameters
-    ----------
-    frame : Frame
-        Scene and camera.
-    count : int
-        About how many pixels are tested.
-
-    Returns
-    -------
-    Points
-        Their surface points, without background.
-    """
+    """Return surface points evenly spread over the picture, of about `count` pixels, without background."""
     height, width = frame.height, frame.width
     rows = min(height, max(1, round(math.sqrt(count * height / width))))
     columns = min(width, max(1, round(count / rows)))
@@ -81,23 +56,9 @@ def visible_points(frame: Frame, count: int = RECEIVERS) -> Points:
 
 
 def transport(tracer: Tracer, receivers: Points, senders: Points, flux: float, nearest: float) -> Array:
-    """Return the irradiance of each receiver from each sender.
+    """Return the irradiance of each receiver from each sender, T_ij, (receivers, senders) float64, W/m^2.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        The scene's geometry.
-    receivers, senders : Points
-        Both ends.
-    flux : float
-        Reflected flux of each sender, W.
-    nearest : float
-        Least distance in the denominator, m.
-
-    Returns
-    -------
-    (receivers, senders) ndarray of float64
-        T_ij, W/m^2.
+    `flux` is what each sender reflects, W; `nearest` the least distance in the denominator, m.
     """
     direction = senders.position - receivers.position[:, None]
     square = (direction * direction).sum(axis=2)
@@ -121,24 +82,10 @@ class Views(NamedTuple):
 
 
 def sampling_quality(tracer: Tracer, views: Views, points: Points, coarsest: float) -> Array:
-    """Return how finely each picture samples each point.
+    """Return how finely each picture samples each surface point, (c, n) float64.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        The scene's geometry.
-    views : Views
-        The pictures.
-    points : Points
-        Surface points.
-    coarsest : float
-        Length of a pixel on a surface that gives a quality of 1/2, m.
-
-    Returns
-    -------
-    (c, n) ndarray of float64
-        0 where a point is outside the picture, faces away or is occluded; else 1 / (1 + (length / coarsest)^2) with the
-        length of a pixel on the surface there, which grows with distance and towards grazing views.
+    0 where a point is outside the picture, faces away or is occluded; else 1 / (1 + (length / coarsest)^2) with the
+    length of a pixel on the surface there (m), which grows with distance and towards grazing views.
     """
     direction = points.position - views.eye[:, None]
     right, down, depth = np.moveaxis(np.einsum("cad,cnd->can", views.axes, direction), 1, 0)
@@ -160,19 +107,9 @@ def _off_surface(tracer: Tracer, points: Points, chosen: Array, direction: Array
 
 
 def unoccluded(tracer: Tracer, starts: Array, ends: Array) -> Array:
-    """Return between which pairs of places nothing lies.
+    """Return between which pairs of places (n, 3), off any surface, m, nothing lies: (n,) bool.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        The scene's geometry.
-    starts, ends : (n, 3) ndarray
-        The places, off any surface, m.
-
-    Returns
-    -------
-    (n,) ndarray of bool
-        True where nothing occludes, by the bare traversal: one ray in 10^7 slips between triangles.
+    By the bare traversal: one ray in 10^7 slips between triangles.
     """
     blocked = np.zeros(len(starts), np.bool_)
     tracer.fill_occluded(np.ascontiguousarray(starts, np.float32), np.ascontiguousarray(ends - starts, np.float32),

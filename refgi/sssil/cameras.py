@@ -192,20 +192,10 @@ def join_cameras(frame: Frame, light: Array, settings: CameraSettings, one_view:
 
 
 def frame_through(frame: Frame, camera: Camera) -> Frame:
-    """Return a frame of the same scene, size and kind through another camera.
+    """Return a frame of the same scene, size and kind through another camera, whose own size does not count.
 
-    Parameters
-    ----------
-    frame : Frame
-        The frame.
-    camera : Camera
-        The other camera, relative to the origin of `frame.scene`; its own size does not count.
-
-    Returns
-    -------
-    Frame
-        It shares what `frame` has computed already and does not depend on the camera: reflective shadow maps, the
-        tracer, tables.
+    The camera is relative to the origin of `frame.scene`. The frame shares what `frame` has computed already and does
+    not depend on the camera: reflective shadow maps, the tracer, tables.
     """
     scene = dataclasses.replace(frame.scene, camera=camera)
     other = Frame(scene, width=frame.width, height=frame.height, dtype=frame.dtype,
@@ -215,20 +205,7 @@ def frame_through(frame: Frame, camera: Camera) -> Frame:
 
 
 def recentred(camera: Camera, origin: Vector) -> Camera:
-    """Return a camera relative to another origin.
-
-    Parameters
-    ----------
-    camera : Camera
-        The camera.
-    origin : tuple of 3 floats
-        The new origin, m.
-
-    Returns
-    -------
-    Camera
-        The same view.
-    """
+    """Return the same view, as a camera relative to another origin (m)."""
     if not any(origin):
         return camera
     eye, target = (np.subtract(place, origin).tolist() for place in (camera.eye, camera.target))

@@ -50,20 +50,7 @@ def hssil(frame: "Frame", settings: HssilSettings) -> Array:
 
 
 def one_view(frame: "Frame", settings: HssilSettings) -> Array:
-    """Light what a camera sees by what this camera alone sees.
-
-    Parameters
-    ----------
-    frame : Frame
-        Scene, camera and lights.
-    settings : HssilSettings
-        Sampling, levels and visibility.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Indirect irradiance, W/m^2.
-    """
+    """Return the indirect irradiance (3, h, w), W/m^2, of what a camera sees by what this camera alone sees."""
     levels = pyramid(frame, settings)  # Sec. 4, hierarchical maps
     senders = sender_pyramid(frame, levels, settings)
     if is_due("sssil.reach"):
@@ -84,23 +71,8 @@ def one_view(frame: "Frame", settings: HssilSettings) -> Array:
 def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettings, senders: Level) -> Array:
     """Return the irradiance of the texels of one level from samples of it, blurred where these differ by receiver.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene whose view the level is.
-    level : Level
-        Receivers.
-    index : int
-        0 for the first level, whose inner disc is sampled as well.
-    settings : HssilSettings
-        Sampling, visibility and blur.
-    senders : Level
-        The level as senders.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2.
+    (3, h, w), W/m^2. `index` is 0 for the first level, whose inner disc is sampled as well; `senders` the level as
+    senders.
     """
     if settings.senders.only_level not in (None, index):
         return np.zeros_like(level.radiance)
@@ -117,16 +89,5 @@ def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettin
 
 
 def guide_of(level: Level) -> Guide:
-    """Return the guide of joint bilateral upsampling to or from a level.
-
-    Parameters
-    ----------
-    level : Level
-        The level.
-
-    Returns
-    -------
-    Guide
-        Its depths and normals.
-    """
+    """Return the guide (depths, normals) of joint bilateral upsampling to or from a level."""
     return Guide(level.depth, level.normal)

@@ -38,17 +38,8 @@ BATCH = 1 << 18  # pairs held at a time
 def hssil_lobes(frame: "Frame", settings: HssilSettings) -> Array:
     """Return the radiance towards the eye that receivers' lobes make of what a camera sees.
 
-    Parameters
-    ----------
-    frame : Frame
-        Scene, camera and lights.
-    settings : HssilSettings
-        As for `hssil`; whatever the pattern but "all", each pixel has samples of its own, and nothing is blurred.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        W/m^2/sr, linear RGB; 0 where there is no lobe.
+    (3, h, w), W/m^2/sr, linear RGB; 0 where there is no lobe. Whatever the pattern but "all", each pixel has samples of
+    its own, and nothing is blurred.
     """
     lobes = view_lobes(frame, frame.glossy_points, settings)
     if not (settings.cameras.count or settings.cameras.views):
@@ -65,21 +56,9 @@ def hssil_lobes(frame: "Frame", settings: HssilSettings) -> Array:
 
 
 def view_lobes(frame: "Frame", points: GlossyPoints, settings: HssilSettings) -> Array:
-    """Return the lobes of some pixels by what this camera alone sees.
+    """Return the lobes of some pixels by what this camera alone sees, (3, h, w), W/m^2/sr.
 
-    Parameters
-    ----------
-    frame : Frame
-        Scene, camera and lights.
-    points : GlossyPoints
-        Pixels of this camera; their lobes may belong to another eye.
-    settings : HssilSettings
-        Sampling, levels and visibility.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        W/m^2/sr.
+    The pixels are this camera's; their lobes may belong to another eye.
     """
     levels = pyramid(frame, settings)
     senders = sender_pyramid(frame, levels, settings)

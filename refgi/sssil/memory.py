@@ -23,30 +23,12 @@ LISTED_RAY_BYTES = 48  # of a sample of one receiver
 
 
 def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
-    """Return the memory that the levels of one picture take.
+    """Return the bytes that the levels of one picture take; texels that its edge cuts are counted as their share.
 
-    Parameters
-    ----------
-    settings : HssilSettings
-        First level, number of levels, and downsampling.
-    pixels : int
-        Pixels of the picture.
-    float_bytes : int
-        Bytes of one number, 4 or 8.
-
-    Returns
-    -------
-    int
-        Bytes; texels that the picture's edge cuts are counted as their share.
-
-    Notes
-    -----
     With n levels from full resolution on it is ``(4 - 4^(1 - n)) / 3`` times the first; from half resolution on, a
     quarter of that. The mean of radiance alone needs the number of its pixels as well; drawn senders are levels of
     their own.
 
-    Examples
-    --------
     >>> from refgi.sssil.settings import SamplingSettings
     >>> level_bytes(HssilSettings(SamplingSettings(start="full", levels=1)), 100, 4)
     4800
@@ -61,20 +43,7 @@ def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
 
 
 def extra_bytes(settings: HssilSettings, extent: Extent) -> int:
-    """Estimate the memory that levels, samples and further cameras add to a picture.
-
-    Parameters
-    ----------
-    settings : HssilSettings
-        First level, number of levels, pattern, cameras.
-    extent : Extent
-        Of the picture.
-
-    Returns
-    -------
-    int
-        Bytes, rather too many than too few.
-    """
+    """Estimate the bytes that levels, samples and further cameras add to a picture, rather too many than too few."""
     size, float_bytes = extent.size, extent.float_bytes
     pixels = size[0] * size[1]
     columns, rows = (-(-side >> settings.sampling.first_level) for side in size)

@@ -76,6 +76,14 @@ def reproject(
     A point within 1/256 texel of a texel's centre takes that texel alone, so that a view which did not move returns its
     values unchanged, however often it is reprojected.
     """
+    return fetched(values, source, position, normal, covered, depth_tolerance, normal_cosine, fetch, origin)
+
+
+def fetched(
+    values: Array, source: SourceView, position: Array, normal: Array, covered: Array, depth_tolerance: float,
+    normal_cosine: float, fetch: Fetch, origin: Vector | None = None,
+) -> tuple[Array, Array]:
+    """Return what `reproject` does, as no stage of its own."""
     projection = source.projection
     expect(projection.kind == PERSPECTIVE and projection.maps == 1, "there", "one perspective map", projection.kind)
     expect(len(values) in (3, 4) and values.shape[1:] == source.depth.shape == projection.shape, "values",
@@ -92,25 +100,10 @@ def reproject(
 def pixel_transform(
     source: SourceView, dtype: npt.DTypeLike, origin: Vector | None = None
 ) -> tuple[Array, Array, Array]:
-    """Return what takes points to the texels of a view.
+    """Return what takes points to the texels of a view: eye (3,), m; frame (3, 3); scale (4,).
 
-    Parameters
-    ----------
-    source : SourceView
-        The view.
-    dtype : dtype
-        Of the result.
-    origin : tuple of 3 floats, optional
-        Origin of the points, m; that of `source` where absent.
-
-    Returns
-    -------
-    eye : (3,) ndarray
-        Where the camera is, m.
-    frame : (3, 3) ndarray
-        Unit vectors right, down and ahead.
-    scale : (4,) ndarray
-        Texels for each tangent, and the middle of the picture, across and down.
+    The frame's rows are unit vectors right, down and ahead; the scale is texels for each tangent, and the middle of the
+    picture, across and down. `origin` is that of the points, m; that of `source` where absent.
     """
     projection = source.projection
     shift = np.zeros(3) if origin is None else np.subtract(source.origin, origin)

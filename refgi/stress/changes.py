@@ -17,8 +17,6 @@ from refgi.scene.mesh import at_corners
 from refgi.scene.motion import rotation_about
 from refgi.scene.values import BRIGHTEST, LARGEST, Array, Vector
 
-__all__ = ["CHANGES", "Change", "Changed", "NotPromisedError"]
-
 Map = Callable[[Array], Array]  # (n, 3) to (n, 3)
 Promise = Literal["bits", "rounding", "estimate", "mean"]
 FAR = (1e6, -1e6, 1e6)  # m
@@ -58,26 +56,9 @@ class Change(NamedTuple):
 
 
 def mapped(scene: Scene, places: Map, directions: Map = lambda d: d, power: float = 1.0) -> Scene:
-    """Return a scene with places and directions changed.
+    """Return a scene with places and directions, (n, 3), changed, and spots' and points' intensity times `power`.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    places, directions : callable
-        Of (n, 3) arrays.
-    power : float
-        Factor on the radiant intensity of its spots and points.
-
-    Returns
-    -------
-    Scene
-        With the same faces and materials.
-
-    Raises
-    ------
-    NotPromisedError
-        If a coordinate or an intensity leaves what a scene may have.
+    Faces and materials stay. NotPromisedError if a coordinate or an intensity leaves what a scene may have.
     """
     def one(of: Map, vector: Vector) -> Vector:
         x, y, z = (float(c) for c in of(np.array([vector], np.float64))[0])

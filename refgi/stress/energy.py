@@ -6,27 +6,13 @@ from refgi.frame import Frame
 from refgi.scene import DirectionalLight
 from refgi.scene.values import Array
 
-__all__ = ["largest_bounce"]
-
 
 def largest_bounce(frame: Frame) -> Array | None:
-    """Return what irradiance of one bounce exceeds nowhere.
+    """Return what irradiance of one bounce exceeds nowhere, (3,), W/m^2.
 
-    Parameters
-    ----------
-    frame : Frame
-        A lit scene.
-
-    Returns
-    -------
-    (3,) ndarray or None
-        Largest radiosity at texels of all lamps' maps, the lamps added, W/m^2; None where a lobe or glass sends light,
-        as it may send all of it one way.
-
-    Notes
-    -----
-    A hemisphere filled with the radiance B / pi gives the irradiance B. A texel of solid angle w, seen at distance r
-    and cosine c, has the area w r^2 / c, so B = flux c / (w r^2).
+    Largest radiosity at texels of all lamps' maps, the lamps added; None where a lobe or glass sends light, as it may
+    send all of it one way. A hemisphere filled with the radiance B / pi gives the irradiance B. A texel of solid angle
+    w, seen at distance r and cosine c, has the area w r^2 / c, so B = flux c / (w r^2).
     """
     if frame.materials.specular.any() or frame.materials.ior.any():
         return None

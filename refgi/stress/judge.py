@@ -12,8 +12,6 @@ from refgi.scene.values import Array
 from refgi.settings import Settings
 from refgi.stress.changes import Changed
 
-__all__ = ["Seen", "bits_apart", "estimates_apart", "means_apart", "rmse_apart", "same_surface", "see", "unsound"]
-
 NEAR = 1e-4  # share of the depth within which two pixels show the same place
 ALIKE = 1e-5  # difference of albedo
 
@@ -29,24 +27,7 @@ class Seen(NamedTuple):
 
 
 def see(scene: Scene, method: str, settings: Settings, options: dict[str, Any]) -> Seen:
-    """Render a scene and keep what comparisons need.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    method : str
-        Short name of the method.
-    settings : Settings
-        The method's.
-    options : dict
-        Of the frame.
-
-    Returns
-    -------
-    Seen
-        Warnings of refgi are left out.
-    """
+    """Render a scene by a method and keep what comparisons need; warnings of refgi are left out."""
     from refgi.methods import render
 
     with warnings.catch_warnings(record=True) as caught:
@@ -60,35 +41,14 @@ def see(scene: Scene, method: str, settings: Settings, options: dict[str, Any]) 
 
 
 def unsound(light: Array) -> int:
-    """Return how many pixels hold NaN, an infinity or a negative number.
-
-    Parameters
-    ----------
-    light : (3, h, w) ndarray
-        Irradiance, W/m^2.
-
-    Returns
-    -------
-    int
-        0 where all is light.
-    """
+    """Return how many pixels of irradiance, (3, h, w), hold NaN, an infinity or a negative number."""
     return int(np.count_nonzero(~(np.isfinite(light) & (light >= 0)).all(axis=0)))
 
 
 def same_surface(before: Seen, after: Seen, changed: Changed) -> Array:
     """Return which pixels of the part show the same place in both pictures, (h, w).
 
-    Parameters
-    ----------
-    before, after : Seen
-        The pictures.
-    changed : Changed
-        What was done between them.
-
-    Returns
-    -------
-    (h, w) ndarray of bool
-        Depths within 1e-4 of each other, and the same albedo.
+    Depths within 1e-4 of each other, and the same albedo.
     """
     depth, albedo = before.depth[changed.part], before.albedo[:, *changed.part]
     other = changed.back(after.depth, light=False) / changed.length
@@ -101,20 +61,6 @@ def same_surface(before: Seen, after: Seen, changed: Changed) -> Array:
 def bits_apart(before: Seen, after: Seen, changed: Changed) -> int:
     """Return how many pixels of the part differ by a bit, of those whose light has all its digits in both pictures.
 
-    Parameters
-    ----------
-    before, after : Seen
-        The pictures.
-    changed : Changed
-        What was done between them.
-
-    Returns
-    -------
-    int
-        Pixels.
-
-    Notes
-    -----
     Light below the smallest normal number of float32, 1.2e-38, keeps fewer bits and is not asked for any.
     """
     was, now = before.light[:, *changed.part], changed.back(after.light)
@@ -125,17 +71,7 @@ def bits_apart(before: Seen, after: Seen, changed: Changed) -> int:
 def rmse_apart(before: Seen, after: Seen, changed: Changed) -> float:
     """Return the RMSE over all pixels that show the same place, over the mean of the picture before.
 
-    Parameters
-    ----------
-    before, after : Seen
-        The pictures.
-    changed : Changed
-        What was done between them.
-
-    Returns
-    -------
-    float
-        1; infinity where the picture before is black and that after is not, and where no pixel shows the same place.
+    Infinity where the picture before is black and that after is not, and where no pixel shows the same place.
     """
     first = before.light[:, *changed.part].astype(np.float64)
     apart = changed.back(after.light.astype(np.float64)) - first
@@ -151,17 +87,7 @@ def rmse_apart(before: Seen, after: Seen, changed: Changed) -> float:
 def means_apart(before: Seen, after: Seen, changed: Changed) -> float:
     """Return how far the means over pixels with a surface are apart, over that before; pictures of any size.
 
-    Parameters
-    ----------
-    before, after : Seen
-        The pictures.
-    changed : Changed
-        What was done between them.
-
-    Returns
-    -------
-    float
-        1; infinity where only one of the two is black.
+    Infinity where only one of the two is black.
     """
     first, second = (seen.light[:, np.isfinite(seen.depth)].astype(np.float64) for seen in (before, after))
     if not first.any() and not second.any():
@@ -171,20 +97,7 @@ def means_apart(before: Seen, after: Seen, changed: Changed) -> float:
 
 
 def estimates_apart(before: Seen, after: Seen, changed: Changed) -> tuple[float, float]:
-    """Return the largest |t| of the picture means of two estimates over channels, and its degrees of freedom.
-
-    Parameters
-    ----------
-    before, after : Seen
-        The pictures.
-    changed : Changed
-        What was done between them.
-
-    Returns
-    -------
-    tuple of 2 floats
-        |t| and degrees of freedom.
-    """
+    """Return the largest |t| of the picture means of two estimates over channels, and its degrees of freedom."""
     first, second = before.estimate, after.estimate
     apart = np.abs(first.picture_mean - second.picture_mean / changed.flux)
     variance = first.picture_variance + second.picture_variance / changed.flux**2

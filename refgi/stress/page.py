@@ -14,8 +14,6 @@ from refgi.scene.values import Array
 from refgi.stress.rows import Row, Stability, strain
 from refgi.stress.run import Found, Silence
 
-__all__ = ["markdown_summary", "write_page"]
-
 FILES = Path(__file__).parent / "files"
 COLUMNS = ("of", "after", "", "worst", "limit", "where the limit comes from", "what it is")
 RED, BLUE, MARK = np.array([1.0, 0.25, 0.15]), np.array([0.2, 0.45, 1.0]), np.array([1.0, 0.9, 0.0])
@@ -23,21 +21,7 @@ BRIGHT = 0.35  # what the mean is shown as, linear
 
 
 def write_page(result: Stability, found: Sequence[Found], silent: Sequence[Silence], folder: Path, title: str) -> None:
-    """Write index.html, whole or not at all.
-
-    Parameters
-    ----------
-    result : Stability
-        The run.
-    found : sequence of Found
-        Its rows with their pictures.
-    silent : sequence of Silence
-        What methods were not asked.
-    folder : Path
-        An existing folder.
-    title : str
-        The scene.
-    """
+    """Write index.html of a run, whole or not at all: rows with their pictures, and what methods were not asked."""
     from markupsafe import Markup
 
     page = templates(FILES).get_template("stress.html.j2").render(
@@ -53,18 +37,7 @@ def write_page(result: Stability, found: Sequence[Found], silent: Sequence[Silen
 
 
 def markdown_summary(result: Stability) -> str:
-    """Return how many promises are kept, in a sentence.
-
-    Parameters
-    ----------
-    result : Stability
-        The run.
-
-    Returns
-    -------
-    str
-        One sentence.
-    """
+    """Return how many promises are kept, in a sentence."""
     count = len(result.failed)
     if not count:
         return f"All {len(result.rows)} promises are kept on this scene."

@@ -17,8 +17,6 @@ from refgi.settings import Settings, from_text
 from refgi.stress.changes import Change, NotPromisedError, Promise
 from refgi.stress.rows import Kind
 
-__all__ = ["FEW", "SURFACES", "UNBOUNDED", "UNLIKELY", "Asked", "asked", "settings_of", "surfaces"]
-
 NONE: Mapping[str, Any] = MappingProxyType({})
 FILE = Path(__file__).parent / "files" / "observed.json"
 LEAST = 1e-6  # of the mean: a limit is never below what a handful of roundings of float32 come to
@@ -62,28 +60,10 @@ class Asked(NamedTuple):
 
 
 def asked(method: str, change: Change, scene: Scene, size: tuple[int, int] | None = None) -> Asked:
-    """Return how a method is asked for a change.
+    """Return how a method is asked for a change: promise, settings and limit, infinity where nothing was observed yet.
 
-    Parameters
-    ----------
-    method : str
-        Short name of the method.
-    change : Change
-        The change.
-    scene : Scene
-        The scene as it is: some lamps' maps do not turn with it.
-    size : (int, int), optional
-        Width and height of the picture, pixels; absent: one that any promise holds for.
-
-    Returns
-    -------
-    Asked
-        Promise, settings and limit; infinity where nothing was observed yet.
-
-    Raises
-    ------
-    NotPromisedError
-        If the method promises nothing after this change; the text says why.
+    Of the scene as it is: some lamps' maps do not turn with it. Without a picture's size, width and height, one that
+    any promise holds for. A NotPromisedError says why the method promises nothing after this change.
     """
     if (method, change.name) in SILENT:
         raise NotPromisedError(SILENT[method, change.name])
@@ -135,18 +115,7 @@ def _other_maps(change: str, scene: Scene) -> str:
 
 
 def surfaces(change: Change) -> Asked:
-    """Return what is promised of the surfaces that pixels show after a change.
-
-    Parameters
-    ----------
-    change : Change
-        The change.
-
-    Returns
-    -------
-    Asked
-        Promise and limit.
-    """
+    """Return promise and limit of the surfaces that pixels show after a change."""
     if change.promise == "bits" or change.name in ("hidden plane", "two lamps of half"):
         return Asked("bits", source="no place is rounded")
     limit, source = _observed(SURFACES, change.name)
@@ -154,20 +123,7 @@ def surfaces(change: Change) -> Asked:
 
 
 def settings_of(method: str, pairs: tuple[str, ...]) -> Settings:
-    """Return a method's settings with some changed.
-
-    Parameters
-    ----------
-    method : str
-        Short name of the method.
-    pairs : tuple of str
-        Such as ``lights=64``.
-
-    Returns
-    -------
-    Settings
-        The method's.
-    """
+    """Return a method's settings with some changed, such as ``lights=64``."""
     from refgi.methods import find_method
 
     settings: Settings = from_text(find_method(method).settings(), pairs)

@@ -11,8 +11,6 @@ import pydantic
 
 from refgi.image import write_text
 
-__all__ = ["FORMAT", "Row", "Stability", "markdown", "over_scenes", "read_rows", "schema_text", "strain", "write_rows"]
-
 FORMAT: Literal["stability 1"] = "stability 1"
 COLUMNS = ("property", "of", "scene", "where it holds", "worst", "limit", "where the limit comes from", "cases")
 
@@ -81,18 +79,7 @@ class Stability(_Strict):
 
 
 def markdown(rows: Iterable[Row]) -> str:
-    """Write rows as a table.
-
-    Parameters
-    ----------
-    rows : iterable of Row
-        In the order of the table.
-
-    Returns
-    -------
-    str
-        Markdown; rows that fail bear FAIL before their figure.
-    """
+    """Write rows as a table of Markdown; rows that fail bear FAIL before their figure."""
     lines = [f"| {' | '.join(COLUMNS)} |", f"|{'---|' * len(COLUMNS)}"]
     for row in rows:
         figure = f"{'' if row.passed else '**FAIL** '}{row.figure:.3g} {row.unit}".rstrip()
@@ -103,57 +90,24 @@ def markdown(rows: Iterable[Row]) -> str:
 
 
 def write_rows(result: Stability, path: Path) -> None:
-    """Write a run's rows as JSON, whole or not at all.
-
-    Parameters
-    ----------
-    result : Stability
-        The run.
-    path : Path
-        The file.
-    """
+    """Write a run's rows as JSON, whole or not at all."""
     write_text(path, json.dumps(result.model_dump(mode="json"), indent=1) + "\n")
 
 
 def read_rows(path: Path) -> Stability:
-    """Read what `write_rows` wrote.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    Stability
-        The run.
-    """
+    """Read what `write_rows` wrote."""
     return Stability.model_validate_json(path.read_text())
 
 
 def schema_text() -> str:
-    """Return the JSON Schema of stability.json.
-
-    Returns
-    -------
-    str
-        As it is kept in `refgi/stress/files`.
-    """
+    """Return the JSON Schema of stability.json, as it is kept in `refgi/stress/files`."""
     return json.dumps(Stability.model_json_schema(), indent=1) + "\n"
 
 
 def strain(row: Row) -> float:
     """Return a figure over its limit; infinity for what is no number, and for any figure beside a limit of 0.
 
-    Parameters
-    ----------
-    row : Row
-        A promise.
-
-    Returns
-    -------
-    float
-        Over 1 where it is broken.
+    Over 1 where the promise is broken.
     """
     if not math.isfinite(row.figure):
         return math.inf
@@ -161,18 +115,7 @@ def strain(row: Row) -> float:
 
 
 def over_scenes(rows: Iterable[Row]) -> Iterator[Row]:
-    """Join the rows of one promise on several scenes.
-
-    Parameters
-    ----------
-    rows : iterable of Row
-        Of any scenes.
-
-    Yields
-    ------
-    Row
-        The one nearest to its limit, with the cases of all.
-    """
+    """Join the rows of one promise on several scenes: yield the one nearest to its limit, with the cases of all."""
     found: dict[tuple[str, str, str], list[Row]] = {}
     for row in rows:
         found.setdefault((row.part, row.property, row.subject), []).append(row)

@@ -19,8 +19,6 @@ from refgi.stress.judge import Seen, bits_apart, estimates_apart, means_apart, r
 from refgi.stress.promises import FEW, SURFACES, UNBOUNDED, UNLIKELY, Asked, asked, settings_of, surfaces
 from refgi.stress.rows import Row
 
-__all__ = ["Found", "Shown", "stress"]
-
 Tell = Callable[[str, float], None]
 PART = "pictures"
 SIGMAS = 4.0  # of an estimate, that it may lie above what light can bring
@@ -53,36 +51,11 @@ def stress(
     source: str = "", tell: Tell = lambda *_: None, silent: Callable[[Silence], None] = lambda _: None,
     unknown: bool = False,
 ) -> Iterator[Found]:
-    """Attack a scene: render it by methods after changes of which the outcome is known.
+    """Attack a scene: render it by methods after changes of which the outcome is known; yield a row a promise.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    methods : sequence of str
-        Short names.
-    width, height : int
-        Picture size, pixels.
-    changes : sequence of str, optional
-        Names of `CHANGES`; all where absent.
-    source : str
-        What names the scene on the command line, for reproductions.
-    tell : callable
-        Called with (what runs, share done).
-    silent : callable
-        Called with what a method is not asked.
-    unknown : bool
-        Yield rows whose limit is still to be observed as well.
-
-    Yields
-    ------
-    Found
-        A row a promise.
-
-    Raises
-    ------
-    InputError
-        If a name is unknown, or the scene cannot be rendered as it is.
+    All `CHANGES` where none is named. `source` names the scene on the command line, for reproductions; `silent` is
+    called with what a method is not asked; `unknown` yields rows whose limit is still to be observed as well.
+    InputError if a name is unknown, or the scene cannot be rendered as it is.
     """
     known = {change.name: change for change in CHANGES}
     for name in changes or ():

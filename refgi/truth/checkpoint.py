@@ -33,21 +33,9 @@ SECONDS_BETWEEN = 10.0  # saves are at least that far apart
 class Checkpoint:
     """A checkpoint file of one computation.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    computation : bytes
-        SHA-256 digest of everything that the passes depend on.
-    values : int
-        How many values a pass has.
-    blocks : int
-        Of how many blocks tails are counted.
-
-    Raises
-    ------
-    InputError
-        If the file is damaged, belongs to another computation or cannot be written, before anything is computed.
+    `computation`: SHA-256 digest of everything that the passes depend on; `values`: numbers a pass has; `blocks`: of
+    how many blocks tails are counted. Raises InputError, before anything is computed, if the file is damaged, belongs
+    to another computation or cannot be written.
     """
 
     def __init__(self, path: Path, computation: bytes, values: int, blocks: int = 0) -> None:

@@ -70,11 +70,17 @@ class ImperfectDepth(NamedTuple):
     """Depth maps of N pixel lights."""
 
     depth: Array  # (N, R, R) float32, m; row and column grow with t and s; inf where nothing is
-    radius: float  # m, of a point; 0 where the scene has no area
+    radius: Array  # (1,) float64, m, of a point; 0 where the scene has no area
     bias: float  # in what a receiver's own surface may differ by within a box or a texel
 
 
-@stage("vpl.imperfect_maps")
+def _steps(*arguments: Any, **named: Any) -> dict[str, Array] | None:
+    from refgi.truth.map_steps import map_steps
+
+    return map_steps(*arguments, **named)
+
+
+@stage("vpl.imperfect_maps", steps=_steps)
 def imperfect_maps(geometry: Geometry, lights: "PixelLights", settings: Imperfect, seed: int = 0) -> ImperfectDepth:
     """Draw the map of each pixel light.
 
@@ -112,7 +118,7 @@ def imperfect_maps(geometry: Geometry, lights: "PixelLights", settings: Imperfec
         shifts = np.stack([draws(seed, IMPERFECT_MAPS, 3, part=i) for i in range(count)]) if count else np.empty((0, 3))
         _draw_maps(position, normal, corners, facing, upto, geometry.cut or NO_CUT, settings.points, shifts, radius,
                    settings.splat, settings.levels, depth)
-    return ImperfectDepth(depth, radius, settings.bias)
+    return ImperfectDepth(depth, np.full(1, radius), settings.bias)
 
 
 def areas_of(geometry: Geometry) -> tuple[Array, Array, Array]:
@@ -126,7 +132,7 @@ def areas_of(geometry: Geometry) -> tuple[Array, Array, Array]:
 def fill_hidden(maps: ImperfectDepth, to: RayReceivers, receivers: tuple[int, int], senders: Senders,
                 lights: tuple[int, int], reach: Array, hidden: Array) -> None:
     """Fill which pairs a map says are blocked, light by light for each receiver; those of `reach` 0 are, too."""
-    _fill_hidden(maps.depth, maps.radius, maps.bias, to.position, to.facing, receivers, senders.position,
+    _fill_hidden(maps.depth, float(maps.radius[0]), maps.bias, to.position, to.facing, receivers, senders.position,
                  senders.normal, lights, reach, hidden)
 
 

@@ -99,30 +99,21 @@ def trace_truth(frame: "Frame", settings: TruthSettings | None = None) -> TruthR
 def trace_lobes(frame: "Frame", settings: TruthSettings | None = None) -> TruthResult:
     """Compute by path tracing what lobes of receivers make of one-bounce light, with its standard error.
 
-    Parameters
-    ----------
-    frame : Frame
-        The view of the scene.
-    settings : TruthSettings, optional
-        How; the defaults where absent.
-
-    Returns
-    -------
-    TruthResult
-        Mean, variance of the mean and sample count of every pixel; radiance towards the eye, W/m^2/sr, and 0 where no
-        lobe reflects there. Means over blocks and picture are over pixels with a lobe.
-
-    Raises
-    ------
-    InputError
-        If the checkpoint file is damaged or of another computation.
+    Radiance towards the eye, W/m^2/sr, 0 where no lobe reflects there; means over blocks and picture are over pixels
+    with a lobe. Raises InputError if the checkpoint file is damaged or of another computation.
     """
     buffer = frame.gbuffer
     return accumulate_lobes(frame.scene, frame.tracer, buffer.position, buffer.normal, buffer.triangle_id,
                             settings or TruthSettings())
 
 
-@stage("truth.accumulate")
+def _steps(*arguments: Any, **named: Any) -> dict[str, Array]:
+    from refgi.truth.path_steps import truth_steps
+
+    return truth_steps(*arguments, **named)
+
+
+@stage("truth.accumulate", steps=_steps)
 def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
                settings: TruthSettings) -> TruthResult:
     """Average independent passes over a G-buffer until the settings say stop.
@@ -150,7 +141,7 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
     InputError
         If the checkpoint file is damaged or of another computation.
     """
-    return _averaged(_without_pilot, scene, tracer, (position, normal, triangle_id), settings)
+    return averaged(without_pilot, scene, tracer, (position, normal, triangle_id), settings)
 
 
 @stage("truth.accumulate_lobes")
@@ -185,11 +176,12 @@ def accumulate_lobes(scene: Scene, tracer: Any, position: Array, normal: Array, 
     if settings.checkpoint and not Path(settings.checkpoint).is_dir():
         place = Path(settings.checkpoint)
         settings = dataclasses.replace(settings, checkpoint=place.with_name(place.name + ".lobes"))
-    return _averaged(_with_lobes, scene, tracer, (position, normal, glossy), settings)
+    return averaged(_with_lobes, scene, tracer, (position, normal, glossy), settings)
 
 
-def _averaged(prepare: Prepare, scene: Scene, tracer: Any, buffer: tuple[Array, Array, Array],
-              settings: TruthSettings) -> TruthResult:
+def averaged(prepare: Prepare, scene: Scene, tracer: Any, buffer: tuple[Array, Array, Array],
+             settings: TruthSettings) -> TruthResult:
+    """Return the mean of passes over a G-buffer (position, normal, triangle ids) of a task that `prepare` makes."""
     shape = buffer[2].shape
     if settings.seconds is not None:
         _warm_up(prepare, scene, tracer, buffer, settings)
@@ -262,7 +254,7 @@ def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_
     `position`, `normal` (3, h, w): the G-buffer's, world space. `triangle_id` (h, w) int: which triangle each pixel
     sees; -1 for none. Result: with the densities that the pilot found.
     """
-    return _guided(_without_pilot(scene, tracer, position, normal, triangle_id, settings))
+    return _guided(without_pilot(scene, tracer, position, normal, triangle_id, settings))
 
 
 def _guided(task: Task) -> Task:
@@ -270,8 +262,9 @@ def _guided(task: Task) -> Task:
     return with_cells(task._replace(densities=pilot(task)))
 
 
-def _without_pilot(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
-                   settings: TruthSettings) -> Task:
+def without_pilot(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
+                  settings: TruthSettings) -> Task:
+    """Return a task without the densities that a pilot finds."""
     points = receivers(scene.geometry, position, normal, triangle_id, tracer.grain)
     set_of = sets_of(points.pixel, triangle_id.shape[1], settings.interleave)
     caustics, left_to_photons = _photons(scene, triangle_id.shape, settings)
@@ -283,7 +276,7 @@ def _without_pilot(scene: Scene, tracer: Any, position: Array, normal: Array, tr
 def _with_lobes(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
                 settings: TruthSettings) -> Task:
     """Return a task of lobes; `triangle_id`: as `glossy_triangles` has it."""
-    task = _without_pilot(scene, tracer, position, normal, triangle_id, settings)
+    task = without_pilot(scene, tracer, position, normal, triangle_id, settings)
     lobes = lobes_of(scene, task.receivers.pixel, position, normal, triangle_id, task.left_to_photons)
     count = settings.photons * len(scene.lights)
     if task.caustics is not None and not settings.caustics and not meets_photons(lobes) and left_out(

@@ -20,9 +20,11 @@ from refgi.pairs.mirrors import warn_of_mirrors
 from refgi.pairs.sampling import error_of_halves, half_of, warn_of_sampling, with_seen_light
 from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, Hidden, receivers, shadowed_sum
+from refgi.rays import Tracer
+from refgi.scene import Geometry
 from refgi.settings import Settings, setting
 from refgi.stages import stage
-from refgi.truth.imperfect import Imperfect, fill_hidden, imperfect_maps
+from refgi.truth.imperfect import Imperfect, ImperfectDepth, fill_hidden, imperfect_maps
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -81,15 +83,10 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
         Indirect irradiance in the frame's dtype, W/m^2, linear RGB. Excludes the receiver's albedo/pi.
     """
     settings = settings or VplSettings()
-    lights, hidden = _lights(frame, settings)
-    buffer = frame.gbuffer
-    points = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id,
-                       frame.tracer.grain)
-    irradiance = np.zeros((3, frame.height, frame.width), frame.dtype)
-    # SII Eq. (2), (3) with visibility V(x, x_i)
-    irradiance.reshape(3, -1)[:, points.pixel] = shadowed_sum(frame.tracer, points, lights,
-                                                              visibility=settings.visibility, batch=settings.batch,
-                                                              hidden=hidden)
+    lights, maps = _lights(frame, settings)
+    position, normal = frame.gbuffer.resolve("position", "normal")
+    irradiance = light_of_pixel_lights(frame.scene.geometry, position, normal, frame.gbuffer.triangle_id, lights, maps,
+                                       settings.visibility, frame.tracer, settings.batch)
     warn_of_mirrors(frame, lights, "vpl")
     found = asked("vpl.sampling_error")
     if found is not None:
@@ -97,6 +94,53 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
                                                Receivers(*frame.gbuffer.resolve("position", "normal", "covered")),
                                                lights)
         warn_of_sampling(found.sampling_error, "vpl")
+    return irradiance
+
+
+def _steps(*arguments: Any, **named: Any) -> Array:
+    from refgi.truth.map_steps import light_steps
+
+    return light_steps(*arguments[:7], **named)
+
+
+@stage("vpl.light", kept=False, steps=_steps)
+def light_of_pixel_lights(
+    geometry: Geometry, position: Array, normal: Array, triangle_id: Array, lights: "PixelLights",
+    maps: ImperfectDepth | None, visibility: bool, tracer: Tracer, batch: int = BATCH,
+) -> Array:
+    """Sum the irradiance of pixel lights at every pixel, with their visibility by rays or maps (SII Eq. 2, 3).
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    position : (3, h, w) ndarray
+        Surface points of the pixels, m.
+    normal : (3, h, w) ndarray
+        Their unit normals.
+    triangle_id : (h, w) ndarray of int32
+        Their triangles, -1 for none.
+    lights : PixelLights
+        The lights.
+    maps : ImperfectDepth or None
+        A map of each light in place of rays.
+    visibility : bool
+        Whether anything blocks.
+    tracer : Tracer
+        The scene's rays.
+    batch : int
+        Pairs held at a time; changes no bit of the result.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Indirect irradiance, W/m^2; 0 without surface.
+    """
+    points = receivers(geometry, position, normal, triangle_id, tracer.grain)
+    irradiance = np.zeros_like(normal)
+    # with visibility V(x, x_i)
+    irradiance.reshape(3, -1)[:, points.pixel] = shadowed_sum(tracer, points, lights, visibility=visibility,
+                                                              batch=batch, hidden=_hidden(maps))
     return irradiance
 
 
@@ -132,41 +176,35 @@ def vpl_sampling_error(frame: "Frame", lights: "PixelLights", settings: VplSetti
 def vpl_lobes(frame: "Frame", settings: VplSettings) -> Array:
     """Sum pixel lights at every glossy pixel's lobe, with a shadow ray or an imperfect shadow map for each pair.
 
-    Parameters
-    ----------
-    frame : Frame
-        The view of the scene.
-    settings : VplSettings
-        Which lights.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Radiance towards the eye in the frame's dtype, W/m^2/sr, linear RGB; 0 where there is no lobe.
+    (3, h, w) radiance towards the eye in the frame's dtype, W/m^2/sr, linear RGB; 0 where there is no lobe.
     """
     from refgi.pairs.glossy_rays import shadowed_radiance
     from refgi.rsm.buffers.glossy import spread_over_picture
 
-    lights, hidden = _lights(frame, settings)
+    lights, maps = _lights(frame, settings)
     points = frame.glossy_points
     to = receivers(frame.scene.geometry, points.position, points.normal,
                    frame.gbuffer.triangle_id.reshape(-1)[points.pixel], frame.tracer.grain)
     radiance = shadowed_radiance(frame.tracer, to, points, lights, visibility=settings.visibility,
-                                 batch=settings.batch, hidden=hidden)
+                                 batch=settings.batch, hidden=_hidden(maps))
     return spread_over_picture(points, radiance, (frame.height, frame.width))
 
 
-def _lights(frame: "Frame", settings: VplSettings) -> "tuple[PixelLights, Hidden | None]":
-    """Return pixel lights, and what hides them in place of rays where that are maps."""
+def _lights(frame: "Frame", settings: VplSettings) -> "tuple[PixelLights, ImperfectDepth | None]":
+    """Return pixel lights, and their maps in place of rays."""
     from refgi.lights import choose_pixel_lights
 
     chosen = settings.lights
     lights = choose_pixel_lights(frame.rsms, count=None if chosen.pattern == "all" else chosen.count,
                                  pattern=chosen.pattern, seed=chosen.seed, filtered=chosen.filtered)
-    hidden = None
+    maps = None
     if settings.visibility and settings.maps is not None:
-        hidden = partial(fill_hidden, imperfect_maps(frame.scene.geometry, lights, settings.maps, chosen.seed))
-    return lights, hidden
+        maps = imperfect_maps(frame.scene.geometry, lights, settings.maps, chosen.seed)
+    return lights, maps
+
+
+def _hidden(maps: ImperfectDepth | None) -> Hidden | None:
+    return None if maps is None else partial(fill_hidden, maps)
 
 
 def _every_texel(settings: VplSettings, _: Mapping[str, Any]) -> VplSettings:

@@ -8,13 +8,15 @@ decision (an edge, a tie) the element is masked: it may differ at will.
 
 Tier T2 has the same for storage in half floats, as one bound for the array and a share of outliers; tier T2B for 8 bits
 where values have no unit and lie in [0, 1] or [-1, 1] (normals, albedo, shares), half floats elsewhere. Bounds of a
-chained run, in which every stage reads the roundings of those before, are of that form too.
+chained run, in which every stage reads the roundings of those before, are of that form too. Where more than MOST_SPARED
+of an array would be outliers, further runs find which elements they are: those are masked, and outliers are what a run
+has beside them.
 
 Inputs that a stage takes as `exact` are not changed: points whose differences float32 finds without error, numbers that
 decide which texel is meant. The kit holds them to the bit.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +26,8 @@ from refgi.vectors.spec import Array, Arrays, Case, Stage, as_read, outputs_of, 
 SAFETY = 4.0  # a handful of runs sees a third to all of what a rounding can do
 SIGMAS = 4.0  # of an estimate's mean, and of a pixel but for a few of them
 RUNS = 4  # with changed inputs
+MORE_RUNS = 8  # where the first ones have many outliers
+MOST_SPARED = 0.05  # share of an array that may be beyond its bounds: with more it is not judged
 ROUNDING = 2.0**-24  # of float32, relative
 HALF_ROUNDING = 2.0**-11  # of float16
 BYTE, SIGNED_BYTE = 1 / 255, 1 / 127  # steps of [0, 1] and [-1, 1] in 8 bits
@@ -50,6 +54,7 @@ class Budget(NamedTuple):
     relative: float
     large: float  # magnitude that stands for the array's large values
     outliers: float  # share of elements
+    masked: Array | None = None  # as the array, bool: elements that may differ at will
 
 
 NO_BUDGET = Budget(0.0, 0.0, 1.0)  # of estimates, which have standard errors instead
@@ -60,7 +65,7 @@ def isolated_bounds(case: Case, step: Stage, known: Arrays, seed: int) -> dict[s
     if is_estimate(case, step):
         return {name: _spread_bound(known, name) for name in step.writes}
     runs = [outputs_of(step, known, np.float32, run) for run in (step.run, *step.variants)]
-    runs += [_run(step, changed) for changed in _changed(step, known, seed, _rounded_at_random)]
+    runs += [_run(step, _changed(step, known, seed, _rounded_at_random, number)) for number in range(RUNS)]
     return {name: _bound(known[name], [run[name] for run in runs], _large(case, name, known[name]))
             for name in step.writes}
 
@@ -80,15 +85,16 @@ def stored_budgets(case: Case, step: Stage, known: Arrays, seed: int, *, in_byte
             return np.asarray(np.where(array < 1.0, np.minimum(stored_near, BELOW_1), stored_near))
         return _rounded_at_random(name, array, random, HALF_ROUNDING / CHANGE)
 
-    runs = [{name: _to_bytes(array, steps[name]) if steps[name] else _to_half(array)
-             for name, array in _run(step, changed).items()} for changed in _changed(step, known, seed, change)]
-    budgets = {}
-    for name in step.writes:
+    def stored_run(number: int) -> dict[str, Array]:
+        return {name: _to_bytes(array, steps[name]) if steps[name] else _to_half(array)
+                for name, array in _run(step, _changed(step, known, seed, change, number)).items()}
+
+    def measures(name: str) -> Measures:
         large = _large(case, name, known[name])
-        rounding = 0.5 * steps[name] / large if steps[name] else HALF_ROUNDING
-        budgets[name] = _budget(known[name], [run[name] for run in runs], rounding, large,
-                                DECIDED_IN_BYTES if in_bytes else DECIDED)
-    return budgets
+        rounding = 0.5 * steps[name] / large if steps[name] and large else HALF_ROUNDING
+        return Measures(known[name], rounding, large, DECIDED_IN_BYTES if in_bytes else DECIDED)
+
+    return _budgets({name: measures(name) for name in step.writes}, stored_run)
 
 
 def byte_step(case: Case, name: str, array: Array) -> float:
@@ -102,23 +108,24 @@ def byte_step(case: Case, name: str, array: Array) -> float:
 
 
 def chained_budgets(case: Case, known: Arrays, seed: int) -> dict[str, Budget]:
-    """Return the budget of each array when every stage reads the rounded outputs of those before it."""
-    runs: list[dict[str, Array]] = []
-    for number in range(RUNS):
-        random = np.random.default_rng([seed, number])
+    """Return the budget of each array when every stage reads the rounded outputs of those before it.
+
+    Every other run is in float32, whose roundings within a stage are more than those of what it reads.
+    """
+    def run(number: int) -> dict[str, Array]:
+        random, real = np.random.default_rng([seed, number]), np.float32 if number % 2 else np.float64
         chain = {name: stored(array) for name, array in case.given.items()}
         for step in case.stages:
-            if is_estimate(case, step):
-                continue
-            changed = {name: array if name in step.exact else _rounded_at_random(name, array, random)
-                       for name, array in as_read(chain, step.reads, np.float64).items()}
-            chain.update(_run(step, changed))
-        runs.append(chain)
-    written = [name for step in case.stages for name in step.writes]
+            if not is_estimate(case, step):
+                changed = {name: array if name in step.exact else _rounded_at_random(name, array, random)
+                           for name, array in as_read(chain, step.reads, real).items()}
+                chain.update(_run(step, changed, real))
+        return chain
+
     estimates = {name for step in case.stages if is_estimate(case, step) for name in step.writes}
-    return {name: NO_BUDGET if name in estimates else
-            _budget(known[name], [run[name] for run in runs], ROUNDING, _large(case, name, known[name]))
-            for name in written}
+    written = [name for step in case.stages for name in step.writes if name not in estimates]
+    return dict.fromkeys(estimates, NO_BUDGET) | _budgets(
+        {name: Measures(known[name], ROUNDING, _large(case, name, known[name]), DECIDED) for name in written}, run)
 
 
 def is_estimate(case: Case, step: Stage) -> bool:
@@ -136,16 +143,15 @@ def _spread_bound(known: Arrays, name: str) -> Bound:
 
 
 def _changed(
-    step: Stage, known: Arrays, seed: int, change: Callable[[str, Array, np.random.Generator], Array]
-) -> Iterator[dict[str, Array]]:
-    exact = as_read(known, step.reads, np.float64)
-    for number in range(RUNS):
-        random = np.random.default_rng([seed, number])
-        yield {name: array if name in step.exact else change(name, array, random) for name, array in exact.items()}
+    step: Stage, known: Arrays, seed: int, change: Callable[[str, Array, np.random.Generator], Array], number: int
+) -> dict[str, Array]:
+    random = np.random.default_rng([seed, number])
+    return {name: array if name in step.exact else change(name, array, random)
+            for name, array in as_read(known, step.reads, np.float64).items()}
 
 
-def _run(step: Stage, inputs: Arrays) -> dict[str, Array]:
-    made = step.run(inputs, np.float64)
+def _run(step: Stage, inputs: Arrays, real: type = np.float64) -> dict[str, Array]:
+    made = step.run(inputs, real)
     return {name: stored(made[name]) for name in step.writes}
 
 
@@ -154,7 +160,8 @@ def _rounded_at_random(
 ) -> Array:
     if array.dtype.kind != "f":
         return array
-    return np.asarray(array * (1.0 + rounding * CHANGE * random.uniform(-1.0, 1.0, array.shape)))
+    changed = array * (1.0 + rounding * CHANGE * random.uniform(-1.0, 1.0, array.shape))
+    return np.asarray(changed, array.dtype)
 
 
 def _to_half(array: Array) -> Array:
@@ -185,26 +192,73 @@ def _bound(expected: Array, runs: list[Array], large: float) -> Bound:
     return Bound(np.where(masked, 0.0, limit).astype(np.float32), masked)
 
 
-def _budget(
-    expected: Array, runs: list[Array], rounding: float, large: float, decided: float = DECIDED
-) -> Budget:
+class Measures(NamedTuple):
+    """What a budget is measured by."""
+
+    expected: Array
+    rounding: float  # of the result, relative
+    large: float
+    decided: float  # DECIDED
+
+
+def _budgets(
+    arrays: Mapping[str, Measures], run: Callable[[int], Mapping[str, Array]]
+) -> dict[str, Budget]:
+    """Return budgets by runs that write all the arrays; by further runs where outliers are many."""
+    runs = [run(number) for number in range(RUNS)]
+    found = {name: _budget(one, [made[name] for made in runs]) for name, one in arrays.items()}
+    many = [name for name, one in found.items() if one.outliers > MOST_SPARED]
+    if many:
+        runs += [run(number) for number in range(RUNS, RUNS + MORE_RUNS)]
+        found |= {name: _masked(arrays[name], found[name], [made[name] for made in runs]) for name in many}
+    return found
+
+
+def _budget(measures: Measures, runs: list[Array]) -> Budget:
+    """Return the budget that the usual changes need; the rest are outliers."""
+    expected, rounding, large, decided = measures
     same = [run for run in runs if run.shape == expected.shape]
     if not same or expected.size == 0:
         return Budget(0.0, large, 1.0 if expected.size else 0.0)
-    off = np.array([distance(run, expected) for run in same])
     if expected.dtype.kind != "f":
-        return Budget(0.0, 0.0, _outliers(off > 0, expected.size))
+        budget = Budget(0.0, 0.0, 0.0)
+    else:
+        if not large:  # nothing but 0 is expected: what a run has instead is rounding
+            large = max(large_value(run) for run in same) / rounding if not expected.any() else 0.0
+        share = _shares(expected, same, large)
+        usual = share[share < decided]
+        budget = Budget(SAFETY * (rounding + (float(np.quantile(usual, USUAL)) if usual.size else 0.0)), large, 0.0)
+    worst = max(int(np.count_nonzero(one)) for one in _beyond(expected, same, budget))
+    return budget._replace(outliers=_allowed(worst, expected.size))
+
+
+def _masked(measures: Measures, budget: Budget, runs: list[Array]) -> Budget:
+    """Return a budget that masks what is beyond it in any run; outliers are what one run alone has."""
+    same = [run for run in runs if run.shape == measures.expected.shape]
+    if not same:
+        return budget
+    beyond = _beyond(measures.expected, same, budget)
+    count = beyond.sum(axis=0)
+    alone = max(int(np.count_nonzero(one & (count == 1))) for one in beyond)
+    return budget._replace(outliers=_allowed(alone, measures.expected.size), masked=count > 0)
+
+
+def _shares(expected: Array, runs: list[Array], large: float) -> Array:
+    """Return how far runs are off, beside an element and the array's large values."""
+    off = np.array([distance(run, expected) for run in runs])
     size = np.where(np.isfinite(expected), np.abs(expected), 0.0).astype(np.float64) + large
-    share = np.divide(off, size, out=np.where(off > 0, np.inf, 0.0), where=size > 0)
-    usual = share[share < decided]
-    relative = SAFETY * (rounding + (float(np.quantile(usual, USUAL)) if usual.size else 0.0))
-    return Budget(relative, large, _outliers(share > relative, expected.size))
+    return np.asarray(np.divide(off, size, out=np.where(off > 0, np.inf, 0.0), where=size > 0))
 
 
-def _outliers(out: Array, size: int) -> float:
+def _beyond(expected: Array, runs: list[Array], budget: Budget) -> Array:
+    if expected.dtype.kind != "f":
+        return np.array([run != expected for run in runs])
+    return np.asarray(_shares(expected, runs, budget.large) > budget.relative)
+
+
+def _allowed(count: int, size: int) -> float:
     """Return the share of outliers to allow: SAFETY times that seen, and never none where some were."""
-    worst = int(out.reshape(len(out), -1).sum(axis=1).max())
-    return min(1.0, SAFETY * worst / size)
+    return min(1.0, SAFETY * count / size)
 
 
 def large_value(expected: Array) -> float:

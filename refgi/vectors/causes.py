@@ -23,6 +23,7 @@ NEARER = 0.25  # of its distance from what is expected: how near an element must
 SORTED = 1e-3  # the same, of elements in order
 SLIGHT = 100.0  # bounds: a difference without an explanation that stays below may be rounding
 SINGLE = 2.0**-22
+TILES = (4, 8, 16, 32, 64, 128, 256)  # sides of groups of threads
 FEW_VALUES = 8  # of whole numbers: states, not indices
 FACTORS = {"2": 2.0, "1/2": 0.5, "pi": np.pi, "1/pi": 1 / np.pi, "2 pi": 2 * np.pi, "1/(2 pi)": 0.5 / np.pi,
            "4 pi": 4 * np.pi, "1/(4 pi)": 0.25 / np.pi, "pi^2": np.pi**2, "1/pi^2": np.pi**-2, "4": 4.0, "1/4": 0.25,
@@ -218,6 +219,40 @@ def _axes(difference: Difference) -> Iterator[tuple[str, Array]]:
     if names[0] in ("xyz", "rgb"):
         yield "components lie beside each other (h, w, 3) instead of in planes (3, h, w)", np.moveaxis(
             expected, 0, -1).reshape(expected.shape)
+        yield ("vectors take 4 numbers each, as a vec3 of std430 does, and are read as planes",
+               padded := _padded(expected))
+        yield ("vectors take 4 numbers each, as a vec3 of std430 does, and are read as if they took 3",
+               padded.reshape(-1, 3).T.reshape(expected.shape))
+    yield from _tiles(difference, names)
+
+
+def _padded(planes: Array) -> Array:
+    """Return the first numbers of planes that are written as vectors of 4."""
+    vectors = np.pad(planes.reshape(len(planes), -1).T, ((0, 0), (0, 4 - len(planes))))
+    return np.asarray(vectors.reshape(-1)[: planes.size].reshape(planes.shape))
+
+
+def _tiles(difference: Difference, names: list[str]) -> Iterator[tuple[str, Array]]:
+    """Yield what is there where groups of threads are rounded down: beyond whole tiles all holds one number."""
+    expected, got, shape = difference.expected, difference.got, difference.expected.shape
+    single = [(axis,) for axis, name in enumerate(names) if name not in ("xy", "xyz", "rgb")]
+    both = [tuple(names.index(name) for name in ("row", "column"))] if {"row", "column"} <= set(names) else []
+    sides: dict[tuple[tuple[int, ...], tuple[int, ...]], list[int]] = {}
+    for axes in (*single, *both):
+        for side in TILES:
+            whole = tuple(shape[axis] // side * side for axis in axes)
+            if all(whole) and any(end < shape[axis] for axis, end in zip(axes, whole, strict=True)):
+                sides.setdefault((axes, whole), []).append(side)
+    for (axes, whole), fitting in sides.items():
+        beyond = np.logical_or.reduce(np.broadcast_arrays(*(
+            (np.arange(shape[axis]) >= end).reshape([-1 if one == axis else 1 for one in range(len(shape))])
+            for axis, end in zip(axes, whole, strict=True))))
+        beyond = np.broadcast_to(beyond, shape)
+        held = np.unique(got[beyond])
+        if len(held) == 1:
+            yield (f"{' and '.join(f'{names[axis]}s' for axis in axes)} beyond whole tiles of "
+                   f"{' or '.join(map(str, fitting))} are not written: they hold {held[0]:g}",
+                   np.where(beyond, held[0], expected))
 
 
 def _components(expected: Array, axis: int, name: str) -> Iterator[tuple[str, Array]]:
@@ -265,8 +300,26 @@ def _coded(difference: Difference) -> Iterator[tuple[str, Array]]:
         yield "0 in place of infinity", np.where(np.isinf(expected), 0.0, expected)
         if np.array_equal(got, expected.astype(np.float16).astype(got.dtype)):
             yield "stored as float16: tier T2 allows that", got
+        yield from _stored_in_few_bits(expected, difference.entry.axes)
         if difference.entry.axes.startswith("xyz") and expected.ndim > 1:
             yield "vectors are not normalised: right direction, other length", _along(expected, got)
+
+
+def _stored_in_few_bits(expected: Array, axes: str) -> Iterator[tuple[str, Array]]:
+    """Yield arrays as formats of textures keep them; infinite numbers as they are."""
+    for bits in (8, 16):
+        unsigned, signed = 2**bits - 1, 2 ** (bits - 1) - 1
+        cut = ", in which what is below 0 is cut" if (expected < 0).any() else ""
+        yield f"stored as unorm{bits}{cut}", np.rint(np.clip(expected, 0, 1) * unsigned) / unsigned
+        yield f"stored as snorm{bits}", np.rint(np.clip(expected, -1, 1) * signed) / signed
+        yield (f"packed as (x + 1) / 2 in unorm{bits} and unpacked",
+               2 * np.rint(np.clip((expected + 1) / 2, 0, 1) * unsigned) / unsigned - 1)
+    if axes.startswith("rgb"):
+        kept = np.array([6, 6, 5]).reshape(-1, *[1] * (expected.ndim - 1))
+        part, power = np.frexp(np.maximum(expected, 0))
+        for said, rounded in (("", np.rint), (" by cutting", np.floor)):
+            yield (f"stored as R11G11B10F{said}: 5 and 6 bits of a float",
+                   np.ldexp(rounded(np.ldexp(part, kept + 1)), power - kept - 1))
 
 
 def _along(expected: Array, got: Array) -> Array:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from refgi.errors import InputError
-from refgi.vectors.bounds import large_value
+from refgi.vectors.bounds import MOST_SPARED, distance, large_value
+from refgi.vectors.bugfile import BugEntry, Bugs
 from refgi.vectors.causes import EXPLAINED, Difference, explain, explained, places_of
 from refgi.vectors.expected import is_line_of, is_required, lines_of, passing_lines, require_lines_known
 from refgi.vectors.findings import CAUSES, findings
@@ -34,7 +35,7 @@ FORMATS = (*TIERS, *PACKED)
 WRONG = ("out", "invalid")
 FOLLOWS = "made from stages that are expected to fail"
 OF_A_KIT = ("cases", "scenes", "schema")  # folders beside the cases where a kit itself is checked
-ORDER: tuple[Verdict, ...] = ("out", "invalid", "within", "exact", "not-run")
+ORDER: tuple[Verdict, ...] = ("out", "invalid", "not-judged", "within", "exact", "not-run")
 
 
 def check_output(kit: Kit, output: Path, asked: Asked) -> Result:
@@ -184,6 +185,7 @@ def _summed(
     return Result(kit=kit.manifest.kit, vectors=kit.manifest.vectors, mode="chained" if asked.chained else "isolated",
                   verdict=worst, exit_code=code, first=wrong[0].first if wrong else None, findings=wrong,
                   stages=tuple(one.model_copy(update={"causes": one.causes[:CAUSES]}) for one in verdicts),
+                  not_judged=sum(array.verdict == "not-judged" for one in verdicts for array in one.arrays),
                   unknown=unknown, missing=missing, passing=passing_lines(asked.expect, verdicts))
 
 
@@ -320,23 +322,16 @@ def _of_array(port: Port, name: str, arrays: Mapping[str, Array], tier: str) -> 
     if entry.tier == "T3":
         return _judged_estimate(kit, case, name, arrays, expected)
     tolerance = entry.chained if asked.chained else None
+    masks = {entry.masked, None if tolerance is None else tolerance.masked}
     few_bits = {"T2": entry.half, "T2B": entry.bytes}.get(tier)
     if few_bits is not None:
         outliers = max(few_bits.outliers, 0.0 if tolerance is None else tolerance.outliers)
         tolerance = few_bits.model_copy(update={"outliers": outliers})
+        masks.add(few_bits.masked)
     limit = kit.extra(case, entry.bound) if entry.bound is not None else None
-    masked = kit.extra(case, entry.masked) if entry.masked is not None else None
-    base, few = "T0" if entry.tier == "T0" else tier, port.few.get(name)
-    if few is None:
-        return judge(name, expected, got, base, limit, masked, tolerance)
-    outliers = few.outliers
-    if tolerance is not None:
-        size = np.where(np.isfinite(expected), np.abs(expected), 0.0) + tolerance.large
-        limit, masked, outliers = tolerance.relative * size, None, outliers + tolerance.outliers
-    judged = judge(name, expected, got, base, few.more + (0.0 if limit is None else limit), masked, None)
-    if judged.verdict.verdict == "out" and judged.verdict.outside <= outliers * expected.size:
-        return judged._replace(verdict=judged.verdict.model_copy(update={"verdict": "within"}))
-    return judged
+    masked = [kit.extra(case, file) for file in sorted(file for file in masks if file is not None)]
+    return judge(name, expected, got, "T0" if entry.tier == "T0" else tier, limit,
+                 np.logical_or.reduce(masked) if masked else None, tolerance, port.few.get(name))
 
 
 def _judged_estimate(kit: Kit, case: CaseManifest, name: str, arrays: Mapping[str, Array], expected: Array) -> Judged:
@@ -349,6 +344,16 @@ def _judged_estimate(kit: Kit, case: CaseManifest, name: str, arrays: Mapping[st
     return judge_estimate(name, expected, arrays[name], kit.array(case, variance), own)
 
 
+def _refutes(kit: Kit, case: CaseManifest, bugs: Bugs, bug: BugEntry, name: str, judged: Judged) -> bool:
+    """Return whether an array that is right would not be with a bug."""
+    if judged.verdict.verdict not in ("exact", "within") or judged.limit is None or judged.out is None:
+        return False
+    expected = kit.array(case, name)
+    told = bugs.told(bug, name, expected)
+    off = distance(told.values, expected.reshape(-1)[told.places])
+    return bool(np.mean(off > judged.limit.reshape(-1)[told.places]) > MOST_SPARED)
+
+
 def _causes(
     port: Port, step: StageEntry, judged: Mapping[str, Judged], arrays: Mapping[str, Array]
 ) -> list[Cause]:
@@ -359,6 +364,8 @@ def _causes(
     found, bugs = [], kit.bugs(case)
     for bug in bugs.of(step.name):
         if bug.blind or any(shapes.get(name, shape) != shape for name, shape in bug.shapes.items()):
+            continue
+        if any(_refutes(kit, case, bugs, bug, name, judged[name]) for name in bug.arrays.keys() & judged.keys()):
             continue
         told = {name: bugs.told(bug, name, one.expected) for name, one in differing.items() if name in bug.arrays}
         shares = [explained(differing[name], one.values, one.places) for name, one in told.items()]

@@ -36,7 +36,7 @@ class Literal:
         started = time.perf_counter()
         value = function(*args, **kwargs)
         kernel = time.perf_counter() - started
-        if beside is None:
+        if beside.form is None:
             return value
         arrays = {leaf: array for parameter, part in bound.arguments.items() for leaf, array in leaves(part, parameter)}
         started = time.perf_counter()

@@ -37,13 +37,16 @@ from refgi.vectors.manifest import (
 from refgi.vectors.scenefile import is_plain, write_scene
 from refgi.vectors.spec import Array, Arrays, Bug, Case, Stage, expected_of, kind_of, outputs_of, stored
 from refgi.vectors.standalone import standalone_text
+from refgi.vectors.wiring import wirings
 
 SEED = 20090101  # of the changes that bounds are measured by
 TOLD_BY, BESIDE = 96, 32  # elements of a likely bug that are kept: those that tell it, and others
+WIRING_TOLD_BY, WIRING_BESIDE = 20, 6  # the same of wrong wirings, of which there are many
 PARTS = 2  # of the bytes of an array that it takes with its bounds
 TOLD_IN = 3  # cases of a method that tell a likely bug: it is tried in no further ones
+WIRING_TRIED = 2  # cases of a method in which a wrong wiring is tried; in no further ones once it is told
 ISOLATED = "float32 runs and 4 float64 runs on inputs changed by up to 2 roundings of float32, x 4; plus rounding"
-CHAINED = "4 float64 runs, the inputs of every stage changed by up to 2 roundings of float32, x 4"
+CHAINED = "2 float64 and 2 float32 runs, the inputs of every stage changed by up to 2 roundings of float32, x 4"
 HALF = "4 float64 runs on inputs rounded to float16 at random, results in float16, x 4"
 BYTES = "the same in 8 bits, where numbers without unit lie in [0, 1] or [-1, 1]"
 Tell = Callable[[str, float], None]
@@ -150,10 +153,21 @@ def _tell_within(tell: Tell, name: str, begun: float, cases: int, stage: str, sh
 
 
 class _Told:
-    """Which likely bugs cases tell from the right stage: a few of each method are enough."""
+    """Which likely bugs cases tell from the right stage: a few of each method are enough, of wrong wirings one."""
 
     def __init__(self) -> None:
         self._cases: dict[tuple[str, str, str], int] = {}
+        self._wirings: dict[tuple[str, str, str], int] = {}
+
+    def wiring(self, method: str, stage: str, cause: str) -> bool:
+        """Return whether a wrong wiring is to be tried in a further case, and count it."""
+        key = method, kind_of(stage), cause
+        self._wirings[key] = self._wirings.get(key, 0) + 1
+        return self._wirings[key] <= WIRING_TRIED
+
+    def wired(self, method: str, stage: str, cause: str) -> None:
+        """Mark a wrong wiring that a case tells."""
+        self._wirings[method, kind_of(stage), cause] = WIRING_TRIED
 
     def enough(self, method: str, stage: str, cause: str) -> bool:
         """Return whether enough cases of a method tell a bug."""
@@ -197,6 +211,10 @@ def write_case(case: Case, folder: Path, told: _Told, tell: Tell) -> CaseManifes
             if not told.enough(case.method, step.name, bug.cause):
                 blind = _keep_bug(bugs, step, known, bounds, bug)
                 told.add(case.method, step.name, bug.cause, not blind)
+        for bug in wirings(case, step, known):
+            if told.wiring(case.method, step.name, bug.cause) and not _keep_bug(bugs, step, known, bounds, bug,
+                                                                                wired=True):
+                told.wired(case.method, step.name, bug.cause)
         stages.append(StageEntry(name=step.name, what=step.what, paper=step.paper, reads=step.reads,
                                  writes=step.writes, exact=step.exact))
     content = bugs.content()
@@ -224,8 +242,10 @@ def _tolerances(
     home: Path, name: str, entry: ArrayEntry, bound: Bound, budgets: Mapping[str, tuple[Budget, str]]
 ) -> Mapping[str, object]:
     """Return the fields of an array that say how far it may be off."""
-    more: dict[str, object] = {key: Tolerance(**budget._asdict(), source=source)
-                               for key, (budget, source) in budgets.items()}
+    more: dict[str, object] = {}
+    for key, (budget, source) in budgets.items():
+        file = None if budget.masked is None else _save(home, f"mask/{name}.{key}.npy", budget.masked)[0]
+        more[key] = Tolerance(**budget._replace(masked=None)._asdict() | {"masked": file}, source=source)
     if entry.dtype == "<f4":
         more |= {"bound": _save(home, f"bound/{name}.npy", bound.limit)[0], "bound_source": ISOLATED}
     if bound.masked.any():
@@ -235,11 +255,20 @@ def _tolerances(
 
 
 def _keep_bug(
-    bugs: BugWriter, step: Stage, known: Arrays, bounds: Mapping[str, Bound], bug: Bug
+    bugs: BugWriter, step: Stage, known: Arrays, bounds: Mapping[str, Bound], bug: Bug, *, wired: bool = False
 ) -> bool:
-    """Run a stage with a likely bug and keep elements that tell it; return whether none does."""
-    made = outputs_of(step, known, np.float64, bug.run)
+    """Run a stage with a likely bug and keep elements that tell it; return whether none does.
+
+    `wired`: a wrong wiring, of which fewer elements are kept, and none where none tells it.
+    """
+    try:
+        made = outputs_of(step, known, np.float64, bug.run)
+    except Exception:  # whatever a wrong buffer leads to: it is seen at once
+        if wired:
+            return True
+        raise
     told, blind = {}, True
+    counts = (WIRING_TOLD_BY, WIRING_BESIDE) if wired else (TOLD_BY, BESIDE)
     for name in step.writes:
         array, expected = made[name], known[name]
         if array.shape != expected.shape:
@@ -248,11 +277,13 @@ def _keep_bug(
         off = (distance(array, expected) > bounds[name].limit) & ~bounds[name].masked
         if off.any():
             blind = False
-            places = np.concatenate([_spread(np.flatnonzero(off), TOLD_BY), _spread(np.flatnonzero(~off), BESIDE)])
+            places = np.concatenate([_spread(np.flatnonzero(one), count) for one, count in zip((off, ~off), counts,
+                                                                                               strict=True)])
             told[name] = Told(places, array.reshape(-1)[places])
-    entry = BugEntry(cause=bug.cause, paper=bug.paper, arrays={}, blind=blind,
-                     shapes={name: made[name].shape for name in step.writes})
-    bugs.add(step.name, entry, told, known)
+    if not (blind and wired):
+        entry = BugEntry(cause=bug.cause, paper=bug.paper, arrays={}, blind=blind,
+                         shapes={name: made[name].shape for name in step.writes})
+        bugs.add(step.name, entry, told, known)
     return blind
 
 
@@ -282,6 +313,6 @@ def _write_frame(folder: Path, made: KitManifest) -> None:
         (folder / "schema" / name).write_text(schema_text(model), encoding="utf-8", newline="\n")
     (folder / "VERSION").write_text(f"{VERSION}\n", encoding="utf-8")
     (folder / KIT).write_text(text_of(made), encoding="utf-8", newline="\n")
-    for name in ("README.md", "CHANGES.md"):
+    for name in ("README.md", "CHANGES.md", "names-1.toml"):
         (folder / name).write_bytes(resources.files("refgi.vectors").joinpath("files", name).read_bytes())
     (folder / "check.py").write_text(standalone_text(), encoding="utf-8", newline="\n")

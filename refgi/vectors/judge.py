@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from refgi.vectors.bounds import FLUSHED, SIGMAS, distance, large_value
+from refgi.vectors.bounds import FLUSHED, MOST_SPARED, SIGMAS, distance, large_value
 from refgi.vectors.manifest import ArrayEntry, ArrayVerdict, Tolerance, Verdict
+from refgi.vectors.port import Few
 from refgi.vectors.spec import Array, axes_of
 
 FEW = 0.005  # share of pixels that may be beyond SIGMAS standard errors
@@ -29,7 +30,7 @@ def unlike(name: str, tier: str, entry: ArrayEntry, got: Array) -> ArrayVerdict 
 
 def judge(
     name: str, expected: Array, got: Array, tier: str, limit: Array | None, masked: Array | None,
-    tolerance: Tolerance | None,
+    tolerance: Tolerance | None, few: Few | None = None,
 ) -> Judged:
     """Compare an array with what is expected, element by element.
 
@@ -47,12 +48,14 @@ def judge(
         Elements that may differ at will.
     tolerance : Tolerance or None
         In place of bounds for each element: one of the whole array, with a share of outliers.
+    few : Few or None
+        What storage in few bits allows beside either.
 
     Returns
     -------
     Judged
-        The worst element is the one farthest beyond its bound; a number that is not finite where a finite one is
-        expected is beyond any.
+        Not judged where more than MOST_SPARED of the elements are beyond, but allowed to be. The worst element is the
+        one farthest beyond its bound; a number that is not finite where a finite one is expected is beyond any.
     """
     off = distance(got, expected)
     if tier == "T0" or expected.dtype.kind != "f":
@@ -62,17 +65,33 @@ def judge(
         allowed = tolerance.relative * size + FLUSHED
     else:
         allowed = np.zeros(expected.shape) if limit is None else limit.astype(np.float64)
-    out = off > allowed
-    free = masked if tolerance is None else None
-    spared = out & free if free is not None else np.zeros(expected.shape, np.bool_)
-    out = out & ~spared
-    few = 0.0 if tolerance is None else tolerance.outliers
-    count = int(np.count_nonzero(out))
-    verdict: Verdict = "exact" if not off.any() else "within" if count <= few * out.size else "out"
-    worst, place = _worst(off, allowed, out, expected)
+    outliers = 0.0 if tolerance is None else tolerance.outliers
+    if few is not None:
+        allowed, outliers = allowed + few.more, outliers + few.outliers
+    masked = np.zeros(expected.shape, np.bool_) if masked is None else masked
+    beyond = off > allowed
+    out = beyond & ~masked
+    count, every = int(np.count_nonzero(out)), int(np.count_nonzero(beyond))
+    blunt = large_value(expected) > 0 and np.mean(allowed >= large_value(expected)) > MOST_SPARED
+    verdict: Verdict = "exact"
+    if off.any():
+        fine: Verdict = "within" if every <= MOST_SPARED * out.size and not blunt else "not-judged"
+        verdict = fine if count <= outliers * out.size else "out"
+    worst, place = _worst(off, allowed, out if count else ~masked, expected)
     said = ArrayVerdict(name=name, verdict=verdict, tier=tier, worst=worst, element=place, outside=count,
-                        masked=int(np.count_nonzero(spared)))
-    return Judged(said.model_copy(update=_values(expected, got, allowed, place)), out, allowed)
+                        masked=every - count, said=_spared(verdict, every, out.size, blunt=bool(blunt)))
+    limit = np.where(masked, np.inf, allowed)
+    return Judged(said.model_copy(update=_values(expected, got, allowed, place)), out, limit)
+
+
+def _spared(verdict: Verdict, count: int, size: int, *, blunt: bool) -> str:
+    """Return how many elements beyond their bounds a verdict that is not out spared."""
+    if verdict == "not-judged" and blunt:
+        return "bounds are as large as the array's values"
+    if verdict == "out" or not count:
+        return ""
+    return f"{count} of {size} elements spared" + (
+        ": more than can be judged by rounding" if verdict == "not-judged" else "")
 
 
 def judge_estimate(
@@ -117,18 +136,17 @@ def judge_estimate(
 
 
 def _worst(
-    off: Array, allowed: Array, out: Array, expected: Array
+    off: Array, allowed: Array, among: Array, expected: Array
 ) -> tuple[float | None, tuple[int, ...] | None]:
-    """Return the largest error over its bound, and where it is worst beside the array's large values.
+    """Return the largest error over its bound, and where it is worst beside the array's large values; of some elements.
 
-    Among the elements that are out, or else all.
+    None where there are none.
     """
-    if off.size == 0:
+    if not among.any():
         return None, None
     floor = np.finfo(np.float64).tiny
     with np.errstate(over="ignore"):
         ratio = np.where(off > 0, off / np.maximum(allowed, floor), 0.0)
-    among = out if out.any() else np.ones(out.shape, np.bool_)
     worst = float(ratio[among].max())
     beside = off / (allowed + WORTH * large_value(expected) + floor) if expected.dtype.kind == "f" else off
     at = np.unravel_index(int(np.argmax(np.where(among, beside, -1.0))), off.shape)

@@ -8,12 +8,12 @@ import pydantic
 
 from refgi.errors import InputError, shortened
 
-VERSION = "1.0.4"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
-# a case, a major changes what an array means
+VERSION = "2.0.0"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
+# a case, a major changes what an array means or its name
 KIT, CASE, RESULT = "kit.json", "manifest.json", "result.json"
 
 M = TypeVar("M", bound=pydantic.BaseModel)
-Verdict = Literal["exact", "within", "out", "invalid", "not-run"]
+Verdict = Literal["exact", "within", "not-judged", "out", "invalid", "not-run"]
 
 
 class _Strict(pydantic.BaseModel):
@@ -21,12 +21,13 @@ class _Strict(pydantic.BaseModel):
 
 
 class Tolerance(_Strict):
-    """``|got - expected| <= relative (|expected| + large)``, but for a share of outliers."""
+    """``|got - expected| <= relative (|expected| + large)``, but for masked elements and a share of outliers."""
 
     relative: float
     large: float
     outliers: float
     source: str
+    masked: str | None = None  # file of bool: elements that may differ at will, beside those of the array's own mask
 
 
 class ArrayEntry(_Strict):
@@ -110,8 +111,8 @@ class ArrayVerdict(_Strict):
     got: float | None = None
     bound: float | None = None
     outside: int = 0  # elements beyond their bound
-    masked: int = 0  # masked elements that differ
-    said: str = ""  # why it is invalid
+    masked: int = 0  # masked elements beyond their bound
+    said: str = ""  # why it is invalid or not judged; of what is within, what was spared
     damaged: bool = False  # its file cannot be read
     read: str = ""  # how it was read where it does not lie as the kit's: texels, stored depth, another order
 
@@ -148,7 +149,7 @@ class CommonCause(_Strict):
 class Finding(_Strict):
     """What is wrong with a kind of stage over all cases."""
 
-    stage: str  # without numbers of maps, levels and rounds: "rsm.flux"
+    stage: str  # without numbers of maps, levels and rounds: "rsm.map_surface"
     first: tuple[str, str]  # case and stage
     wrong: int  # verdicts that are out or invalid
     ran: int  # verdicts of it in all
@@ -166,6 +167,7 @@ class Result(_Strict):
     first: tuple[str, str] | None  # case and stage of the first wrong one
     findings: tuple[Finding, ...]
     stages: tuple[StageVerdict, ...]
+    not_judged: int = 0  # arrays beyond their bounds at more elements than a verdict can spare
     unknown: tuple[str, ...] = ()  # what the output holds that the kit does not know
     missing: tuple[str, ...] = ()  # stages that must have run and have not: CASE/STAGE
     passing: tuple[str, ...] = ()  # lines of expected failures none of whose stages fails

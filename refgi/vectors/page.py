@@ -44,7 +44,7 @@ def write_page(file: str, kit: Kit, output: Path, result: Result, asked: Asked) 
     manifests = {case.id: case for case in kit.cases(Asked(cases=tuple({one.case for one in result.stages})))}
     ran = [one for one in result.stages if one.verdict != "not-run"]
     size = 12 * sum(int(np.prod(manifests[one.case].arrays[array.name].shape)) for one in ran for array in one.arrays)
-    shown = {"out"} if size > MOST_BYTES else {"out", "within", "exact"}
+    shown = {"out"} if size > MOST_BYTES else {"out", "not-judged", "within", "exact"}
     stages: dict[str, Any] = {}
     for case in manifests.values():
         port = Port(kit, case, output, asked)

@@ -13,7 +13,7 @@ import numpy as np
 from refgi.vectors.bounds import HALF_ROUNDING, SAFETY, large_value
 from refgi.vectors.kit import Asked, DamagedError, Kit, find_array, fits, read_array
 from refgi.vectors.lists import order_of, reordered
-from refgi.vectors.manifest import CaseManifest, StageEntry
+from refgi.vectors.manifest import CaseManifest, StageEntry, Tolerance
 from refgi.vectors.spec import Array
 from refgi.vectors.storage import PACKED, PACKED_ROUNDING, can_pack, packed_steps, planes_of
 
@@ -116,10 +116,15 @@ class Port:
         read = max((self._rounding.get(one, 0.0) for one in step.reads if one not in step.exact), default=0.0)
         ratio = 0.0 if entry.half is None else read / HALF_ROUNDING
         changed = 0.0 if entry.half is None else max(entry.half.relative - (SAFETY - 1) * HALF_ROUNDING, 0.0)
-        outliers = 0.0 if entry.half is None else min(1.0, ratio * entry.half.outliers)
+        outliers = 0.0 if entry.half is None else min(1.0, ratio * self._spared_in_half(entry.half))
         self._rounding[name] = max(own, read if self.asked.chained else 0.0)
         if (own or read) and tier != "T0":
             self.few[name] = Few(steps + ratio * changed * size, outliers)
+
+    def _spared_in_half(self, half: Tolerance) -> float:
+        """Return the share of an array that half floats may move at will."""
+        masked = 0.0 if half.masked is None else float(self.kit.extra(self.case, half.masked).mean())
+        return half.outliers + masked
 
     def _in_form(self, name: str, array: Array, got: Got) -> Array:
         """Return an array as planes and in m."""

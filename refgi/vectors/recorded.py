@@ -7,8 +7,8 @@ arrays that it is handed, everything that is no array (lamps, settings, numbers)
 """
 
 import dataclasses
+import hashlib
 import inspect
-import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -17,26 +17,28 @@ import numpy as np
 
 from refgi import stages
 from refgi.diagnostics import diagnosing
-from refgi.methods import render
+from refgi.frame import Frame
+from refgi.methods import find_method, render
 from refgi.scene import Scene
 from refgi.settings import flat
+from refgi.vectors.docstrings import descriptions, field_description, returned, spec_of, summary
 from refgi.vectors.forms import described
+from refgi.vectors.forms.beside import Described
+from refgi.vectors.inputs import input_spec
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Array, Arrays, Bug, Case, Run, Spec
 
-LEFT_OUT = frozenset({"scene.load", "rays.build", "rsm.resolve", "rsm.rasterize", "lights.shares", "lights.map_flux",
-                      "cluster.occluders", "cluster.blockers",
+LEFT_OUT = frozenset({"scene.load", "rays.build", "rsm.resolve", "rsm.rasterize", "rsm.solid_angles",
+                      "rsm.lamp_irradiance", "lights.shares", "lights.map_flux", "cluster.blockers",
                       "cluster.distances"})  # parts of others, or no arrays that a port has
 GIVEN = {"geometry": "scene", "materials": "materials"}  # parameters whose arrays are the scene's
+VIEW = ("origin", "frame", "half")  # fields of a view
 TOLD_APART = 4  # distinct values that tell an array from a chance one of equal content
-UNIT = re.compile(r"(?<![\w^/])(W/m\^2/sr|W/m\^2|W/sr|W|m\^2|m|sr|rad)(?![\w^/])")
-SHAPE = re.compile(r"^\(([^()]*)\)")
-AXES = {"h": "row", "w": "column", "H": "row", "W": "column", "h x w": "row, column"}
-COLOUR = ("W", "W/m^2", "W/m^2/sr", "W/sr")
 
 
 def recorded_case(
-    id: str, scene: Scene, method: str, settings: Any = None, *, only: str = "", what: str = "", **options: Any
+    id: str, scene: Scene, method: str, settings: Any = None, *, only: str = "", what: str = "", indirect: bool = False,
+    **options: Any,
 ) -> Case:
     """Return a method on a scene, stage by stage.
 
@@ -54,6 +56,8 @@ def recorded_case(
         Start of the names of stages to keep; all where empty. What they read of others is given.
     what : str
         One line for people.
+    indirect : bool
+        End at the indirect irradiance, without direct light and receivers' lobes.
     **options : object
         As of `refgi.methods.render`: width, height, rsm_resolution, shadows.
 
@@ -62,24 +66,66 @@ def recorded_case(
     Case
         The stages in their order, as they ran in float64.
     """
-    with stages.observe(record=True) as log, diagnosing(False):
-        picture = render(scene, method, settings, dtype=np.float64, **options)
     recipe = Recipe(id, method, what or f"{method} as it ran")
     recipe.scene = scene
-    rows, columns = picture.irradiance.shape[1:]
-    recipe.facts |= {"camera": {"columns": columns, "rows": rows},
-                     "settings": {key: value for key, value in flat(settings).items()
-                                  if isinstance(value, bool | int | float | str)} if settings is not None else {}}
-    runs = [run for run in log.runs if run.status == "ran" and run.name not in LEFT_OUT and run.name.startswith(only)]
-    count = Counter(run.name for run in runs)
-    number, known = Counter[str](), _Known(recipe)
-    for run in runs:
-        outputs = dict(leaves(run.output))
-        if outputs and not known.has_all(outputs):  # a run that repeats another tells nothing
-            name = f"{run.name}{number[run.name]}" if count[run.name] > 1 else run.name
-            number[run.name] += 1
-            _add(recipe, known, name, run, outputs)
+
+    def irradiance() -> Array:
+        if not indirect:
+            return render(scene, method, settings, dtype=np.float64, **options).irradiance
+        known = find_method(method)
+        return known.function(Frame(scene, dtype=np.float64, **options), settings or known.settings())
+
+    with diagnosing(False):
+        rows, columns = record(recipe, irradiance, only).shape[1:]
+    recipe.facts |= {"camera": {"columns": columns, "rows": rows}}
+    if settings is not None:
+        recipe.facts["settings"] = plain(flat(settings))
     return recipe.case()
+
+
+def record(recipe: Recipe, call: Callable[[], Any], only: str = "") -> Any:
+    """Add each stage that runs in a call to a case, those whose names begin with `only`; return what it returns."""
+    with stages.observe(record=True, steps=True) as log:
+        value = call()
+    ran = [run for run in log.runs if run.status == "ran"]
+    outputs, first = _made(ran, only)
+    count, number = Counter(ran[k].name for k in set(first.values())), Counter[str]()
+    known, whole = _Known(recipe), list[stages.Run]()  # `whole`: those whose steps run
+    names: dict[int, dict[str, str]] = {}  # of the arrays that a run makes
+    for k, run in enumerate(ran):
+        while whole and whole[-1].depth >= run.depth:
+            known.same(whole.pop())
+        if run.steps is not None:
+            whole.append(run)
+        elif k in outputs and first[k] == k:
+            several = count[run.name] > 1 or stages.STAGES[run.name].each  # type: ignore[attr-defined]
+            name = f"{run.name}{number[run.name]}" if several else run.name
+            number[run.name] += 1
+            names[k] = _add(recipe, known, name, run, outputs[k])
+        elif k in outputs:
+            for leaf, array in outputs[k].items():
+                known.add(names[first[k]][leaf], array)
+    return value
+
+
+def _made(ran: list[stages.Run], only: str) -> tuple[dict[int, dict[str, Array]], dict[int, int]]:
+    """Return what runs made that a case keeps, by number, and of each the first that made the same of the same."""
+    made, first, seen = dict[int, dict[str, Array]](), dict[int, int](), dict[tuple[Any, ...], int]()
+    for k, run in enumerate(ran):
+        if run.name.startswith(only) and run.name not in LEFT_OUT and run.steps is None:
+            outputs = _named_outputs(inspect.unwrap(stages.STAGES[run.name]), run.output)
+            if outputs:
+                made[k] = outputs
+                read = dict(leaves(run.arguments)).values()
+                first[k] = seen.setdefault((run.name, *map(_content, read), *map(_content, outputs.values())), k)
+    return made, first
+
+
+def _named_outputs(function: Callable[..., Any], output: Any) -> dict[str, Array]:
+    names = tuple(returned(function))
+    if type(output) is tuple and len(names) == len(output) and "" not in names:
+        output = dict(zip(names, output, strict=True))
+    return dict(leaves(output))
 
 
 class _Known:
@@ -89,11 +135,15 @@ class _Known:
         self._recipe = recipe
         self._at: dict[tuple[Any, ...], str] = {}
         self._held: dict[tuple[Any, ...], str] = {}
+        self._ids: list[tuple[str, Array]] = []
+        self._views: dict[str, dict[str, Array]] = {}  # fields of views that are given
         self._kept: list[Array] = []  # so that no address is used anew
 
     def add(self, name: str, array: Array) -> None:
         """Note an array under a name; the first name stays."""
         self._kept.append(array)
+        if array.dtype == np.int32 and array.ndim == 2:
+            self._ids.append((name, array))
         self._at.setdefault(_place(array), name)
         if array.dtype.kind == "f" and len(np.unique(array)) >= TOLD_APART:
             self._held.setdefault(_content(array), name)
@@ -102,13 +152,32 @@ class _Known:
         """Return the name of an array, or of one that holds the same."""
         return self._at.get(_place(array)) or self._held.get(_content(array))
 
-    def has_all(self, arrays: Mapping[str, Array]) -> bool:
-        """Return whether all of some arrays are known."""
-        return all(self.name(array) is not None for array in arrays.values())
+    def ids(self, covered: Array) -> str | None:
+        """Return the name of triangle ids that say where there is a surface: what only asks for that reads them."""
+        return next((name for name, ids in self._ids if covered.dtype == np.bool_ and covered.shape == ids.shape
+                     and np.array_equal(covered, ids >= 0)), None)
 
-    def give(self, name: str, array: Array, about: str) -> str:
+    def view(self, leaf: str, arrays: Mapping[str, Array]) -> str | None:
+        """Return the name of a field of a view among arrays, or of where a camera is, if that view is given already."""
+        start, _, field = leaf.rpartition(".")
+        own = {"origin": arrays[leaf]} if field == "eye" else {
+            key: arrays[f"{start}.{key}"] for key in VIEW if f"{start}.{key}" in arrays} if field in VIEW else {}
+        return next((f"{name}.{'origin' if field == 'eye' else field}" for name, fields in self._views.items() if own
+                     and all(np.array_equal(fields.get(key, ()), array) for key, array in own.items())), None)
+
+    def same(self, whole: stages.Run) -> None:
+        """Note what a stage made by the names that its steps have for it."""
+        steps = dict(leaves(whole.steps))
+        for leaf, array in leaves(whole.output):
+            if leaf in steps and (name := self.name(steps[leaf])) is not None:
+                self.add(name, array)
+
+    def give(self, name: str, array: Array, spec: Spec) -> str:
         """Add an array that no stage made; return its name."""
-        self._recipe.give(name, array, spec_of(about, array, name))
+        self._recipe.give(name, array, spec)
+        start, _, field = name.rpartition(".")
+        if field in VIEW:
+            self._views.setdefault(start, {})[field] = array
         self.add(name, array)
         return name
 
@@ -118,53 +187,77 @@ def _place(array: Array) -> tuple[Any, ...]:
 
 
 def _content(array: Array) -> tuple[Any, ...]:
-    return array.shape, array.dtype.str, array.tobytes()
+    return array.shape, array.dtype.str, hashlib.blake2b(array.tobytes(), digest_size=16).digest()
 
 
-def _add(recipe: Recipe, known: _Known, name: str, run: stages.Run, outputs: Mapping[str, Array]) -> None:
-    """Add a run of a stage."""
+def _add(
+    recipe: Recipe, known: _Known, name: str, run: stages.Run, outputs: Mapping[str, Array]
+) -> dict[str, str]:
+    """Add a run of a stage; return the names of its arrays by their leaves."""
     function = inspect.unwrap(stages.STAGES[run.name])
     arguments = run.arguments or {}
-    told = descriptions(function)
+    told, made = descriptions(function), returned(function)
     reads: dict[str, str] = {}  # leaf of the parameters: array
-    for leaf, array in (item for parameter, value in arguments.items() for item in leaves(value, parameter)):
+    handed = dict(item for parameter, value in arguments.items() for item in leaves(value, parameter))
+    for leaf, array in handed.items():
         parameter, _, field = leaf.partition(".")
-        own = f"{GIVEN[parameter]}.{field}" if parameter in GIVEN else f"{name}.{leaf}"
-        reads[leaf] = known.name(array) or known.give(own, array, told.get(parameter, ""))
+        own = f"{GIVEN[parameter]}.{field}" if parameter in GIVEN else (
+            f"{name}.given.{leaf}" if leaf in outputs else f"{name}.{leaf}")
+        reads[leaf] = known.name(array) or known.ids(array) or known.view(leaf, handed) or known.give(
+            own, array, input_spec(own, arguments[parameter], handed) or spec_of(
+                field_description(arguments[parameter], field) or told.get(parameter, ""), array, own))
     writes = {leaf: f"{name}.{leaf}" if leaf else name for leaf in outputs}
     for leaf, array in outputs.items():
         known.add(writes[leaf], array)
-    specs = {writes[leaf]: spec_of(field_description(run.value, leaf) or told.get("", ""), array, leaf or name)
-             for leaf, array in outputs.items()}
-    form, bugs, exact = None, tuple[Bug, ...](), tuple[str, ...]()
-    if (beside := described(run.name, arguments)) is not None:
-        form = dataclasses.replace(
-            beside.form, reads={key: _named(reads, leaf) for key, leaf in beside.form.reads.items()},
-            writes=tuple(writes[leaf] for leaf in beside.form.writes),
-            kept={writes[leaf]: reads[read] for leaf, read in beside.form.kept.items()})
-        bugs = tuple(bug for module, rows in beside.lists for bug in form.bugs(rows, of=module))
-        exact = tuple(reads[leaf] for leaf in beside.exact)
-    recipe.add(name, _summary(function), _run(function, arguments, reads, writes), tuple(dict.fromkeys(reads.values())),
-               specs, paper=f"{function.__module__}.{function.__name__}", bugs=bugs, exact=exact,
-               variants=() if form is None else (form,))
+    beside = described(run.name, arguments)
+    specs = {writes[leaf]: dataclasses.replace(spec_of(made.get(leaf) or made.get(leaf.partition(".")[0]) or
+        field_description(run.value, leaf) or made.get("", ""), array, leaf or name), **beside.specs.get(leaf, {}))
+        for leaf, array in outputs.items()}
+    stage = run_of(function, arguments, reads, writes)
+    what, paper = summary(function)
+    recipe.add(name, what, stage, tuple(dict.fromkeys(reads.values())), specs,
+               paper=beside.paper or paper or f"{function.__module__}.{function.__name__}",
+               exact=tuple(reads[leaf] for leaf in beside.exact), **_beside(beside, stage, reads, writes))
+    numbers = plain({key: value for key, value in arguments.items() if not isinstance(value, str) or value})
+    if numbers or beside.facts:
+        recipe.facts[name] = {**numbers, **beside.facts}
+    recipe.factors |= {f"{what} of {name}": float(value) for what, value in beside.factors.items()}
+    return writes
 
 
-def _named(reads: Mapping[str, str], leaf: Any) -> Any:
-    """Return the names of arrays for those of leaves."""
-    return tuple(_named(reads, one) for one in leaf) if isinstance(leaf, tuple) else reads[leaf]
+def _beside(beside: Described, stage: Run, reads: Mapping[str, str], writes: Mapping[str, str]) -> dict[str, Any]:
+    """Return the likely bugs and other ways of a stage by the names that a case has for its arrays."""
+    bugs, variants = tuple[Bug, ...](), tuple[Run, ...]()
+    if beside.form is not None:
+        form = beside.form.named(reads, writes)
+        rows = (bug for module, name, *most in beside.lists for bug in form.bugs(name, of=module)[:most[0] if most else
+                                                                                              None])
+        bugs = tuple(bug for bug in rows if not any(word in bug.cause for word in beside.without))
+        variants = (form,)
+    return {"bugs": bugs + tuple(bug for make in beside.bugs for bug in make(stage, reads, writes)),
+            "variants": variants + tuple(make(stage, reads, writes) for make in beside.variants)}
 
 
-def _run(
+def plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values that JSON can say."""
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items() if all(
+        isinstance(one, bool | int | float | str) for one in (value if isinstance(value, tuple) else (value,)))}
+
+
+def run_of(
     function: Callable[..., Any], arguments: Mapping[str, Any], reads: Mapping[str, str], writes: Mapping[str, str]
 ) -> Run:
+    """Return a stage on arrays by name: its function with the arguments as they were, but for the arrays."""
     def run(arrays: Arrays, real: Any) -> Arrays:
         def handed(leaf: str, array: Array) -> Array:
             new = arrays[reads[leaf]]
+            if array.dtype == np.bool_ and new.dtype != np.bool_:
+                return np.ascontiguousarray(new >= 0)
             return np.ascontiguousarray(new, real if array.dtype.kind == "f" else array.dtype)
 
         changed = {key: np.dtype(real) if _is_float_type(value) else rebuilt(value, key, handed, real)
                    for key, value in arguments.items()}
-        made = dict(leaves(stages.recorded(function(**changed))))
+        made = _named_outputs(function, stages.recorded(function(**changed)))
         return {array: made[leaf] for leaf, array in writes.items()}
 
     return run
@@ -213,60 +306,3 @@ def rebuilt(value: Any, name: str, handed: Callable[[str, Array], Array], real: 
     if isinstance(value, list | tuple):
         return type(value)(parts.values())
     return dataclasses.replace(value, **parts)
-
-
-# what arrays are, from docstrings and comments
-
-
-def descriptions(function: Callable[..., Any]) -> dict[str, str]:
-    """Return what a stage's docstring says of its parameters, and under "" of what it returns: type, then text."""
-    text = inspect.cleandoc(function.__doc__ or "")
-    found: dict[str, str] = {}
-    for section in ("Parameters", "Returns"):
-        part = re.search(rf"^{section}\n-+\n(.*?)(?=^\w+\n-+\n|\Z)", text, re.MULTILINE | re.DOTALL)
-        for entry in re.split(r"\n(?=\S)", part[1].rstrip()) if part else []:
-            head, _, about = entry.partition("\n")
-            names, colon, kind = head.partition(" : ")
-            for name in names.split(", ") if colon and section == "Parameters" else [""]:
-                found[name] = f"{kind if colon else head} {' '.join(about.split())}"
-    return found
-
-
-def field_description(value: Any, leaf: str) -> str:
-    """Return the comment or docstring of a field of a value, of the last one that a dotted name goes through."""
-    said = ""
-    for field in leaf.split(".") if leaf else []:
-        of = type(value)
-        prop = getattr(of, field, None)
-        if isinstance(prop, property):
-            said = inspect.cleandoc(prop.__doc__ or "")
-        elif hasattr(of, "__annotations__") and field in of.__annotations__:
-            found = re.search(rf"^    {field}: .*?  # (.*)$", inspect.getsource(of), re.MULTILINE)
-            said = found[1] if found else said
-        value = value[int(field)] if isinstance(value, list | tuple) and field.isdigit() else (
-            value.get(field) if isinstance(value, Mapping) else getattr(value, field, None))
-    return said
-
-
-def spec_of(about: str, array: Array, name: str) -> Spec:
-    """Return what an array is, as far as a line says: its axes by the shape written there, its unit, the text."""
-    shape = SHAPE.search(about) or re.search(r"\((?:\d+|[A-Za-z]\w*'?)(?:, (?:\d+|[A-Za-z]\w*'?))*,?\)", about)
-    names = [one.strip() for one in (shape[1] if shape and shape.re is SHAPE else shape[0].strip("()") if shape else
-                                     "").split(",") if one.strip()]
-    unit = UNIT.search(about) if array.dtype.kind == "f" else None
-    axes = [_axis(one, unit[1] if unit else "") for one in names]
-    if len(axes) != array.ndim:
-        axes = [f"axis {k}" for k in range(array.ndim)]
-    twice = {one for one in axes if axes.count(one) > 1}
-    axes = [f"{one} {k}" if one in twice else one for k, one in enumerate(axes)]
-    return Spec(", ".join(axes) or "value", unit[1] if unit else "1", about.split("ndarray ")[-1] or name)
-
-
-def _axis(text: str, unit: str) -> str:
-    if text == "3":
-        return "rgb" if unit in COLOUR else "xyz"
-    return AXES.get(text, text)
-
-
-def _summary(function: Callable[..., Any]) -> str:
-    return (inspect.getdoc(function) or function.__name__).splitlines()[0].rstrip(".")

@@ -8,7 +8,7 @@ from refgi.texts import annotation, table
 from refgi.vectors.manifest import Result, StageVerdict
 from refgi.vectors.words import stories, story
 
-KINDS = ("exact", "within", "out", "invalid")
+KINDS = ("exact", "within", "not-judged", "out", "invalid")
 
 
 def report(result: Result) -> str:
@@ -42,6 +42,11 @@ def counts(result: Result) -> list[str]:
         begun = {one.case for one in result.stages if one.verdict != "not-run"}
         lines.append(f"a part alone: {idle} of {ran + idle} stages not run, {len(cases - begun)} of {len(cases)} cases "
                      "without any; --require NAME makes them count")
+    if result.not_judged:
+        arrays = [(one.case, array) for one in result.stages for array in one.arrays if array.verdict != "not-run"]
+        case, first = next(one for one in arrays if one[1].verdict == "not-judged")
+        lines.append(f"not judged: {result.not_judged} of {len(arrays)} arrays "
+                     f"({result.not_judged / len(arrays):.1%}), first {case}/{first.name}: {first.said}")
     if result.left:
         lines.append(f"stopped at the first wrong stage: {result.left} stages not looked at")
     if result.missing:
@@ -59,13 +64,16 @@ def github(result: Result) -> str:
     if result.missing:
         lines.append(annotation("refgi: required and not run", "\n".join(result.missing)))
     lines += [annotation("refgi: expected to fail and does not", line, "warning") for line in result.passing]
+    lines += [annotation("refgi: not judged", "\n".join(story(one)), "warning") for one in result.stages
+              if one.verdict == "not-judged"]
     return "\n".join([*lines, *counts(result)])
 
 
 def write_junit(file: str, result: Result) -> None:
     """Write a check as JUnit XML: a suite for each case, a test for each stage.
 
-    What does not count is skipped: expected failures, stages made from wrong inputs, what has not run unless it must.
+    What does not count is skipped: expected failures, what is not judged, stages made from wrong inputs, what has not
+    run unless it must.
 
     Raises
     ------
@@ -94,6 +102,8 @@ def _test(stage: StageVerdict, required: set[str]) -> ElementTree.Element:
         return test
     if stage.verdict == "not-run":
         tag, said = "error" if f"{stage.case}/{stage.stage}" in required else "skipped", "not run"
+    elif stage.verdict == "not-judged":
+        tag, said = "skipped", "not judged"
     elif stage.excused or stage.upstream == "dirty":
         tag, said = "skipped", stage.excused or "made from wrong inputs"
     else:
@@ -112,8 +122,8 @@ def _largest(stage: StageVerdict) -> str:
 
 
 def _remark(stage: StageVerdict) -> str:
-    masked = sum(one.masked for one in stage.arrays)
-    remarks = [f"{masked} edge elements differ"] if masked else []
+    spared = sum(one.masked + (one.outside if one.verdict != "out" else 0) for one in stage.arrays)
+    remarks = [f"{spared} elements beyond their bounds spared"] if spared else []
     remarks += ["made from wrong inputs"] if stage.upstream == "dirty" else []
     remarks += [stage.excused] if stage.excused else []
     remarks += [stage.causes[0].cause] if stage.causes else []

@@ -7,6 +7,7 @@ Empty lines and those that begin with `#` are passed over. `new` may name `array
 that take a wrong one.
 """
 
+import dataclasses
 import functools
 import types
 from collections.abc import Callable, Mapping
@@ -54,6 +55,12 @@ class Form:
         made = dict(zip(self.writes, made if isinstance(made, list | tuple) else (made,), strict=True))
         return made | {name: arrays[array] for name, array in self.kept.items()}
 
+    def named(self, reads: Mapping[str, str], writes: Mapping[str, str]) -> "Form":
+        """Return the form by the names that a case has for its arrays."""
+        return dataclasses.replace(self, reads={key: _renamed(reads, leaf) for key, leaf in self.reads.items()},
+                                   writes=tuple(writes.get(leaf, leaf) for leaf in self.writes),
+                                   kept={writes[leaf]: reads[read] for leaf, read in self.kept.items()})
+
     def bugs(self, *lists: str, of: str = "") -> tuple[Bug, ...]:
         """Return the likely bugs of some lists, in the order of the file; `of`: a literal module that it calls."""
         module = f"{PACKAGE}.{of}" if of else self.function.__module__
@@ -62,6 +69,11 @@ class Form:
 
 def _as_it_is(array: Array) -> Array:
     return array
+
+
+def _renamed(reads: Mapping[str, str], leaf: Any) -> Any:
+    return tuple(_renamed(reads, one) for one in leaf) if isinstance(leaf, tuple) else None if leaf is None else (
+        reads[leaf])
 
 
 def _read(arrays: Arrays, name: Any) -> Any:

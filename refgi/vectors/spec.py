@@ -77,7 +77,7 @@ def axes_of(axes: str) -> list[str]:
 
 
 def kind_of(stage: str) -> str:
-    """Return a stage's name without the numbers of maps, levels and rounds: rsm0.flux and rsm1.flux are one kind."""
+    """Return a stage's name without the numbers of maps, levels and rounds: rsm.map_surface0 and 1 are one kind."""
     return re.sub(r"\.?\d+", "", stage)
 
 

@@ -113,7 +113,7 @@ class Depth(NamedTuple):
 def depth_from(text: str) -> tuple[str, Depth]:
     """Return an array's name or its beginning, "" for all, and how its depth is stored.
 
-    From a text such as "ndc:0.1:100" or "rsm0=linear:0:50:16".
+    From a text such as "ndc:0.1:100" or "rsm.map_surface=linear:0:50:16".
 
     Raises
     ------

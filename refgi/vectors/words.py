@@ -29,7 +29,7 @@ def stories(result: Result) -> list[list[str]]:
 
 
 def _faults(stage: StageVerdict) -> list[str]:
-    return [f"  {fault(one)}" for one in stage.arrays if one.verdict in ("out", "invalid")]
+    return [f"  {fault(one)}" for one in stage.arrays if one.verdict in ("out", "invalid", "not-judged")]
 
 
 def _likely(cause: Cause | CommonCause, fit: str) -> str:
@@ -39,7 +39,7 @@ def _likely(cause: Cause | CommonCause, fit: str) -> str:
 
 def fault(array: ArrayVerdict) -> str:
     """Return what is wrong with an array: its worst element with both values, or why it cannot be compared."""
-    if array.verdict == "invalid":
+    if array.verdict in ("invalid", "not-judged"):
         return f"{array.name}: {array.said}"
     place = ", ".join(map(str, array.element or ()))
     values = " and ".join(f"{'NaN or infinity' if value is None else f'{value:.9g}'} {word}" for value, word in (

@@ -61,6 +61,7 @@ def test_errors_are_those_of_the_method_run_by_hand_with_each_seed(box, bench):
             assert list(run.errors[name].model_dump(exclude={"in_doubt"}).values()) == pytest.approx(list(expected))
 
 
+@pytest.mark.slow
 def test_a_method_of_the_screen_is_judged_by_what_the_camera_sees_as_well(box):
     """Each reference is the truth with the method's own limits, traced by hand; with rays it knows what blocks."""
     grid = Grid((choice("hssil", samples=64), choice("hssil", samples=64, visibility="rays")), ())
@@ -92,6 +93,7 @@ def test_the_path_tracer_comes_nearer_and_has_no_bias(bench):
         assert one.rmse == pytest.approx(math.hypot(one.spread, one.noise), rel=0.2)
 
 
+@pytest.mark.slow
 def test_the_path_tracer_s_line_estimates_what_the_reference_does(box, tmp_path):
     """Its own settings reach both, and no stop reads what the reference has left in a file."""
     with warnings.catch_warnings():

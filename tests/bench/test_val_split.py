@@ -14,7 +14,7 @@ from refgi.frame import Frame
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.truth import TruthSettings, VplSettings, vpl
-from tests.naive import clustered
+from tests.literal.whole import val as clustered
 
 # near pairs clamped at a twentieth of the scene's metre: else the error of sampling is that of a pixel beside a light
 # the scale of depths that the limits below were measured with
@@ -53,6 +53,7 @@ def rms(values):
     return math.sqrt((values**2).mean())
 
 
+@pytest.mark.slow("cornell_sphere:faces=80")
 @pytest.mark.feature("VAL-27", "REF-15")
 @pytest.mark.parametrize("name", [pytest.param("cornell_box", marks=pytest.mark.slow),
                                   "cornell_sphere:faces=80"])

@@ -95,7 +95,7 @@ def test_a_log_that_does_not_count_holds_no_counts():
 
 def test_a_cut_leaves_out_pairs_as_its_fragments_are_counted(box, frame, shown, shining):
     one = choice("sii", f"lights={LIGHTS}", "clamp=none", "cut=relative", "cut.share=0.5")
-    splat = recorded(frame, one, "sii.splat").inputs
+    splat = recorded(frame, one, "sii.splat").arguments
     counted = fragments(splat["receivers"], splat["lights"], splat["settings"], splat["footprint"], splat["projection"])
     lost = shining * shown  # of the sample by which the cut's loss is known
     assert taken(box, "sii", *one.changes).pairs - lost == counted.evaluated < 0.5 * shining * shown
@@ -119,7 +119,7 @@ def test_levels_take_their_samples_at_each_texel(box):
 
 def test_subsplats_take_each_light(box, frame):
     one = choice("multires", f"lights={LIGHTS}", "clamp=none")
-    inputs = recorded(frame, one, "multires.evaluate").inputs
+    inputs = recorded(frame, one, "multires.evaluate").arguments
     expected = inputs["points"].shape[1] * np.count_nonzero(inputs["lights"].flux.any(axis=0))
     assert taken(box, "multires", *one.changes).pairs == expected
 

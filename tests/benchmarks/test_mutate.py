@@ -121,6 +121,7 @@ def test_every_operator_has_an_example():
     assert EXAMPLES.keys() == {*OPERATORS, "swap", "setting"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("operator", EXAMPLES)
 def test_an_operator_changes_one_line_of_a_program(toy, operator):
     line, expected = EXAMPLES[operator]
@@ -161,6 +162,7 @@ def test_kinds_and_operators_take_turns(toy):
     assert len(set(wiring[:5])) == 5
 
 
+@pytest.mark.slow
 def test_faults_of_the_sources_are_programs():
     faults = drawn(all_faults(REFGI, ["refgi/lights"]), 0)
     assert {fault.operator for fault in faults} == EXAMPLES.keys()
@@ -174,6 +176,7 @@ def test_the_tests_of_a_file():
     assert "tests/splat/multires/test_multires.py" in selected(REFGI, "refgi/lights/selection.py")  # imports it
 
 
+@pytest.mark.slow
 def test_what_becomes_of_faults(toy, tmp_path, monkeypatch):
     monkeypatch.setattr(baseline, "COMPILING", 4.0)  # s
     (toy.root / "toy/lamps/lamp.py").write_text(LAMP.replace(IF_FAR, LOOP + IF_FAR))
@@ -196,12 +199,14 @@ def test_what_is_no_program_is_drawn_again(toy, tmp_path):
     assert [result.outcome for result in taken.results] == [INVALID, CAUGHT]
 
 
+@pytest.mark.slow
 def test_a_test_that_fails_without_a_fault_is_an_error(toy, tmp_path):
     (toy.root / "tests/lamps/test_lamp.py").write_text("def test_light():\n    assert False\n")
     with pytest.raises(InputError, match=r"fail without a fault.*test_light"):
         outcomes(toy, tmp_path / "out", faults_to(toy, "return settings.power"))
 
 
+@pytest.mark.slow
 def test_results_hold_while_what_they_rest_on_is_the_same(toy, tmp_path, monkeypatch):
     caught, survivor = "return settings.power", "return 3.0 * falloff(distance)"
     faults, ran = faults_to(toy, caught, survivor), []
@@ -219,6 +224,7 @@ def test_results_hold_while_what_they_rest_on_is_the_same(toy, tmp_path, monkeyp
     assert len(ran) == 1
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on(toy, tmp_path):
     before, out = content_of(toy), tmp_path / "out"
     script = (f"import sys; sys.path.insert(0, {str(ROOT)!r})\n"
@@ -243,6 +249,7 @@ def test_a_killed_run_goes_on(toy, tmp_path):
     assert content_of(toy) == before
 
 
+@pytest.mark.slow
 def test_the_report_has_score_and_survivors(toy, tmp_path, capsys):
     options = ["--count", "20", "--kind", "wiring", "--path", "toy/lamps/lamp.py", "--out", str(tmp_path)]
     assert runner.main(options, toy) == 1

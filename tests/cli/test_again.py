@@ -19,7 +19,7 @@ from refgi.scene import load_scene
 from refgi.settings import flat, of, replaced
 from refgi.sssil.hssil import hssil
 from refgi.sssil.settings import HssilSettings, TemporalSettings
-from tests.naive.temporal import filtered
+from tests.literal.whole.temporal import filtered
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 TINY = ["--size", "12x10", "--rsm-resolution", "16"]

@@ -74,6 +74,7 @@ def test_errors_are_split_where_asked_for(tmp_path):
     assert html.count("<details><summary>gather") == 2
 
 
+@pytest.mark.slow
 def test_a_split_of_blended_frames_has_a_temporal_part(tmp_path):
     (tmp_path / "grid.toml").write_text("[hssil]\nlevels = [2]\n[gather]\nsamples = [20]\n")
     done = run("--grid", tmp_path / "grid.toml", *SMALL, "--split", "--split-frames", "3", "--out", tmp_path / "out")
@@ -94,6 +95,7 @@ def test_a_split_that_fails_is_told(tmp_path, grid, monkeypatch):
     assert "gather comes to" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_choice_that_gives_no_picture_is_told(tmp_path, grid, monkeypatch):
     timed = measure.timed
 

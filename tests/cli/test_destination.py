@@ -42,6 +42,7 @@ def refused(result, *words):
     return True
 
 
+@pytest.mark.slow("compare")
 @pytest.mark.parametrize("verb", VERBS)
 def test_missing_folders_are_made_one_deep_or_where_one_says_so(verb):
     arguments, name = VERBS[verb]
@@ -53,6 +54,7 @@ def test_missing_folders_are_made_one_deep_or_where_one_says_so(verb):
     assert Path("c", name).is_file()
 
 
+@pytest.mark.slow("compare")
 @pytest.mark.parametrize("verb", VERBS)
 def test_a_file_of_another_program_is_overwritten_by_force_alone(verb):
     arguments, name = VERBS[verb]

@@ -11,8 +11,7 @@ from refgi.image import read_exr
 from refgi.literal import direct, pairs
 from refgi.vectors.edits import edited
 
-SMALL = ["cornell_box", "--size", "20x15", "--rsm-resolution", "24", "--eye", "0.35,0.3,-0.75", "--up", "0.1,1,0.05",
-         "--set"]  # askew: of walls that face the camera, slopes of 0 are decided by rounding
+SMALL = ["cornell_box", "--size", "20x15", "--rsm-resolution", "24", "--set"]
 SETTINGS = {"sii": ["lights=40"], "hssil": ["samples=12"]}
 
 

@@ -28,6 +28,7 @@ def test_equal_pictures_differ_by_nothing(picture, everywhere):
     assert got.error.shape == (24, 32)
 
 
+@pytest.mark.slow
 def test_a_larger_error_is_seen_more(picture, everywhere):
     means = [flip(picture * factor, picture, everywhere).mean for factor in (1.1, 1.5, 3.0)]
     assert 0 < means[0] < means[1] < means[2] <= 1

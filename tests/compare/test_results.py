@@ -270,6 +270,7 @@ while True:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="SIGKILL is POSIX")
 def test_a_kill_leaves_whole_files_or_none(tmp_path, evidence):
     """Killed at five moments while it writes a comparison over and over: each file by its own name is whole."""

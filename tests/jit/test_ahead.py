@@ -38,6 +38,7 @@ def test_every_line_of_the_list_is_a_kernel_and_its_types():
     assert len(read_list()) == len(LIST.read_text(encoding="utf-8").splitlines())
 
 
+@pytest.mark.slow("gather", "multires", "truth", "val", "vpl")
 @pytest.mark.parametrize("method", list(BUILT_IN))
 def test_the_list_is_what_methods_call(method):
     """After changes of kernels: python -m benchmarks.signatures."""

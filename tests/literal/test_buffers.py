@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from refgi.literal.buffers import image_points, rays, surface, visible_triangles
+from refgi.literal.colours import tint
 from refgi.rays import Tracer
 from refgi.rsm.raster.projection import view_frame
 from refgi.scene import Geometry
@@ -65,3 +66,14 @@ def test_a_floor_seen_from_above_by_hand():
     mean = np.array([0.6, 0.8 + 1 + 1, 0]) / 3  # (0, 0, -3) is the triangle's centre
     assert normal[:, 0, 0] == pytest.approx(mean / np.linalg.norm(mean))
     assert albedo[:, 0, 0] == pytest.approx([0.2, 0.3, 0.4])
+
+
+def test_vertex_colours_are_linear_within_a_triangle():
+    """Closed form: a corner has its own colour, the middle of an edge the mean of two, the centroid that of three."""
+    vertices, faces = np.array([[0.0, 0, 0], [4, 0, 1], [0, 3, 2]]), np.array([[0, 1, 2]])
+    colours = np.array([[[1.0, 0, 0], [0, 1, 0], [0.2, 0.4, 0.9]]])
+    places = np.stack([vertices[0], vertices[2], (vertices[1] + vertices[2]) / 2, vertices.mean(axis=0), vertices[1]])
+    triangle_id = np.array([[0, 0, 0, 0, -1]])
+    expected = [colours[0, 0], colours[0, 2], colours[0, 1:].mean(axis=0), colours[0].mean(axis=0), np.zeros(3)]
+    np.testing.assert_allclose(tint(triangle_id, places.T[:, None], vertices, faces, colours)[:, 0].T, expected,
+                               atol=1e-15)

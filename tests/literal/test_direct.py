@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refgi.literal.buffers import surface, visible_triangles
-from refgi.literal.direct import direct_irradiance, plane_bias, shadow_map, shadow_rays
+from refgi.literal.direct import direct_irradiance, emission, leaving_radiance, plane_bias, shadow_map, shadow_rays
 from refgi.rays import Tracer
 from refgi.rsm.raster.projection import cube_projection, directional_projection
 from refgi.scene import DirectionalLight, Geometry, PointLight
@@ -89,3 +89,12 @@ def test_half_way_between_the_cosines_of_its_cones_a_spot_shines_with_half_its_i
                               (np.ones(3),), (place,), (np.array([0.0, -1, 0]),), (np.array([0.2, 0.8]),),
                               ("smoothstep",))
     assert total[0, 0, 0] == pytest.approx(0.5 * math.cos(angle) ** 3)  # d = 1 / cos
+
+
+def test_irradiance_of_pi_leaves_as_the_albedo_beside_what_is_emitted():
+    irradiance, albedo = np.full((3, 1, 2), math.pi), np.array([0.5, 0.25, 0.0]).reshape(3, 1, 1) + np.zeros((3, 1, 2))
+    own = emission(np.array([[1, -1]]), np.array([0, 2]), np.array([[9.0, 9, 9], [8, 8, 8], [1, 2, 3]]))
+    np.testing.assert_array_equal(own[:, 0], [[1, 0], [2, 0], [3, 0]])
+    got = leaving_radiance(irradiance, 2 * irradiance, albedo=albedo, emission=own)
+    np.testing.assert_allclose(got[:, 0], [[2.5, 1.5], [2.75, 0.75], [3.0, 0.0]])
+    np.testing.assert_allclose(leaving_radiance(irradiance, albedo=albedo), albedo)

@@ -84,13 +84,14 @@ def test_a_linear_picture_is_interpolated_on_a_plane_and_kept_across_an_edge():
     row, column = np.mgrid[:12, :16].astype(float)
     position, ids = np.stack([column, row, 0 * row]), np.zeros((12, 16), int)
     normal = np.where(column < 8, 1.0, 0.0) * UP[:, :, None] + np.where(column < 8, 0.0, 1.0) * UP[::-1, :, None]
-    light = np.stack([row + 2 * column, row, column])
-    chosen, made = interpolate(position, np.ones((1, 12, 16)) * UP[:, :, None], ids, light, 4, 0.9, 1.0)
+    light, box = np.stack([row + 2 * column, row, column]), (np.zeros(3), np.array([15.0, 11.0, 0.0]))
+    chosen, made = interpolate(position, np.ones((1, 12, 16)) * UP[:, :, None], ids, light, box, 4, 0.9, 1.0)
     inside = np.s_[:, 1:10, 2:14]  # between the outermost coarse pixels
     np.testing.assert_allclose(made[inside], light[inside])
     assert chosen.all()
-    chosen, made = interpolate(position, normal, ids, np.where(column < 8, 1.0, 2.0) * np.ones((3, 1, 1)), 4, 0.9, 1.0)
-    np.testing.assert_allclose(made, np.where(column < 8, 1.0, 2.0) * np.ones((3, 1, 1)))
+    halves = np.where(column < 8, 1.0, 2.0) * np.ones((3, 1, 1))
+    chosen, made = interpolate(position, normal, ids, halves, box, 4, 0.9, 1.0)
+    np.testing.assert_allclose(made, halves)
     assert not chosen[5, [7, 8]].any()
-    chosen, _ = interpolate(position, normal, ids, light, 4, -1.0, 1e-6)
+    chosen, _ = interpolate(position, normal, ids, light, box, 4, -1.0, 1e-6)
     assert chosen.sum() == 16  # the coarse pixels alone

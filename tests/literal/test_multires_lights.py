@@ -57,7 +57,8 @@ def test_lists_are_the_published_ones(relative, finest):
     light = np.cumsum(rng.random((3, 3, 11, 14)) < 0.06, axis=3) * rng.random((3, 3, 1, 1))  # steps along rows
     pixels = multires.representatives(np.where(shown, 0, -1), top)
     samples = [np.where(pixel >= 0, light.reshape(3, 3, -1)[:, :, pixel], 0) for pixel in pixels]
-    splits = multires_lights.splits(pixels, samples, finest, threshold, relative)
+    splits = multires_lights.splits(pixels, samples, finest, threshold,
+                                    "relative" if relative else "absolute")
     first, level, row, column, values = multires_lights.lists(pixels, samples, splits)
     for k in range(3):
         expected = per_light.subsplats(shown, lambda at, k=k: light[k][:, *at], top, finest,
@@ -85,3 +86,14 @@ def test_a_picture_of_half_the_size_by_hand():
     both, left = np.array([[True, True]]), np.array([[True, False]])
     assert multires_lights.halved(light, triangle_id, both)[2].tolist() == [[3, 3]]  # the right one as its neighbour
     assert multires_lights.halved(light, triangle_id, left)[2].tolist() == [[3, 0]]
+
+
+def test_subsplats_as_a_picture_of_one_row():
+    """Property: a row holds the pixels that stand for subsplats, in their order; light is a row without its axis."""
+    random = np.random.default_rng(4)
+    position, normal = random.normal(size=(2, 3, 5, 7))
+    triangle_id, pixel = np.arange(35).reshape(5, 7) % 4, np.array([33, 2, 17])
+    place, up, triangle = multires_lights.one_row(position, normal, triangle_id, pixel)
+    for got, plane in ((place, position), (up, normal), (triangle[None], triangle_id[None])):
+        assert np.array_equal(got[:, 0], np.stack([plane[:, i // 7, i % 7] for i in pixel], axis=1))
+    assert np.array_equal(multires_lights.of_row(place), place.reshape(3, 3))

@@ -125,6 +125,17 @@ def test_a_pixel_that_no_texel_is_like_takes_the_nearest_in_depth():
     np.testing.assert_array_equal(found, 5.0)
 
 
+def test_of_texels_as_near_in_depth_the_closest_is_taken():
+    """A sliver of one pixel, unlike all texels: by rows first, each row's own column, then the one beside it."""
+    depth, normal = np.full((6, 6), 2.0), np.array([0.0, 0, 1])[:, None, None] * np.ones((3, 6, 6))
+    texels, other = np.arange(9.0).reshape(3, 3) * np.ones((3, 1, 1)), -normal[:, ::2, ::2]
+    for missing, expected in (((), 4), ([4], 5), ([4, 5], 3), ([3, 4, 5], 1), ([0, 1, 2, 3, 4, 5], 7)):
+        below = np.full(9, 4.0)
+        below[list(missing)] = np.inf
+        found = literal.upsample(texels, below.reshape(3, 3), other, depth, normal, 2, 0.02, 8.0, True)
+        assert found[0, 2, 3] == expected  # an upper right pixel of the texel in the middle
+
+
 @pytest.mark.parametrize(("size", "window"), [(3, [0, 1, 1, 1, 0]), (4, [0.5, 1, 1, 1, 0.5])])
 def test_a_window_by_hand(size, window):
     """One bright texel of a wall spreads over a box about it, along both axes."""

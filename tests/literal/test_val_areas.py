@@ -9,17 +9,18 @@ from scipy.cluster.vq import kmeans2
 from refgi.literal.val_areas import (
     areas,
     dithered,
-    extents,
     facing,
+    illuminated_extent,
     interleaving,
-    kmeans,
     kmeans_assign,
     kmeans_each,
     kmeans_means,
+    kmeans_rounds,
     kmeans_start,
     map_frames,
     parts,
     shadowed,
+    visible_extent,
 )
 
 CLOSE = 1e-12
@@ -32,10 +33,9 @@ def test_boxes_hold_what_is_seen_and_what_reflects():
     dark, lit = np.zeros((3, 1, 2)), np.array([[[0.0, 0]], [[0, 0]], [[0, 1]]])
     places = [np.array([[[9.0, -4]], [[9, 6]], [[9, 2]]]), np.array([[[7.0, 8]], [[7, 8]], [[7, 8]]])]
     ids = np.array([[0, 4, -1]])
-    visible, illuminated = extents(position, ids, places, [lit, lit])
-    assert visible.tolist() == [[1, -1, 0], [2, 3, 5]]
-    assert illuminated.tolist() == [[-4, 6, 2], [8, 8, 8]]
-    assert extents(position, ids, places, [lit, dark], [dark, lit[..., ::-1]])[1].tolist() == [[-4, 6, 2], [7, 7, 7]]
+    boxes = (visible_extent(position, ids), illuminated_extent(places, [lit, lit]),
+             illuminated_extent(places, [lit, dark], [dark, lit[..., ::-1]]))
+    assert np.array(boxes).tolist() == [[[1, -1, 0], [2, 3, 5]], [[-4, 6, 2], [8, 8, 8]], [[-4, 6, 2], [7, 7, 7]]]
 
 
 def test_clusters_begin_at_every_nth_light():
@@ -70,7 +70,8 @@ def test_rounds_without_normals_are_those_of_scipy():
     random = np.random.default_rng(3)
     place, normal = random.random((3, 200)), random.normal(size=(3, 200))
     center, axis = kmeans_start(place, normal, 7)
-    center, axis, of = kmeans(place, normal, np.array([[0.0] * 3, [1] * 3]), center, axis, "squared", 1.0, 0.0, 200)
+    box = np.array([[0.0] * 3, [1] * 3])
+    center, axis, of = kmeans_rounds(place, normal, box, center, axis, "squared", 1.0, 0.0, 200)
     expected, label = kmeans2(place.T, place.T[[k * 200 // 7 for k in range(7)]], iter=200, minit="matrix")
     assert (of == label).all()
     np.testing.assert_allclose(center.T, expected, atol=CLOSE)

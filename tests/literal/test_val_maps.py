@@ -9,15 +9,16 @@ import pytest
 from refgi.literal.val_areas import map_frames
 from refgi.literal.val_maps import (
     basis,
-    blockers,
     depth_maps,
-    depth_maps_behind,
     depth_scale,
     direction,
+    frames_behind,
     map_depths,
     map_ranges,
     map_views,
+    occluders,
     rounded_level,
+    seen_vertices,
     texel_centers,
 )
 from refgi.rays import Tracer
@@ -43,9 +44,11 @@ def test_walls_do_not_block_and_what_stands_in_a_room_does():
     vertices = np.array([[-1.0, 0, -1], [3, 0, -1], [-1, 0, 3], [0, 0.5, 0], [1, 0.5, 0], [0, 0.5, 1], [0, -2, 0],
                          [1, -2, 0], [0, -2, 1], [0, 0, 0], [1, 0, 0], [0, 0, 1]])
     faces, box = np.arange(12).reshape(4, 3), np.array([[-1.0, 0, -1], [3, 1, 3]])
-    given = vertices, faces, np.array([[0, 0, -1]]), np.array([[0.2], [1.0], [0.2]]), box, box
-    assert blockers(*given, touching=False).tolist() == [False, True, False, False]
-    assert blockers(*given, touching=True).tolist() == [True, True, False, True]
+    seen = seen_vertices(vertices, faces, np.array([[0, 0, -1]]))
+    assert seen.tolist() == vertices[:3].tolist()
+    given = vertices, faces, seen, np.array([[0.2], [1.0], [0.2]]), box, box
+    assert occluders(*given, touching=False).tolist() == [False, True, False, False]
+    assert occluders(*given, touching=True).tolist() == [True, True, False, True]
 
 
 def test_texels_cover_the_hemisphere():
@@ -74,8 +77,8 @@ def leaves():
 def test_distances_are_those_of_rays(behind, ball):
     vertices, faces, blocks, center, frame = leaves()
     members = np.array([3, 1, 0])
-    made = (depth_maps_behind if behind else depth_maps)(
-        vertices, faces, blocks, center, frame, np.full(3, ball), members, TEXELS)
+    made = depth_maps(vertices, faces, blocks, center, frames_behind(frame) if behind else frame, np.full(3, ball),
+                      members, TEXELS)
     tracer = Tracer(Geometry(vertices, faces[blocks], np.zeros(int(blocks.sum()), np.int32)))
     s, t = texel_centers(made)
     inside, toward = s * s + t * t <= 1, direction(s, t)

@@ -5,18 +5,18 @@ import math
 import numpy as np
 import pytest
 
-from refgi.literal.val_maps import direction, texel_centers
+from refgi.literal.val_maps import direction, frames_behind, texel_centers
 from refgi.literal.val_visibility import (
     depth_tests,
     disc,
     half_angle,
+    of_both,
     pcss,
     pcss_penumbra,
     penumbra_angle,
     plane_distance,
     search,
     square,
-    two_maps,
     widest_angle,
 )
 from refgi.rays import Tracer
@@ -145,8 +145,10 @@ def test_the_map_behind_is_turned_round():
     empty, behind = np.full((1, 64, 64), np.inf), plate_map(64, 1.0, np.inf)  # right of the map behind: -x
     x = pixels([[-1.0, 1.0, -1.0], [0.3, 0.3, 0.3], [-3.0, -3.0, 3.0]])
     up = pixels([[0.0, 0, 0], [0, 0, 0], [1.0, 1, -1]])
-    given = covered(x[:, 0]), up, empty, behind, *ONE, np.ones(1), np.full(1, np.inf)
-    assert two_maps(x, *given)[0, 0].tolist() == [0, 1, 1]
+    center, frame = ONE
+    ahead, back = (depth_tests(x, covered(x[:, 0]), up, depth, center, axes, np.ones(1), depth.min(axis=(1, 2)))
+                   for depth, axes in ((empty, frame), (behind, frames_behind(frame))))
+    assert of_both(ahead, back)[0, 0].tolist() == [0, 1, 1]
 
 
 def edge_of_spheres():

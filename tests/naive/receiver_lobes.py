@@ -10,13 +10,11 @@ import math
 import numpy as np
 
 from refgi.literal.light_flux import spot_share
+from tests.literal.whole.pairs import irradiance_of
+from tests.literal.whole.vpl import sender_faces
 from tests.naive.crossings import LIFT, corners_of, crossings, face_normals, free
-from tests.naive.pair_term import parts
 from tests.naive.radiometry import gauss_legendre, lobe_fraction
 from tests.naive.truth import nearest_hits
-from tests.naive.vpl import sender_faces
-
-ROWS = 64  # receivers whose pairs are held at a time
 
 
 def unit(vectors):
@@ -119,25 +117,16 @@ def of_lights(frame, lights, pairs, visibility=False):
     w_o = unit(np.asarray(frame.scene.camera.eye) - x)
     specular, exponent = np.array([m.specular for m in materials]), np.array([m.exponent for m in materials])
     up = sender_faces(frame, lights) if visibility else None
-    for part in parts(lights, pairs):
-        away = part.position - x
-        r2 = (away**2).sum(axis=1)
-        w_i = away / np.sqrt(r2)[:, None]
-        leaving = np.maximum(0, -(w_i @ part.normal)) / math.pi if part.exponent is None else _lobe(part, -w_i)
-        term = brdf(exponent, unit(normal), w_i, w_o) * leaving * np.maximum(0, (normal * w_i).sum(axis=1)) / r2
-        counts = term > 0
+    light = sum(irradiance_of(x.T, normal.T, lights, pairs))
+    for k, place in enumerate((lights.position - pairs.offset * lights.normal).T):
+        away = place - x
+        term = brdf(exponent, unit(normal), unit(away), w_o) * light[:, k]
         if visibility:
-            counts &= ((away * facing).sum(axis=1) > 0) & (away @ up[part.light] < 0)
-            counts[counts] = free(corners_of(geometry), x[counts] + LIFT * facing[counts],
-                                  part.position + LIFT * up[part.light])
-        result[:, *at] += np.where(counts, term, 0.0) * np.outer(part.flux, np.ones(len(x))) * specular.T
+            counts = ((away * facing).sum(axis=1) > 0) & (away @ up[k] < 0) & term.any(axis=0)
+            counts[counts] = free(corners_of(geometry), x[counts] + LIFT * facing[counts], place + LIFT * up[k])
+            term = term * counts
+        result[:, *at] += term * specular.T
     return result
-
-
-def _lobe(part, w):
-    share = lobe_fraction(math.acos(min(1.0, float(part.normal @ part.axis))), part.exponent)
-    lobe = (part.exponent + 1) / (2 * math.pi * share) * power(unit(np.asarray(part.axis)), w, part.exponent)
-    return np.where(w @ part.normal > 0, lobe, 0.0)
 
 
 def from_mirror_side(scene, x, normal, w_o, material, light, count, random):

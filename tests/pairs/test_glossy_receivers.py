@@ -241,13 +241,14 @@ def test_a_range_weighs_pairs_by_what_arrives_at_most(outside, rng):
     square, xi = rng.uniform(0.2, 1, 60), rng.uniform(0.3, 1, 60)
     reach = Range(np.append(square, 1.0), np.append(xi, 1.0), outside), Range(square, xi, outside)
 
-    def factor(part, x):
-        away = x - part.position
-        r2 = (away**2).sum(axis=1)
-        cosine = np.maximum(0, away @ (part.axis if part.exponent else part.normal)) / np.sqrt(r2)
-        above = away @ part.normal > 0
-        b = square[part.xi] * np.where(above, cosine ** (part.exponent or 1.0), 0) / r2
-        kept = np.where(b >= xi[part.xi], np.maximum(1, 1 / np.maximum(b, 1e-300)), 0.0)
+    def factor(part):
+        away = points.position[:, None].astype(float) - lights.position[..., None]
+        r2, exponent = (away**2).sum(axis=0), lights.lobe_exponent[:, None] if part else 1.0
+        axis = (lights.lobe_axis if part else lights.normal)[..., None]
+        cosine = np.maximum(0, (away * axis).sum(axis=0)) / np.sqrt(r2)
+        above = (away * lights.normal[..., None]).sum(axis=0) > 0
+        b = square[:, None] * np.where(above, cosine**exponent, 0) / r2
+        kept = np.where(b >= xi[:, None], np.maximum(1, 1 / np.maximum(b, 1e-300)), 0.0)
         return 1 - kept if outside else kept
 
     assert (lights.lobe_exponent > 0).all()

@@ -58,6 +58,7 @@ def test_on_axis_figures(evidence):
     evidence("on axis: " + ", ".join(f"{e:.4f} of the pixel light at {d} r" for d, e in found.items()))
 
 
+@pytest.mark.slow("float64")
 @pytest.mark.parametrize("real", [np.float32, np.float64])
 @pytest.mark.feature("REF-09")
 def test_cones_are_integrated(real, evidence):

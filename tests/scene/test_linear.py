@@ -110,6 +110,7 @@ MORE = (many_objects, chained_nodes, unknown_materials, flat_nodes, rootless_nod
         repeated_keys, missing_meshes)
 
 
+@pytest.mark.slow("own_meshes")
 @pytest.mark.parametrize("make", [*MAKERS, *(pytest.param(make, marks=pytest.mark.slow) for make in MORE)],
                          ids=lambda make: make.__name__)
 def test_time_grows_with_the_file(tmp_path: Path, make: Callable[[Path, int], Path]) -> None:

@@ -40,6 +40,7 @@ FIRST_ORDER = 1.5
 SIZES = {"none": (16, 32, 64), "rays": (16, 32)}  # a ray for each pair: the fourth power of the size
 
 
+@pytest.mark.slow("True-none")
 @pytest.mark.feature("HSS-03")
 @pytest.mark.parametrize("visibility", ["none", "rays"])
 @pytest.mark.parametrize("blocker", [False, True])

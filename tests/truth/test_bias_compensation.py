@@ -60,6 +60,7 @@ def parts(bound):
     return found, footprint(SUN, room.geometry, GRID)[0]
 
 
+@pytest.mark.slow("0.003")
 @pytest.mark.feature("REF-10")
 @pytest.mark.parametrize("bound", [0.003, 0.03, 0.3])
 def test_bounded_light_and_short_rays_are_the_two_parts_of_the_integral(bound, evidence):

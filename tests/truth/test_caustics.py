@@ -42,6 +42,7 @@ def test_a_mirror_acts_as_an_image_of_the_light(evidence):
     assert (result.mean[:, outside] == 0).all()
 
 
+@pytest.mark.slow
 def test_without_the_option_the_lobe_is_an_emitter_like_any_other():
     light = SpotLight((0.0, 1.0, 0.0), (1.0, -0.35, 0.0), math.radians(25), math.radians(25), (3.0, 2.0, 1.0))
     blunt = dataclasses.replace(MIRROR, exponent=150.0)

@@ -84,6 +84,7 @@ def in_sphere(found, settings, count=400):
 FACES, POLYHEDRON = 200_000, 1.2e-4
 
 
+@pytest.mark.slow("combined")
 @pytest.mark.feature("REF-06")
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_integrating_sphere(estimator, evidence):
@@ -110,6 +111,7 @@ def test_bounces_in_a_sphere_are_a_geometric_series(bounces, evidence):
     evidence(f"{bounces} bounces: relative error {error:.1e}, within {SIGMAS:g} standard errors")
 
 
+@pytest.mark.slow("several")
 @pytest.mark.parametrize("lights", ["spot", "point", "several"])
 def test_estimators_agree(lights, evidence):
     spot = SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.3, 0.6, (2.0, 1.5, 1.0))
@@ -156,6 +158,7 @@ def test_estimators_agree_without_visibility(evidence):
     assert agree(corner_room(spot), evidence, "visibility=False", visibility=False) < SIGMAS + 1
 
 
+@pytest.mark.slow("True-smoothstep")
 @pytest.mark.parametrize(("blocked", "falloff"), [(True, "smoothstep"), (False, "smoothstep"), (True, "squared_ramp")])
 def test_the_naive_twin(blocked, falloff, evidence):
     spot = SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.3, 0.6, (2.0, 1.5, 1.0), falloff)

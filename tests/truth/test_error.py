@@ -50,6 +50,7 @@ STUDENT = np.array([0.674, 0.945, 0.994])  # shares within 1, 2, 3 sigma at 29 d
 SCATTER = {"combined": (0.06, 0.03, 0.008), "hemisphere": (0.06, 0.04, 0.03), "light": (0.06, 0.04, 0.03)}
 
 
+@pytest.mark.slow("light")
 @pytest.mark.parametrize("estimator", ["combined", "hemisphere", "light"])
 def test_pixels_lie_within_their_standard_error(frame, long_run, estimator, evidence):
     settings = TruthSettings(estimator=estimator, directions=8 if estimator != "light" else None)

@@ -47,6 +47,7 @@ def test_nothing_leaves_through_the_back_of_a_face_that_hides(estimator, visibil
         assert result.mean.any() == lit
 
 
+@pytest.mark.slow("0.002", "0.1")
 @pytest.mark.parametrize("bound", [0.002, 0.01, 0.1])
 def test_lobes_beyond_the_bound_are_left_to_the_hemisphere(bound, evidence):
     """A lobe exceeds the bound where a diffuse surface cannot: E by NumPy, at the place that a mirror would light."""

@@ -42,6 +42,7 @@ def test_no_value_is_lost_on_a_glossy_sphere(faces, exponent, caustics):
     assert result.mean.max() < 100  # W/m^2; the lamp gives the floor 1
 
 
+@pytest.mark.slow("1000000.0")
 @pytest.mark.parametrize("exponent", [1e6, 1e12])
 def test_the_sharpest_lobes_are_mirrors(exponent, evidence):
     """Mean of the picture against mirrors: a reflection of light in NumPy, and the diffuse part alone."""

@@ -19,7 +19,7 @@ from refgi.scene import Geometry, load_scene
 from refgi.settings import of
 from refgi.truth import VplSettings, vpl
 from refgi.truth.imperfect import Imperfect, ImperfectDepth, fill_hidden, imperfect_maps
-from tests.naive import vpl as naive
+from tests.literal.whole import vpl as naive
 
 SINGLE = 1e-6  # maps are float32
 ON_BORDERS = 1e-4  # of the pairs: where a place lies between two texels
@@ -53,7 +53,7 @@ def test_what_is_hidden_is_that_of_the_literal_text(frame, lights):
     at = [part[:, None].astype(float) for part in (pairs.to.position, pairs.to.normal)]
     seen = looked_up(*at, np.zeros((1, len(pairs.to.pixel)), int), pairs.to.facing[:, None].astype(float),
                      pairs.senders.position, pairs.senders.normal, map_frames(pairs.senders.normal), pairs.maps.depth,
-                     np.array([pairs.maps.radius]), 0.5)[:, 0].T
+                     pairs.maps.radius, 0.5)[:, 0].T
     sends = pairs.reach > 0
     assert 0.1 < seen[sends].mean() < 0.9
     assert np.mean(seen[sends] == pairs.hidden[sends]) < ON_BORDERS

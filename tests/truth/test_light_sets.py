@@ -51,6 +51,7 @@ def test_every_point_of_a_set_is_uniform_in_its_cell():
     assert (chi2 < 44).all()  # 15 degrees of freedom: beyond 44 once in 10,000
 
 
+@pytest.mark.slow
 def test_points_follow_the_density():
     density = density_of(BUMP, 0.3)
     points, weight = warp(density, stratified_sets(512, 1, np.random.default_rng(6))[0])
@@ -128,6 +129,7 @@ def test_sets_hold_diffuse_parts_in_whole_blocks():
 VARIANTS = ({"interleave": 1, "uniform_share": 1.0}, {"interleave": 4, "uniform_share": 0.1}, {"interleave": 3})
 
 
+@pytest.mark.slow("spot")
 @pytest.mark.parametrize("lights", ["spot", pytest.param("several", marks=pytest.mark.slow)])
 def test_sets_and_densities_change_no_expectation(lights, evidence):
     """Against one set of even rays, the estimator without both: pixel by pixel and for the picture."""

@@ -122,6 +122,7 @@ def panel_before_light(exponent, senders=None):
     return dataclasses.replace(room, camera=Camera((0.3, 1.0, 2.2), (0.0, 0.8, 0.0), vfov=math.radians(28)))
 
 
+@pytest.mark.slow("1.0-None", "1000.0-None", "30.0-20.0")
 @pytest.mark.feature("REF-26")
 @pytest.mark.parametrize(("exponent", "senders"), [
     (1.0, None), (1.0, 20.0), (30.0, 20.0), (1e3, None), pytest.param(1e5, None, marks=pytest.mark.slow)])
@@ -176,6 +177,7 @@ def block_means(picture, seen):
     return sums / np.maximum(seen.reshape(h // 8, 8, w // 8, 8).sum(axis=(1, 3)), 1)
 
 
+@pytest.mark.slow("2.0-20.0")
 @pytest.mark.feature("REF-26")
 @pytest.mark.parametrize(("exponent", "blocks"), [(2.0, 20.0), (30.0, 20.0)])
 def test_estimators_agree(exponent, blocks, evidence):
@@ -276,6 +278,7 @@ def test_the_combination_is_as_good_as_the_better_one(exponent, evidence):
     assert ratio < 2
 
 
+@pytest.mark.slow("100000.0")
 @pytest.mark.feature("REF-26")
 @pytest.mark.parametrize("exponent", [1.0, 30.0, 1e3, 1e5])
 def test_the_error_falls_with_the_root_of_the_samples(exponent, evidence):
@@ -383,6 +386,7 @@ def test_few_photons_are_as_true_as_many_and_say_how_far_off_they_are(receiver, 
     assert low < spread < high
 
 
+@pytest.mark.slow("40.0")
 @pytest.mark.parametrize("receiver", [40.0, 7490.0, 7510.0, 3e4, 1e6])
 def test_photons_and_directions_share_out_sharp_senders(receiver, evidence):
     """Around the exponent where directions take over from photons (a quarter of the sender's) no light is lost."""
@@ -421,6 +425,7 @@ def task_of_lobes(frame, settings):
     return _with_lobes(frame.scene, frame.tracer, buffer.position, buffer.normal, glossy, settings)
 
 
+@pytest.mark.slow("900.0")
 @pytest.mark.feature("REF-26")
 @pytest.mark.parametrize("exponent", [0.0, 900.0])
 def test_without_visibility_the_sum_over_every_texel(exponent, evidence):

@@ -26,6 +26,7 @@ MAP = 4e-3  # of a map of 128 texels a side
 SUM = 1e-12  # float64
 
 
+@pytest.mark.slow("bilinear", "nearest")
 @pytest.mark.feature("REF-24")
 @pytest.mark.parametrize("chosen", ["nearest", "bilinear", "trilinear"])
 def test_colour_bleeds_as_every_texel_of_the_map_says(chosen: str, evidence: Callable[[str], None]) -> None:

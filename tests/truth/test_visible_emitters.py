@@ -98,6 +98,7 @@ def test_a_side_that_faces_away_is_not_seen(estimator, visibility):
 FACES, POLYHEDRON = 20_000, 1.2e-3  # the polyhedron lies inside the sphere: E grows by about 20 / faces
 
 
+@pytest.mark.slow("combined")
 @pytest.mark.feature("HSS-03")
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_the_part_of_a_sphere_that_is_seen(estimator, evidence):
@@ -124,6 +125,7 @@ def frame():
     return Frame(load_scene("cornell_box"), width=24, height=24)
 
 
+@pytest.mark.slow
 def test_estimators_agree_and_all_is_more(frame, evidence):
     results = {kind: trace_truth(frame, TruthSettings(estimator=kind, emitters="visible", samples=24 * 40))
                for kind in ALL}

@@ -24,6 +24,7 @@ def relative_error(picture, reference, seen):
     return math.sqrt(np.mean(best[: int(0.99 * len(best))] ** 2))
 
 
+@pytest.mark.slow("cornell_box")
 @pytest.mark.feature("REF-02", "REF-03")
 @pytest.mark.parametrize("name", ["cornell_box", pytest.param("atrium", marks=pytest.mark.slow)])
 def test_all_texels_converge_to_the_truth(name, evidence):
@@ -44,6 +45,7 @@ def test_all_texels_converge_to_the_truth(name, evidence):
     assert abs(mean - 1) < SAMPLED_EDGES
 
 
+@pytest.mark.slow
 @pytest.mark.feature("REF-03")
 def test_the_full_sum_without_visibility_is_that_of_sii_and_of_the_truth(evidence):
     from refgi.splat.sii.settings import SiiSettings

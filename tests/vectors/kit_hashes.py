@@ -11,8 +11,9 @@ from refgi.testing import quick_kit
 from refgi.vectors.check import Asked
 
 FILE = Path(__file__).with_suffix(".json")
-LIBM_FREE = re.compile(r"(gbuffer|rsm\d)\.(ids|surface)|rsm\d\.(points|importance|warp|texels)|lights|footprints|"
-                       r"multires\..*_ranges|multires\.(discontinuities|states|subsplats|points)|level\d")
+LIBM_FREE = re.compile(r"rsm\.(visible_triangles|surface|map_triangles|map_surface)\d?|"
+                       r"lights\.((halton_points|grid_points|importance|warp|texels)\d|pixel_lights|footprints)|"
+                       r"multires\.(.*_ranges\d?|discontinuities|states|subsplats|points)|sssil\.(first|coarser)_level\d?")
 
 
 def hashes(kit):

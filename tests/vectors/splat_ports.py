@@ -6,6 +6,7 @@ import numpy as np
 
 from refgi.vectors.bounds import distance, isolated_bounds
 from refgi.vectors.cases import kit_cases
+from refgi.vectors.rows import Form
 from refgi.vectors.spec import expected_of, outputs_of, stored
 
 SAME = 2e-6  # of an element and of its array's largest: places in float32, whose rounding near lights magnify
@@ -35,6 +36,11 @@ def stages_of(id, start):
     return [stage.name for stage in made(id)[0].stages if stage.name.startswith(start)]
 
 
+def named_as_given(name):
+    """Return whether an array is the scene's, a lamp's or a view's."""
+    return name.startswith(("scene.", "materials.")) or ".projection." in name or ".lamp." in name
+
+
 def off(id, name, got):
     """Return the names of a stage's arrays that a port has out of bounds."""
     known, bounds = made(id)[1], bounds_of(id, name)
@@ -59,9 +65,10 @@ def masked_shares(id, start):
 
 
 def expect_literal(id, name):
-    """Expect that the literal text of a stage, its last variant, makes what the stage does."""
+    """Expect that the literal text of a stage makes what the stage does."""
     known, step = made(id)[1], stage_of(id, name)
-    for array, got in outputs_of(step, known, np.float64, step.variants[-1]).items():
+    form = next(one for one in step.variants if isinstance(one, Form))
+    for array, got in outputs_of(step, known, np.float64, form).items():
         expected = known[array]
         assert got.shape == expected.shape, (id, array)
         finite = np.isfinite(expected)

@@ -11,54 +11,55 @@ def srgb(a):
     return np.where(a <= 0.0031308, 12.92 * a, 1.055 * np.maximum(a, 0) ** (1 / 2.4) - 0.055)
 
 
+FLUX = "rsm.reflected_flux0.flux"
 BUGS = [
-    ("rsm0.flux", lambda a: a * np.pi, "pi times"),
-    ("rsm0.flux", lambda a: a / (2 * np.pi), "1/(2 pi) times"),
-    ("rsm0.flux", lambda a: a / (2 * np.pi), "a factor 2 pi is missing"),
-    ("rsm0.flux", lambda a: a * 4, "a factor 4 too many"),
-    ("rsm0.flux", lambda a: -a, "sign is turned"),
-    ("rsm0.flux", lambda a: a * 1.234, "1.234 times"),
-    ("rsm0.flux", lambda a: a * 6.4, "T/N of rsm0 times"),
-    ("lights.flux", lambda a: a / 6.4, "1/(T/N of rsm0) times"),
-    ("rsm0.flux", lambda a: a * 1.00001, "too few digits"),
-    ("gbuffer.depth", lambda a: a + 0.25, "0.25 is added"),
-    ("rsm0.flux", lambda a: a[:, ::-1], "rows run upwards"),
-    ("rsm0.flux", lambda a: a[:, :, ::-1], "columns run leftwards"),
-    ("rsm0.flux", lambda a: a[:, ::-1, ::-1], "both rows and columns"),
-    ("rsm0.flux", lambda a: np.swapaxes(a, 1, 2), "rows and columns are exchanged"),
-    ("rsm0.flux", lambda a: np.roll(a, 1, 2), "columns are shifted by one"),
-    ("rsm0.position", lambda a: 0.5 * (a + np.roll(a, 1, 1)), "half a texel off along rows"),
-    ("rsm0.flux", lambda a: a[::-1], "in the order bgr"),
-    ("rsm0.flux", lambda a: np.repeat(a[:1], 3, 0), "all channels hold red"),
-    ("rsm0.position", lambda a: a[[0, 2, 1]], "in the order xzy"),
-    ("rsm0.position", lambda a: a * np.array([1, 1, -1])[:, None, None], "z is mirrored"),
-    ("rsm0.position", lambda a: np.stack([a[0], -a[2], a[1]]), "y and z are exchanged"),
-    ("rsm0.flux", lambda a: np.moveaxis(a, 0, -1).reshape(a.shape), "beside each other"),
-    ("rsm0.flux", lambda a: a.ravel(order="F").reshape(a.shape), "in Fortran order, the first axis fastest"),
-    ("rsm0.flux", lambda a: a.ravel().reshape(a.shape, order="F"), "the header says Fortran order"),
-    ("gbuffer.albedo", srgb, "encoded as sRGB"),
-    ("gbuffer.albedo", lambda a: a ** (1 / 2.2), "gamma of 1/2.2"),
-    ("rsm0.normal", lambda a: (a + 1) / 2, "packed as"),
-    ("rsm0.normal", np.abs, "absolute value"),
-    ("rsm0.position", lambda a: np.maximum(a, 0), "negative values are cut"),
-    ("gbuffer.depth", lambda a: 1 / a, "reciprocal"),
-    ("rsm0.flux", lambda a: a.astype(">f4").view("<f4"), "bytes are swapped"),
-    ("rsm0.flux", lambda a: a.astype(np.float16), "float16"),
-    ("rsm0.flux", np.zeros_like, "nothing was written"),
-    ("rsm0.flux", lambda a: np.full_like(a, 3), "all elements are 3"),
-    ("rsm0.flux", lambda a: np.where(a > 0.01, np.nan, a), "are NaN"),
-    ("rsm0.texel", lambda a: a + 1, "indices begin at 1"),
-    ("rsm0.texel", lambda a: a % 16 * 16 + a // 16, "column by column"),
-    ("gbuffer.triangle_id", lambda a: np.where(a < 0, 0, a + 1), "one too high"),
-    ("gbuffer.triangle_id", lambda a: np.where(a < 0, 0, a), "none is marked by 0"),
-    ("rsm0.position", lambda a: a[:, [*range(8, 16), *range(8)]], "the right values in another order"),
-    ("lights.map", lambda a: 1 - a, "0 and 1 are exchanged"),
-    ("lights.map", lambda a: np.where(a == 0, 2, a), "every 0 is 2"),
-    ("gbuffer.depth", lambda a: np.where(np.isinf(a), 0, a), "0 in place of infinity"),
-    ("lights.lobe_exponent", lambda a: a[::-1], "lights are in reverse order"),
-    ("rsm0.flux", lambda a: np.stack([a[0], 1.7 * a[1], a[2]]), "at rgb 1 alone: every element is 1.7 times"),
-    ("rsm0.position", lambda a: a[[0, 1, 1]], "at xyz 2 alone: it holds xyz 1"),
-    ("gbuffer.albedo", lambda a: np.stack([a[0], a[1], srgb(a[2])]), "at rgb 2 alone: encoded as sRGB"),
+    (FLUX, lambda a: a * np.pi, "pi times"),
+    (FLUX, lambda a: a / (2 * np.pi), "1/(2 pi) times"),
+    (FLUX, lambda a: a / (2 * np.pi), "a factor 2 pi is missing"),
+    (FLUX, lambda a: a * 4, "a factor 4 too many"),
+    (FLUX, lambda a: -a, "sign is turned"),
+    (FLUX, lambda a: a * 1.234, "1.234 times"),
+    (FLUX, lambda a: a * 256 / 42, "T/N of lights.texels0 times"),
+    ("lights.pixel_lights.flux", lambda a: a * 42 / 256, "1/(T/N of lights.texels0) times"),
+    (FLUX, lambda a: a * 1.00001, "too few digits"),
+    ("rsm.surface.depth", lambda a: a + 0.25, "0.25 is added"),
+    (FLUX, lambda a: a[:, ::-1], "rows run upwards"),
+    (FLUX, lambda a: a[:, :, ::-1], "columns run leftwards"),
+    (FLUX, lambda a: a[:, ::-1, ::-1], "both rows and columns"),
+    (FLUX, lambda a: np.swapaxes(a, 1, 2), "rows and columns are exchanged"),
+    (FLUX, lambda a: np.roll(a, 1, 2), "columns are shifted by one"),
+    ("rsm.map_surface0.position", lambda a: 0.5 * (a + np.roll(a, 1, 1)), "half a texel off along rows"),
+    (FLUX, lambda a: a[::-1], "in the order bgr"),
+    (FLUX, lambda a: np.repeat(a[:1], 3, 0), "all channels hold red"),
+    ("rsm.map_surface0.position", lambda a: a[[0, 2, 1]], "in the order xzy"),
+    ("rsm.map_surface0.position", lambda a: a * np.array([1, 1, -1])[:, None, None], "z is mirrored"),
+    ("rsm.map_surface0.position", lambda a: np.stack([a[0], -a[2], a[1]]), "y and z are exchanged"),
+    (FLUX, lambda a: np.moveaxis(a, 0, -1).reshape(a.shape), "beside each other"),
+    (FLUX, lambda a: a.ravel(order="F").reshape(a.shape), "in Fortran order, the first axis fastest"),
+    (FLUX, lambda a: a.ravel().reshape(a.shape, order="F"), "the header says Fortran order"),
+    ("rsm.surface.albedo", srgb, "encoded as sRGB"),
+    ("rsm.surface.albedo", lambda a: a ** (1 / 2.2), "gamma of 1/2.2"),
+    ("rsm.map_surface0.normal", lambda a: (a + 1) / 2, "packed as"),
+    ("rsm.map_surface0.normal", np.abs, "absolute value"),
+    ("rsm.map_surface0.position", lambda a: np.maximum(a, 0), "negative values are cut"),
+    ("rsm.surface.depth", lambda a: 1 / a, "reciprocal"),
+    (FLUX, lambda a: a.astype(">f4").view("<f4"), "bytes are swapped"),
+    (FLUX, lambda a: a.astype(np.float16), "float16"),
+    (FLUX, np.zeros_like, "nothing was written"),
+    (FLUX, lambda a: np.full_like(a, 3), "all elements are 3"),
+    (FLUX, lambda a: np.where(a > 0.01, np.nan, a), "are NaN"),
+    ("lights.texels0.texel", lambda a: a + 1, "indices begin at 1"),
+    ("lights.texels0.texel", lambda a: a % 16 * 16 + a // 16, "column by column"),
+    ("rsm.visible_triangles", lambda a: np.where(a < 0, 0, a + 1), "one too high"),
+    ("rsm.visible_triangles", lambda a: np.where(a < 0, 0, a), "none is marked by 0"),
+    ("rsm.map_surface0.position", lambda a: a[:, [*range(8, 16), *range(8)]], "the right values in another order"),
+    ("lights.pixel_lights.map_index", lambda a: 1 - a, "0 and 1 are exchanged"),
+    ("lights.pixel_lights.map_index", lambda a: np.where(a == 0, 2, a), "every 0 is 2"),
+    ("rsm.surface.depth", lambda a: np.where(np.isinf(a), 0, a), "0 in place of infinity"),
+    ("lights.pixel_lights.lobe_exponent", lambda a: a[::-1], "lights are in reverse order"),
+    (FLUX, lambda a: np.stack([a[0], 1.7 * a[1], a[2]]), "at rgb 1 alone: every element is 1.7 times"),
+    ("rsm.map_surface0.position", lambda a: a[[0, 1, 1]], "at xyz 2 alone: it holds xyz 1"),
+    ("rsm.surface.albedo", lambda a: np.stack([a[0], a[1], srgb(a[2])]), "at rgb 2 alone: encoded as sRGB"),
 ]
 
 
@@ -75,17 +76,18 @@ def test_a_bug_is_named(kit, tmp_path, array, bug, said):
 def test_the_power_of_another_channel_is_named(kit, tmp_path):
     port = Port(kit, "sii-warp-a", tmp_path)
     case = next(one for one in kit.cases(Asked(cases=("sii-warp-a",))) if one.id == "sii-warp-a")
-    red, green, _ = kit.array(case, "light0.intensity")
+    red, green, _ = kit.array(case, "rsm.reflected_flux0.lamp.strength")
     assert abs(red / green - 1) > 0.05
-    port.write("rsm0.flux", port.arrays["rsm0.flux"] * np.array([1, red / green, 1])[:, None, None])
+    port.write(FLUX, port.arrays[FLUX] * np.array([1, red / green, 1])[:, None, None])
     causes = [one.cause for one in port.first().causes]
-    assert "at rgb 1 alone: every element is light0.intensity, red/green times what it should be" in causes
+    name = "rsm.reflected_flux0.lamp.strength, red/green"
+    assert f"at rgb 1 alone: every element is {name} times what it should be" in causes
 
 
 def test_another_array_in_its_place_is_named(kit, tmp_path):
     port = Port(kit, "sii-warp-a", tmp_path)
-    port.write("gbuffer.normal", port.arrays["gbuffer.position"])
-    assert "it holds gbuffer.position" in [one.cause for one in port.first().causes]
+    port.write("rsm.surface.normal", port.arrays["rsm.surface.position"])
+    assert "it holds rsm.surface.position" in [one.cause for one in port.first().causes]
 
 
 @pytest.mark.parametrize(("cases", "least"), [
@@ -117,8 +119,8 @@ def test_every_likely_bug_of_the_kit_is_told_by_the_checker(kit, tmp_path, cases
 
 def test_noise_has_no_cause(kit, tmp_path):
     port = Port(kit, "sii-warp-a", tmp_path)
-    array = port.arrays["sum.irradiance"]
-    port.write("sum.irradiance", array * np.random.default_rng(1).uniform(0.5, 1.5, array.shape))
+    array = port.arrays["pairs.sum"]
+    port.write("pairs.sum", array * np.random.default_rng(1).uniform(0.5, 1.5, array.shape))
     (only,) = port.first().causes
     assert only.cause.startswith("no known cause fits; ")
     assert only.share == 0.0

@@ -32,40 +32,40 @@ def test_rounding_is_within(port):
 
 
 def test_the_first_wrong_stage_is_named_with_its_worst_element(port):
-    flux, total = port.arrays["rsm0.flux"].copy(), port.arrays["sum.irradiance"]
+    flux, total = port.arrays["rsm.reflected_flux0.flux"].copy(), port.arrays["pairs.sum"]
     flux[1, 7, 4] *= 1.5
-    port.write("rsm0.flux", flux)
-    port.write("sum.irradiance", 2 * total)
+    port.write("rsm.reflected_flux0.flux", flux)
+    port.write("pairs.sum", 2 * total)
     result = port.check()
     assert result.exit_code == OUT
-    assert result.first == ("sii-warp-a", "rsm0.flux")
+    assert result.first == ("sii-warp-a", "rsm.reflected_flux0")
     (wrong,) = [one for one in port.first().arrays if one.verdict == "out"]
-    assert (wrong.name, wrong.element, wrong.outside) == ("rsm0.flux", (1, 7, 4), 1)
-    assert wrong.expected == port.arrays["rsm0.flux"][1, 7, 4]
+    assert (wrong.name, wrong.element, wrong.outside) == ("rsm.reflected_flux0.flux", (1, 7, 4), 1)
+    assert wrong.expected == port.arrays["rsm.reflected_flux0.flux"][1, 7, 4]
     assert wrong.got == flux[1, 7, 4]
 
 
 def test_an_id_that_differs_is_out_and_one_on_an_edge_is_not(kit, tmp_path):
     port = Port(kit, "sii-three-lamps", tmp_path)
-    entry = port.case.arrays["rsm1.triangle_id"]
+    entry = port.case.arrays["rsm.map_triangles1"]
     masked = kit.extra(port.case, entry.masked)
-    ids = port.arrays["rsm1.triangle_id"]
-    port.write("rsm1.triangle_id", np.where(masked, ids + 1, ids))
-    (verdict,) = [one for one in port.check().stages if one.stage == "rsm1.ids"]
+    ids = port.arrays["rsm.map_triangles1"]
+    port.write("rsm.map_triangles1", np.where(masked, ids + 1, ids))
+    (verdict,) = [one for one in port.check().stages if one.stage == "rsm.map_triangles1"]
     assert (verdict.verdict, verdict.arrays[0].masked) == ("within", masked.sum())
     assert masked.sum() == entry.masked_count > 0
-    port.write("rsm1.triangle_id", np.where(masked, ids, ids + 1))
-    assert port.first().stage == "rsm1.ids"
+    port.write("rsm.map_triangles1", np.where(masked, ids, ids + 1))
+    assert port.first().stage == "rsm.map_triangles1"
 
 
 @pytest.mark.parametrize(("array", "change", "said"), [
-    ("rsm0.flux", lambda a: np.moveaxis(a, 0, -1), "the axes are in another order"),
-    ("rsm0.flux", lambda a: a.ravel(), "as many elements, in another shape"),
-    ("rsm0.flux", lambda a: a[:, :-1], "1 fewer along row"),
-    ("rsm0.flux", lambda a: a[0], "expected shape (3, 16, 16)"),
-    ("rsm0.flux", lambda a: a.astype(np.int32), "expected floats (<f4), got int32"),
-    ("rsm0.texel", lambda a: a.astype(np.float32), "expected whole numbers (<i4), got float32"),
-    ("rsm0.flux", lambda a: a.astype(np.complex64), "expected floats (<f4), got complex64"),
+    ("rsm.reflected_flux0.flux", lambda a: np.moveaxis(a, 0, -1), "the axes are in another order"),
+    ("rsm.reflected_flux0.flux", lambda a: a.ravel(), "as many elements, in another shape"),
+    ("rsm.reflected_flux0.flux", lambda a: a[:, :-1], "1 fewer along row"),
+    ("rsm.reflected_flux0.flux", lambda a: a[0], "expected shape (3, 16, 16)"),
+    ("rsm.reflected_flux0.flux", lambda a: a.astype(np.int32), "expected floats (<f4), got int32"),
+    ("lights.texels0.texel", lambda a: a.astype(np.float32), "expected whole numbers (<i4), got float32"),
+    ("rsm.reflected_flux0.flux", lambda a: a.astype(np.complex64), "expected floats (<f4), got complex64"),
 ])
 def test_what_cannot_be_compared_is_said_in_plain_words(port, array, change, said):
     port.write(array, change(port.arrays[array]))
@@ -78,27 +78,27 @@ def test_what_cannot_be_compared_is_said_in_plain_words(port, array, change, sai
 
 def test_numbers_that_are_none_are_out(port):
     for value in (np.nan, np.inf):
-        flux = port.arrays["rsm0.flux"].copy()
+        flux = port.arrays["rsm.reflected_flux0.flux"].copy()
         flux[0, 5, 5] = value
-        port.write("rsm0.flux", flux)
+        port.write("rsm.reflected_flux0.flux", flux)
         assert port.check().exit_code == OUT
         assert "1 element is" in port.first().causes[0].cause
 
 
 def test_stages_that_did_not_run_do_not_count_unless_asked_for(port):
     for name in port.arrays:
-        if not name.startswith("sum"):
+        if name != "pairs.sum":
             port.remove(name)
     assert port.check().exit_code == ALL_WITHIN
-    assert port.check(stages=("rsm0",)).exit_code == NOT_COMPARABLE
-    port.remove("sum.irradiance")
+    assert port.check(stages=("rsm",)).exit_code == NOT_COMPARABLE
+    port.remove("pairs.sum")
     assert port.check().exit_code == NOT_COMPARABLE
 
 
 def test_a_missing_array_of_a_stage_is_not_comparable(port):
-    port.remove("lights.normal")
+    port.remove("lights.pixel_lights.normal")
     result = port.check()
-    assert (result.exit_code, result.first) == (NOT_COMPARABLE, ("sii-warp-a", "lights"))
+    assert (result.exit_code, result.first) == (NOT_COMPARABLE, ("sii-warp-a", "lights.pixel_lights"))
 
 
 def test_half_floats_pass_the_second_tier_alone(port):
@@ -107,67 +107,67 @@ def test_half_floats_pass_the_second_tier_alone(port):
             port.write(name, array.astype(np.float16))
     assert port.check().exit_code == OUT
     assert port.check(tiers={"": "T2"}).exit_code == ALL_WITHIN
-    assert port.check(tiers={"rsm": "T2"}).first[1] == "gbuffer.surface"
+    assert port.check(tiers={"rsm": "T2"}).first[1] == "lights.importance0"
 
 
 def test_colours_in_8_bits_pass_their_tier_and_wrong_ones_do_not(port):
-    albedo = port.arrays["gbuffer.albedo"]
-    port.write("gbuffer.albedo", np.rint(255 * albedo) / 255)
+    albedo = port.arrays["rsm.surface.albedo"]
+    port.write("rsm.surface.albedo", np.rint(255 * albedo) / 255)
     assert port.check().exit_code == OUT
     assert port.check(tiers={"": "T2B"}).exit_code == ALL_WITHIN
     for wrong in (np.rint(15 * albedo) / 15, 0.9 * albedo, albedo[::-1]):
-        port.write("gbuffer.albedo", wrong)
+        port.write("rsm.surface.albedo", wrong)
         assert port.check(tiers={"": "T2B"}).exit_code == OUT
 
 
 def test_the_strictest_tier_wants_equal_floats(port):
-    port.write("rsm0.flux", np.nextafter(port.arrays["rsm0.flux"], np.float32(1)))
+    port.write("rsm.reflected_flux0.flux", np.nextafter(port.arrays["rsm.reflected_flux0.flux"], np.float32(1)))
     assert port.check().exit_code == ALL_WITHIN
-    assert port.check(tiers={"": "T1", "rsm0": "T0"}).first[1] == "rsm0.flux"
+    assert port.check(tiers={"": "T1", "rsm": "T0"}).first[1] == "rsm.reflected_flux0"
 
 
 def test_isolated_stages_are_each_explained(port):
     """A stage that read the kit's arrays is wrong by itself, whatever is wrong before it."""
-    port.write("rsm0.flux", np.pi * port.arrays["rsm0.flux"])
-    port.write("sum.irradiance", 2 * port.arrays["sum.irradiance"])
+    port.write("rsm.reflected_flux0.flux", np.pi * port.arrays["rsm.reflected_flux0.flux"])
+    port.write("pairs.sum", 2 * port.arrays["pairs.sum"])
     wrong = {one.stage: one for one in port.check().stages if one.verdict == "out"}
     assert {one.upstream for one in wrong.values()} == {"isolated"}
     assert {stage: "times what it should be" in one.causes[0].cause for stage, one in wrong.items()} == {
-        "rsm0.flux": True, "sum": True}
+        "rsm.reflected_flux0": True, "pairs.sum": True}
     causes = {one.stage: one.causes for one in port.check(chained=True).stages if one.verdict == "out"}
-    assert [bool(causes[stage]) for stage in ("rsm0.flux", "sum")] == [True, False]
+    assert [bool(causes[stage]) for stage in ("rsm.reflected_flux0", "pairs.sum")] == [True, False]
 
 
 def test_a_tier_is_asked_for_by_any_part_of_a_stages_name(port):
-    port.write("rsm0.density_weight", port.arrays["rsm0.density_weight"].astype(np.float16))
+    port.write("lights.warp0.density_weight", port.arrays["lights.warp0.density_weight"].astype(np.float16))
     assert port.check().exit_code == OUT
-    for name in ("rsm0.warp", "rsm0", "warp"):
+    for name in ("lights.warp0", "lights", "warp"):
         assert port.check(tiers={name: "T2"}).exit_code == ALL_WITHIN, name
-    assert port.check(tiers={"warp": "T2", "rsm0.warp": "T1"}).exit_code == OUT
+    assert port.check(tiers={"warp": "T2", "lights.warp0": "T1"}).exit_code == OUT
 
 
 def test_a_chain_says_what_was_made_from_wrong_inputs(port):
-    port.write("rsm0.flux", 2 * port.arrays["rsm0.flux"])
-    port.write("rsm0.importance", 2 * port.arrays["rsm0.importance"])
-    port.write("lights.flux", 2 * port.arrays["lights.flux"])
+    port.write("rsm.reflected_flux0.flux", 2 * port.arrays["rsm.reflected_flux0.flux"])
+    port.write("lights.importance0", 2 * port.arrays["lights.importance0"])
+    port.write("lights.pixel_lights.flux", 2 * port.arrays["lights.pixel_lights.flux"])
     verdicts = {one.stage: one for one in port.check(chained=True).stages}
-    assert (verdicts["rsm0.surface"].upstream, verdicts["rsm0.flux"].upstream) == ("clean", "clean")
-    assert verdicts["rsm0.flux"].verdict == verdicts["rsm0.importance"].verdict == "out"
-    for stage in ("rsm0.importance", "rsm0.warp", "rsm0.texels", "lights", "sum"):
+    assert (verdicts["rsm.map_surface0"].upstream, verdicts["rsm.reflected_flux0"].upstream) == ("clean", "clean")
+    assert verdicts["rsm.reflected_flux0"].verdict == verdicts["lights.importance0"].verdict == "out"
+    for stage in ("lights.importance0", "lights.warp0", "lights.texels0", "lights.pixel_lights", "pairs.sum"):
         assert verdicts[stage].upstream == "dirty", stage
-    assert verdicts["rsm1.flux"].upstream == "clean"
-    assert port.check(chained=True).first == ("sii-warp-a", "rsm0.flux")
+    assert verdicts["rsm.reflected_flux1"].upstream == "clean"
+    assert port.check(chained=True).first == ("sii-warp-a", "rsm.reflected_flux0")
 
 
 def test_damaged_kits_and_outputs_are_told(kit, port, tmp_path):
     copy = tmp_path / "kit"
     shutil.copytree(kit.folder, copy)
-    file = copy / "cases" / "sii-warp-a" / "out" / "rsm0.flux.npy"
+    file = copy / "cases" / "sii-warp-a" / "out" / "rsm.reflected_flux0.flux.npy"
     content = bytearray(file.read_bytes())
     content[-3] ^= 1
     file.write_bytes(bytes(content))
     port.kit = Kit(copy)
-    with pytest.raises(DamagedError, match=r"rsm0\.flux\.npy: expected the bytes"):
+    with pytest.raises(DamagedError, match=r"rsm\.reflected_flux0\.flux\.npy: expected the bytes"):
         port.check()
     manifest = copy / "cases" / "sii-warp-a" / "manifest.json"
     manifest.write_text(manifest.read_text().replace("W/m^2", "W"))
@@ -177,32 +177,32 @@ def test_damaged_kits_and_outputs_are_told(kit, port, tmp_path):
     with pytest.raises(DamagedError, match="strange"):
         Kit(copy)
     port.kit = kit
-    file = port.folder / "sii-warp-a" / "rsm0.flux.npy"
+    file = port.folder / "sii-warp-a" / "rsm.reflected_flux0.flux.npy"
     whole = file.read_bytes()
     for content, said in ((b"no array", "without its header"), (whole[:-5], "bytes that its header says, got"),
                           (b"", "without its header"), (whole + b"more", "bytes that its header says, got")):
         file.write_bytes(content)
         result = port.check()
-        assert (result.exit_code, result.first) == (DAMAGED, ("sii-warp-a", "rsm0.flux"))
+        assert (result.exit_code, result.first) == (DAMAGED, ("sii-warp-a", "rsm.reflected_flux0"))
         assert said in port.first().arrays[1].said
-        assert {one.verdict for one in result.stages if one.stage != "rsm0.flux"} == {"exact"}
+        assert {one.verdict for one in result.stages if one.stage != "rsm.reflected_flux0"} == {"exact"}
 
 
 def test_unknown_names_are_refused(kit, port, tmp_path):
-    for asked, said in (({"stages": ("rms0",)}, r"--stage: .*did you mean 'rsm0"),
-                        ({"tiers": {"summ": "T2"}}, r"--tier: .*did you mean 'sum'")):
+    for asked, said in (({"stages": ("rms",)}, r"--stage: .*did you mean 'rsm"),
+                        ({"tiers": {"pairs.summ": "T2"}}, r"--tier: .*did you mean 'pairs.sum'")):
         with pytest.raises(InputError, match=said):
             port.check(**asked)
-    assert {one.stage for one in port.check(stages=("warp",)).stages} == {"rsm0.warp", "rsm1.warp"}
-    port.write("rsm0.fluxx", port.arrays["rsm0.flux"])
+    assert {one.stage for one in port.check(stages=("warp",)).stages} == {"lights.warp0", "lights.warp1"}
+    port.write("rsm.reflected_flux0.fluxx", port.arrays["rsm.reflected_flux0.flux"])
     (port.folder / "sii-warp-aa").mkdir()
     assert port.check().unknown == (
         "sii-warp-aa: no such case; did you mean 'sii-warp-a'?",
-        "sii-warp-a/rsm0.fluxx.npy: no array of this case; did you mean 'rsm0.flux'?")
+        "sii-warp-a/rsm.reflected_flux0.fluxx.npy: no array of this case; did you mean 'rsm.reflected_flux0.flux'?")
     port.folder = tmp_path / "nowhere"
     with pytest.raises(InputError, match="expected a folder"):
         port.check()
-    for case, array, tier in (("sii-warp-c", "rsm0.flux", "T1"), ("sii-warp-a", "rsm0.fluxx", "T1"),
-                              ("sii-warp-a", "rsm0.flux", "T9")):
+    for case, array, tier in (("sii-warp-c", "pairs.sum", "T1"), ("sii-warp-a", "pairs.summ", "T1"),
+                              ("sii-warp-a", "pairs.sum", "T9")):
         with pytest.raises(InputError, match="expected one of"):
-            stage_of_array(kit, case, array, port.arrays["rsm0.flux"], tier)
+            stage_of_array(kit, case, array, port.arrays["pairs.sum"], tier)

@@ -46,12 +46,12 @@ def place(kit, tmp_path, monkeypatch):
 def change(port, command):
     """Write what options speak of."""
     if "--depth" in command:
-        z = port.arrays["gbuffer.depth"].astype(float)
+        z = port.arrays["rsm.surface.depth"].astype(float)
         d = np.where(np.isinf(z), 1.0, 100.0 * (z - 0.1) / (np.where(np.isinf(z), 1.0, z) * 99.9))
-        port.write("gbuffer.depth", np.round(d * (2**24 - 1)) / (2**24 - 1))
+        port.write("rsm.surface.depth", np.round(d * (2**24 - 1)) / (2**24 - 1))
     if "--unordered" in command:
-        lights = next(step.writes for step in port.case.stages if step.name == "lights")
-        order = np.random.default_rng(1).permutation(port.arrays["lights.texel"].size)
+        lights = next(step.writes for step in port.case.stages if step.name == "lights.pixel_lights")
+        order = np.random.default_rng(1).permutation(port.arrays["lights.pixel_lights.texel"].size)
         for name in lights:
             port.write(name, port.arrays[name][..., order])
 
@@ -81,4 +81,4 @@ def test_every_option_stands_in_both_documents():
 
 def test_commands_are_found():
     assert len(commands()) > 12
-    assert ("python", "kit/check.py", "my_output/", "--unordered", "lights") in commands()
+    assert ("python", "kit/check.py", "my_output/", "--unordered", "lights.pixel_lights") in commands()

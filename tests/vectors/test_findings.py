@@ -15,28 +15,29 @@ def findings(verdicts, tried=lambda _: set()):
 
 
 def test_maps_levels_and_rounds_are_one_kind():
-    assert [kind_of(name) for name in ("rsm0.flux", "rsm12.flux", "clusters.3.assign", "sum")] == [
-        "rsm.flux", "rsm.flux", "clusters.assign", "sum"]
+    names = ("rsm.reflected_flux0", "rsm.reflected_flux12", "cluster.kmeans_assign3", "pairs.sum")
+    assert [kind_of(name) for name in names] == [
+        "rsm.reflected_flux", "rsm.reflected_flux", "cluster.kmeans_assign", "pairs.sum"]
 
 
 def test_a_cause_that_fits_every_case_leads_one_that_fits_better_once():
     found = findings([
-        verdict("a", "sum", verdict="within"),
-        verdict("a", "rsm0.flux", ("chance", 1.0), ("bug", 0.92)),
-        verdict("a", "rsm1.flux", ("bug", 0.95), ("other chance", 0.99)),
-        verdict("b", "rsm0.flux", ("bug", 0.91)),
-        verdict("b", "rsm1.flux", verdict="not-run"),
-        verdict("b", "sum", ("of the sum", 1.0)),
+        verdict("a", "pairs.sum", verdict="within"),
+        verdict("a", "rsm.reflected_flux0", ("chance", 1.0), ("bug", 0.92)),
+        verdict("a", "rsm.reflected_flux1", ("bug", 0.95), ("other chance", 0.99)),
+        verdict("b", "rsm.reflected_flux0", ("bug", 0.91)),
+        verdict("b", "rsm.reflected_flux1", verdict="not-run"),
+        verdict("b", "pairs.sum", ("of the sum", 1.0)),
     ])
     assert [(one.stage, one.first, one.wrong, one.ran) for one in found] == [
-        ("rsm.flux", ("a", "rsm0.flux"), 3, 3), ("sum", ("b", "sum"), 1, 2)]
+        ("rsm.reflected_flux", ("a", "rsm.reflected_flux0"), 3, 3), ("pairs.sum", ("b", "pairs.sum"), 1, 2)]
     assert [cause.cause for cause in found[0].causes] == ["bug", "chance", "other chance"]
     assert [(cause.explained, cause.tried) for cause in found[0].causes] == [(3, 3), (1, 3), (1, 3)]
 
 
 def test_a_bug_counts_where_a_case_knows_it():
     """One that explains two of the two cases that know it leads a remark that fits three of five."""
-    wrong = [verdict(case, "sum", *causes) for case, causes in (
+    wrong = [verdict(case, "pairs.sum", *causes) for case, causes in (
         ("a", [("bug", 1.0), ("remark", 1.0)]), ("b", [("bug", 0.95), ("remark", 1.0)]), ("c", [("remark", 1.0)]),
         ("d", []), ("e", []))]
     found = findings(wrong, lambda one: {"bug"} if one.case in "ab" else set())
@@ -46,16 +47,17 @@ def test_a_bug_counts_where_a_case_knows_it():
 
 
 def test_what_is_made_from_wrong_inputs_is_not_blamed():
-    assert findings([verdict("a", "sum", upstream="dirty"), verdict("a", "rsm0.flux", verdict="exact")]) == ()
+    assert findings([verdict("a", "pairs.sum", upstream="dirty"),
+                     verdict("a", "rsm.reflected_flux0", verdict="exact")]) == ()
 
 
 def test_where_no_cause_explains_the_places_of_the_first_are_told():
     remark = ("no known cause fits: all lie at row 0", 0.0)
-    found = findings([verdict("a", "sum", remark), verdict("b", "sum", ("no known cause fits", 0.0))])
+    found = findings([verdict("a", "pairs.sum", remark), verdict("b", "pairs.sum", ("no known cause fits", 0.0))])
     assert [cause.cause for cause in found[0].causes] == [remark[0]]
-    found = findings([verdict("a", "sum", remark), verdict("b", "sum", ("bug", 1.0))])
+    found = findings([verdict("a", "pairs.sum", remark), verdict("b", "pairs.sum", ("bug", 1.0))])
     assert [(cause.cause, cause.explained, cause.tried) for cause in found[0].causes] == [("bug", 1, 2)]
 
 
 def test_at_most_three_causes_are_told():
-    assert len(findings([verdict("a", "sum", *((str(k), 1.0) for k in range(9)))])[0].causes) == 3
+    assert len(findings([verdict("a", "pairs.sum", *((str(k), 1.0) for k in range(9)))])[0].causes) == 3

@@ -7,7 +7,7 @@ import pytest
 from refgi.frame import Frame
 from refgi.splat.gather import gather
 from refgi.vectors.cases.gather import FULL, FULL_PLANS, QUICK, QUICK_PLANS, settings_of
-from tests.vectors.splat_ports import LARGEST_MASK, expect_literal, made, masked_shares, stages_of
+from tests.vectors.splat_ports import LARGEST_MASK, expect_literal, made, masked_shares, named_as_given, stages_of
 
 PLANS = QUICK_PLANS | FULL_PLANS
 ALL = [*QUICK, *FULL]
@@ -33,8 +33,13 @@ def test_the_literal_text_is_the_stage(id):
         expect_literal(id, name)
 
 
+@pytest.mark.parametrize("id", PLANS)
+def test_stages_make_all_but_scene_views_and_random_numbers(id):
+    assert [name for name in made(id)[0].given if not named_as_given(name)] == ["gather.pattern.xi"]
+
+
 def test_some_pixels_are_interpolated_and_some_are_not():
-    assert 0.1 < made("gather-interpolated")[1]["gather.interpolated"].mean() < 0.9
+    assert 0.1 < made("gather-interpolated")[1]["gather.interpolate.interpolated"].mean() < 0.9
 
 
 @pytest.mark.parametrize("id", ALL)

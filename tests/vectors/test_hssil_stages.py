@@ -1,6 +1,5 @@
 """Oracle tests of the kit's screen-space stages: the chain is the method, the literal text is a port."""
 
-import re
 from functools import cache
 
 import numpy as np
@@ -8,10 +7,11 @@ import pytest
 
 from refgi.diagnostics import diagnosing
 from refgi.frame import Frame
-from refgi.sssil.crown.pattern import samples_at, shared_offsets
 from refgi.sssil.hssil import hssil
+from refgi.stages import observe
 from refgi.vectors.bounds import distance, isolated_bounds, large_value
 from refgi.vectors.cases import hssil as cases
+from refgi.vectors.recorded import leaves
 from refgi.vectors.spec import expected_of
 
 CASES = {**cases.QUICK, **cases.FULL}
@@ -20,9 +20,7 @@ FLIPPED = 0.005  # share of values that rounding decides otherwise in the chain:
 MASKED = 0.05  # share of an array that rounding may decide
 LOOSE = 1e-4  # of the large values: most bounds beyond this would hide bugs
 AMPLIFIED = 0.005  # share of bounds beyond: means over texels that weigh next to nothing
-LITERAL = {"level", "points of samples", "shifts of samples", "samples", "gather", "blur", "light", "picture", "motion",
-           "reprojected", "entering", "clamp", "temporal"}
-NO_LEVEL = re.compile(r"\d")
+STEPS = 1e-12  # of the large values: a stage's sums in another order than its steps'
 
 
 @cache
@@ -47,7 +45,7 @@ def outside(array, expected, bound):
 def test_the_chain_is_the_method(name):
     case, known, _ = made(name)
     scene, (width, height), shadows = cases.VIEWS[name]
-    frame = Frame(scene, width=width, height=height, dtype=np.float64, shadows=shadows, rsm_resolution=32)
+    frame = Frame(scene, width=width, height=height, dtype=np.float64, shadows=shadows, rsm_resolution=cases.MAPS)
     expected, found = hssil(frame, cases.SETTINGS[name]), known[case.stages[-1].writes[0]]
     off = np.abs(found - expected) > CHAIN * (large_value(expected) + np.abs(expected))
     assert off.mean() <= FLIPPED
@@ -60,36 +58,40 @@ def test_the_blend_is_that_of_a_sequence(name):
     case, known, _ = made(name)
     with diagnosing(False):
         expected = [*cases.sequence(name, cases.frames_of(name))][-1].irradiance
-    assert np.abs(known["temporal.irradiance"] - expected).max() < CHAIN * expected.max()
-    covered, weight = known["gbuffer.triangle_id"] >= 0, known["reprojected.weight"]
-    assert (weight[covered] == 0).any(), "no pixel is disoccluded"
-    assert not covered.all()
-    assert case.stages[-1].name == "temporal"
+    off = np.abs(known["sssil.blend.irradiance"] - expected) > CHAIN * large_value(expected)
+    assert off.mean() <= FLIPPED
+    step = next(one for one in case.stages if one.name == "sssil.reprojection")
+    ids = known[next(one for one in step.reads if one.startswith("rsm.visible_triangles") and "projection" not in one)]
+    assert (known["sssil.reprojection.weight"][ids >= 0] == 0).any(), "no pixel is disoccluded"
+    assert not (ids >= 0).all()
 
 
 @pytest.mark.feature("HSS-05")
-@pytest.mark.parametrize("name", cases.VIEWS)
-def test_samples_are_those_of_the_method(name):
-    """Shifts kept in float32 move no sample to another texel."""
-    case, known, _ = made(name)
-    sampling = cases.SETTINGS[name].sampling
-    for index in range(case.facts["hssil"]["levels"]):
-        rows, columns = known[f"level{index}.depth"].shape
-        number, radius = sampling.first_level + index, case.facts[f"samples{index}"]["radius"]
-        if sampling.pattern == "pixel":
-            each = [[samples_at(sampling, index, number, i, j, radius) for j in range(columns)] for i in range(rows)]
-            offsets, weight = (np.array([[one[k] for one in row] for row in each]) for k in (0, 1))
-            weight = weight if sampling.density != "uniform" else weight[:1, :1]
+@pytest.mark.filterwarnings("ignore:radius")
+@pytest.mark.parametrize("name", [*cases.VIEWS, *cases.TEMPORAL])
+def test_steps_make_what_their_stage_makes(name):
+    """Levels and sums of the fused stages, with samples that float32 shifts do not move to another texel."""
+    with observe(record=True, steps=True) as log, diagnosing(False):
+        if name in cases.VIEWS:
+            scene, (width, height), shadows = cases.VIEWS[name]
+            hssil(Frame(scene, width=width, height=height, dtype=np.float64, shadows=shadows,
+                        rsm_resolution=cases.MAPS), cases.SETTINGS[name])
         else:
-            offsets, weight = shared_offsets(sampling, index, number, rows, radius)
-        np.testing.assert_array_equal(known[f"samples{index}.offsets"], offsets)
-        np.testing.assert_allclose(known[f"samples{index}.weight"], weight, atol=1e-6 * weight.max())
+            list(cases.sequence(name, cases.frames_of(name)))
+    compared = set()
+    for run in (one for one in log.runs if one.steps is not None and one.name.startswith("sssil.")):
+        whole, steps = dict(leaves(run.output)), dict(leaves(run.steps))
+        assert set(steps) <= set(whole)
+        for leaf, array in steps.items():
+            np.testing.assert_allclose(array, whole[leaf], rtol=0, atol=STEPS * max(large_value(whole[leaf]), 1e-300))
+        compared.add(run.name)
+    assert compared == {"sssil.pyramid", "sssil.gather"} | ({"sssil.temporal"} if name in cases.TEMPORAL else set())
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_bounds_are_near_rounding_and_masks_are_few(name):
     _, known, bounds = made(name)
-    for key, bound in bounds.items():
+    for key, bound in ((key, bound) for key, bound in bounds.items() if key.startswith("sssil.")):
         assert bound.masked.mean() < MASKED, key
         assert (bound.limit > LOOSE * large_value(known[key])).mean() <= AMPLIFIED or not known[key].any(), key
 
@@ -99,11 +101,22 @@ def test_the_literal_text_is_the_stages(name):
     """Bugs, which are edits of it, are wrong by what they say alone."""
     case, known, bounds = made(name)
     for step in case.stages:
-        if NO_LEVEL.sub("", step.name) in LITERAL:
+        if step.name.startswith("sssil.") and step.name != "sssil.senders":
             read = {key: known[key].astype(float) if known[key].dtype.kind == "f" else known[key] for key in step.reads}
             assert len(step.variants) == 1, step.name
             for key, array in step.variants[0](read, np.float64).items():
                 same(np.where(bounds[key].masked, known[key], array), known[key])
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_only_scene_views_and_random_numbers_are_given(name):
+    case = CASES[name]()
+    own = {one for one in case.given if one.startswith("sssil.") and ".projection." not in one}
+    before = {f"sssil.reprojection.{key}" for key in ("irradiance", "frames")} | (
+        {"sssil.motion.before", "sssil.reprojection.depth", "sssil.reprojection.normal_before"}
+        if name == "hssil-moving" else set())
+    assert all(one.endswith((".start", ".shifts")) for one in own - before)
+    assert own & before == set() if name in cases.VIEWS else "sssil.reprojection.irradiance" in own
 
 
 def same(array, expected):

@@ -63,9 +63,9 @@ def compensated(terms):
 
 def terms_of(arrays, kind):
     """Return Eq. 2 of each light at each pixel in float32, (N, 3, h, w), in one of the ways that ports write it."""
-    x, n = single(arrays["gbuffer.position"]), single(arrays["gbuffer.normal"])
-    p, facing = (single(arrays[f"lights.{key}"])[:, :, None, None] for key in ("position", "normal"))
-    flux = single(arrays["lights.flux"])[:, :, None, None] / single(np.pi)
+    x, n = single(arrays["rsm.surface.position"]), single(arrays["rsm.surface.normal"])
+    p, facing = (single(arrays[f"lights.pixel_lights.{key}"])[:, :, None, None] for key in ("position", "normal"))
+    flux = single(arrays["lights.pixel_lights.flux"])[:, :, None, None] / single(np.pi)
     d = x[:, None] - p
     square = (d * d).sum(axis=0)
     if kind == "fused":  # products summed in a wider type and rounded once
@@ -86,10 +86,10 @@ def terms_of(arrays, kind):
 def test_sums_in_any_order(kit, tmp_path, kind, order):
     case = next(one for one in kit.cases(Asked(cases=("sii-halton",))))
     arrays = {name: kit.array(case, name) for name in case.arrays}
-    total = np.where(arrays["gbuffer.triangle_id"] >= 0, order(terms_of(arrays, kind)), 0)
+    total = np.where(arrays["rsm.visible_triangles"] >= 0, order(terms_of(arrays, kind)), 0)
     (tmp_path / case.id).mkdir()
-    np.save(tmp_path / case.id / "sum.irradiance.npy", total)
-    result = check_output(kit, tmp_path, Asked(stages=("sum",), cases=("sii-halton",)))
+    np.save(tmp_path / case.id / "pairs.sum.npy", total)
+    result = check_output(kit, tmp_path, Asked(stages=("pairs.sum",), cases=("sii-halton",)))
     assert result.exit_code == ALL_WITHIN
 
 
@@ -134,34 +134,34 @@ def in_few_bits(array, step):
 def test_tiles_in_any_order(kit, tmp_path):
     """The literal text's pixels are a picture whatever the order of tiles."""
     case = next(one for one in kit.cases(Asked(cases=("sii-grid",))))
-    step = next(one for one in kit_cases("quick")["sii-grid"]().stages if one.name == "sum")
+    step = next(one for one in kit_cases("quick")["sii-grid"]().stages if one.name == "pairs.sum")
     arrays = {name: kit.array(case, name) for name in step.reads}
-    right = written(step, arrays)["sum.irradiance"]
+    right = written(step, arrays)["pairs.sum"]
     tiles = np.zeros_like(right)
     for column in range(0, right.shape[2], 4):
         for row in reversed(range(0, right.shape[1], 4)):
-            here = {**arrays, "gbuffer.triangle_id": np.full_like(arrays["gbuffer.triangle_id"], -1)}
+            here = {**arrays, "rsm.visible_triangles": np.full_like(arrays["rsm.visible_triangles"], -1)}
             block = np.s_[row : row + 4, column : column + 4]
-            here["gbuffer.triangle_id"][block] = arrays["gbuffer.triangle_id"][block]
-            tiles += written(step, here)["sum.irradiance"]
+            here["rsm.visible_triangles"][block] = arrays["rsm.visible_triangles"][block]
+            tiles += written(step, here)["pairs.sum"]
     (tmp_path / case.id).mkdir()
-    np.save(tmp_path / case.id / "sum.irradiance.npy", tiles)
-    assert check_output(kit, tmp_path, Asked(stages=("sum",), cases=("sii-grid",))).exit_code == ALL_WITHIN
+    np.save(tmp_path / case.id / "pairs.sum.npy", tiles)
+    assert check_output(kit, tmp_path, Asked(stages=("pairs.sum",), cases=("sii-grid",))).exit_code == ALL_WITHIN
 
 
 @pytest.mark.parametrize("chained", [False, True])
 @pytest.mark.parametrize("name", ["pairs-diffuse", "pairs-glossy"])
 def test_subnormal_numbers_read_as_0(kit, tmp_path, name, chained):
     """NVIDIA's float32 arithmetic reads numbers below 2^-126 as 0, and writes 0 for them."""
-    save_literal(kit, tmp_path, name, "pairs", lambda _, array: np.where(np.abs(array) < 2.0**-126, 0, array))
+    save_literal(kit, tmp_path, name, "pairs.pairs", lambda _, array: np.where(np.abs(array) < 2.0**-126, 0, array))
     assert check_output(kit, tmp_path, Asked(chained=chained, cases=(name,))).exit_code == ALL_WITHIN
 
 
-@pytest.mark.parametrize("stage", ["search.means", "penumbra.means"])
+@pytest.mark.parametrize("stage", ["cluster.mip_means0", "cluster.mip_means1"])
 @pytest.mark.parametrize("name", ["val-csm", "val-empty", "val-rim"])
 def test_coordinates_of_textures(kit, tmp_path, name, stage):
     """Places on a map as shares of it in float32, and texels' places from them by a fused operation, as GPUs do."""
-    side = next(kit.array(one, "basis.0").shape[-1] for one in kit.cases(Asked(cases=(name,))))
+    side = next(kit.array(one, "cluster.basis").shape[-1] for one in kit.cases(Asked(cases=(name,))))
 
     def read(array_name, array):
         if not array_name.endswith(".region"):

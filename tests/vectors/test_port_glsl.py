@@ -12,13 +12,13 @@ from refgi.vectors.manifest import Result
 PORT = Path(__file__).parents[2] / "examples/ports/glsl/run.py"
 CONTEXT = "import moderngl; moderngl.create_standalone_context(backend='egl', require=450)"
 COVERED = {
-    "pairs": {("pairs-diffuse", "pairs"), ("pairs-glossy", "pairs")},
-    "sii": {("sii-warp-a", "footprints"), *((f"sii-{case}", "sum") for case in (
+    "pairs": {("pairs-diffuse", "pairs.pairs"), ("pairs-glossy", "pairs.pairs")},
+    "sii": {("sii-warp-a", "lights.footprints"), *((f"sii-{case}", "pairs.sum") for case in (
         "halton", "three-lamps", "warp-a", "warp-b", "grid", "one-texel"))},
-    "hssil": {*((f"hssil-{case}", f"gather{level}") for case, levels in (
+    "hssil": {*((f"hssil-{case}", f"sssil.gather_samples{level}") for case, levels in (
         ("default", 4), ("paper", 4), ("odd", 5)) for level in range(levels))},
-    "val": {("val-csm", "footprints"), *(("val-csm", stage) for stage in (
-        "basis", "mip", "search.means", "penumbra.means", "visibility"))},
+    "val": {("val-csm", "lights.footprints"), *(("val-csm", f"cluster.{stage}") for stage in (
+        "basis", "mip_levels", "mip_means0", "mip_means1", "csm"))},
 }
 
 

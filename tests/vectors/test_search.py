@@ -73,13 +73,13 @@ def test_what_is_told_is_short_and_says_both():
 def pairs(kit, wrong):
     """Return diffuse irradiance of pairs in NumPy, from a kit's inputs (SII Eq. 2); wrong: the light's cosine twice."""
     case = next(one for one in kit.cases(Asked(cases=("pairs-diffuse",))) if one.id == "pairs-diffuse")
-    x, n, p, m, flux = (kit.array(case, name).astype(float).reshape(3, -1) for name in (
-        "gbuffer.position", "gbuffer.normal", "lights.position", "lights.normal", "lights.flux"))
+    x, n, p, m, flux = (kit.array(case, f"pairs.pairs.{name}").astype(float).reshape(3, -1) for name in (
+        "position", "normal", "light_position", "light_normal", "flux"))
     d = x - p
     square = np.maximum((d * d).sum(axis=0), 1e-100)
     arriving, leaving = (np.maximum(0, (sign * normal * d).sum(axis=0)) for sign, normal in ((-1, n), (1, m)))
     cosines = leaving * (leaving if wrong else arriving)
-    return {"pairs.irradiance": (flux * cosines / (math.pi * square**2))[:, None]}
+    return {"pairs.pairs": (flux * cosines / (math.pi * square**2))[:, None]}
 
 
 def written(folder, arrays):
@@ -92,7 +92,7 @@ def written(folder, arrays):
 def test_a_wrong_name_that_is_no_likely_bug_is_named(kit, tmp_path, evidence):
     output = written(tmp_path / "wrong", pairs(kit, wrong=True))
     result = check_output(kit, output, Asked())
-    assert result.first == ("pairs-diffuse", "pairs")
+    assert result.first == ("pairs-diffuse", "pairs.pairs")
     assert not any(cause.explained for cause in result.findings[0].causes)
     told = []
     found = searched(kit, output, Asked(), result, tell=lambda what, done: told.append((what, done)))
@@ -101,7 +101,7 @@ def test_a_wrong_name_that_is_no_likely_bug_is_named(kit, tmp_path, evidence):
     assert "`term = sent * sent * fall`" in first.cause
     assert "literal/pairs.py:" in first.cause
     assert first.explained == 1
-    assert told[0][0].startswith("pairs: ")
+    assert told[0][0].startswith("pairs.pairs: ")
     assert 0 <= told[-1][1] <= 1
     own = {one.causes[0].cause for one in found.stages if (one.case, one.stage) == result.first}
     assert own == {first.cause}  # the page and the table tell it too
@@ -155,8 +155,8 @@ def test_nothing_is_searched_where_nothing_is_wrong(kit, tmp_path):
 
 def test_what_nothing_explains_stays_without_a_cause(kit, tmp_path):
     made = pairs(kit, wrong=False)
-    made["pairs.irradiance"] = made["pairs.irradiance"] * np.random.default_rng(0).uniform(0.5, 2, made[
-        "pairs.irradiance"].shape)
+    made["pairs.pairs"] = made["pairs.pairs"] * np.random.default_rng(0).uniform(0.5, 2, made[
+        "pairs.pairs"].shape)
     output = written(tmp_path / "noise", made)
     result = check_output(kit, output, Asked())
     assert searched(kit, output, Asked(), result, seconds=5.0) == result

@@ -93,42 +93,42 @@ def test_rounding_noise_and_tiers(both, port):
             port.write(name, array.astype(np.float16))
     assert both(port)[0] == 1
     assert both(port, "--tier", "T2")[0] == 0
-    assert both(port, "--tier", "rsm0=T2", "--tier", "lights.flux=R11G11B10F", "--chained")[0] == 1
+    assert both(port, "--tier", "rsm=T2", "--tier", "lights.pixel_lights.flux=R11G11B10F", "--chained")[0] == 1
 
 
 def test_wrong_missing_misshapen_and_damaged_arrays(both, port):
-    port.write("rsm0.flux", port.arrays["rsm0.flux"] / np.pi)
+    port.write("rsm.reflected_flux0.flux", port.arrays["rsm.reflected_flux0.flux"] / np.pi)
     code, text, result = both(port)
-    assert (code, result["first"]) == (1, [CASE, "rsm0.flux"])
+    assert (code, result["first"]) == (1, [CASE, "rsm.reflected_flux0"])
     assert "likely: every element is 1/pi times" in text
     assert both(port, "--chained", "--fail-fast")[2]["left"] > 0
-    port.remove("lights.normal")
-    port.write("gbuffer.albedo", np.moveaxis(port.arrays["gbuffer.albedo"], 0, -1))
-    port.write("rsm1.texel", port.arrays["rsm1.texel"].astype(float))
-    assert both(port)[2]["first"] == [CASE, "gbuffer.surface"]
-    assert both(port, "--layout", "rgba", "--unordered", "lights")[0] == 1
-    (port.folder / CASE / "sum.irradiance.npy").write_bytes(b"none")
+    port.remove("lights.pixel_lights.normal")
+    port.write("rsm.map_surface0.albedo", np.moveaxis(port.arrays["rsm.map_surface0.albedo"], 0, -1))
+    port.write("lights.texels1.texel", port.arrays["lights.texels1.texel"].astype(float))
+    assert both(port)[2]["first"] == [CASE, "rsm.map_surface0"]
+    assert both(port, "--layout", "rgba", "--unordered", "lights.pixel_lights")[0] == 1
+    (port.folder / CASE / "pairs.sum.npy").write_bytes(b"none")
     assert both(port, "--format", "github")[0] == 5
 
 
 def test_estimates_and_edges(both, kit, tmp_path):
     port = Port(kit, "truth-matte", tmp_path)
-    mean = port.arrays["truth.mean"]
-    spread = np.sqrt(port.arrays["truth.variance_of_mean"])
-    port.write("truth.mean", mean + spread * np.random.default_rng(1).normal(size=mean.shape))
+    mean = port.arrays["truth.path_traced.mean"]
+    spread = np.sqrt(port.arrays["truth.path_traced.variance_of_mean"])
+    port.write("truth.path_traced.mean", mean + spread * np.random.default_rng(1).normal(size=mean.shape))
     assert both(port)[0] == 0
-    port.write("truth.mean", 1.5 * mean)
+    port.write("truth.path_traced.mean", 1.5 * mean)
     assert both(port)[0] == 1
 
 
 def test_options_and_folders(both, port, tmp_path):
-    depth = port.arrays["gbuffer.depth"].astype(float)
-    port.write("gbuffer.depth", np.where(np.isinf(depth), 1.0, 100 * (depth - 0.1) / (np.where(
+    depth = port.arrays["rsm.surface.depth"].astype(float)
+    port.write("rsm.surface.depth", np.where(np.isinf(depth), 1.0, 100 * (depth - 0.1) / (np.where(
         np.isinf(depth), 1.0, depth) * 99.9)))
-    assert both(port, "--depth", "gbuffer=ndc:0.1:100:32")[0] == 0
-    (tmp_path / "expect.txt").write_text("gbuffer.surface\nsum\n")
+    assert both(port, "--depth", "rsm.surface=ndc:0.1:100:32")[0] == 0
+    (tmp_path / "expect.txt").write_text("rsm.surface\npairs.sum\n")
     assert both(port, "--expect", str(tmp_path / "expect.txt"), "--require", "all")[0] == 0
-    for wrong in (("--stage", "summ"), ("--tier", "sum=T9"), ("--depth", "x"), ("--require", "nothing")):
+    for wrong in (("--stage", "pairs.summ"), ("--tier", "sum=T9"), ("--depth", "x"), ("--require", "nothing")):
         assert both(port, *wrong)[0] == 2
     empty = tmp_path / "empty"
     empty.mkdir()

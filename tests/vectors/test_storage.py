@@ -108,7 +108,7 @@ def test_a_cleared_buffer_is_no_surface():
 
 def test_depth_is_said_in_words():
     assert depth_from("ndc:0.1:100") == ("", Depth("ndc", 0.1, 100.0, 24))
-    assert depth_from("rsm0.depth=linear:0:50:16") == ("rsm0.depth", Depth("linear", 0.0, 50.0, 16))
+    assert depth_from("rsm.surface.depth=linear:0:50:16") == ("rsm.surface.depth", Depth("linear", 0.0, 50.0, 16))
     assert depth_from("reversed:0.1:inf:32")[1].far == np.inf
     for wrong in ("ndc", "ndc:0:100", "ndc:2:1", "linear:0:inf", "log:0.1:100", "ndc:0.1:100:8", "ndc:a:b",
                   "ndc:0.1:100:24:1"):

@@ -19,19 +19,19 @@ EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "port_tests"
 
 def flux_of(kit):
     (case,) = kit.cases(Asked(cases=("sii-warp-b",)))
-    return kit.array(case, "rsm0.flux")
+    return kit.array(case, "rsm.reflected_flux0.flux")
 
 
 def test_a_stage(kit):
     flux = flux_of(kit)
-    assert_stage_close(flux.astype(np.float64), "sii-warp-b", "rsm0.flux", kit=kit)
-    with pytest.raises(AssertionError, match=r"rsm0\.flux is out(.|\n)*likely: every element is pi times"):
-        assert_stage_close(np.pi * flux, "sii-warp-b", "rsm0.flux", kit=kit)
+    assert_stage_close(flux.astype(np.float64), "sii-warp-b", "rsm.reflected_flux0.flux", kit=kit)
+    with pytest.raises(AssertionError, match=r"rsm\.reflected_flux0 is out(.|\n)*likely: every element is pi times"):
+        assert_stage_close(np.pi * flux, "sii-warp-b", "rsm.reflected_flux0.flux", kit=kit)
     with pytest.raises(AssertionError, match="expected shape"):
-        assert_stage_close(flux[0], "sii-warp-b", "rsm0.flux", kit=kit)
-    assert_stage_close(flux.astype(np.float16), "sii-warp-b", "rsm0.flux", tier="T2", kit=kit)
+        assert_stage_close(flux[0], "sii-warp-b", "rsm.reflected_flux0.flux", kit=kit)
+    assert_stage_close(flux.astype(np.float16), "sii-warp-b", "rsm.reflected_flux0.flux", tier="T2", kit=kit)
     with pytest.raises(InputError, match="case: expected one of"):
-        assert_stage_close(flux, "sii-warp-z", "rsm0.flux", kit=kit)
+        assert_stage_close(flux, "sii-warp-z", "rsm.reflected_flux0.flux", kit=kit)
 
 
 def noisy(seed, samples=64, size=24):

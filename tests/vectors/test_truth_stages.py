@@ -11,9 +11,9 @@ from refgi.truth.settings import TruthSettings
 from refgi.truth.truth import trace_truth
 from refgi.vectors.cases import truth as cases
 from refgi.vectors.spec import expected_of
-from refgi.vectors.stages.truth import NAMES, deviation
 from tests.naive.truth import one_bounce
 
+NAMES = tuple(f"truth.path_traced.{one}" for one in ("mean", "variance_of_mean", "samples"))
 CASES = {**cases.QUICK, **cases.FULL}
 AGREE = 2.0  # mean square of standardised differences: 1; to 1.7 where lobes are met by chance, which has heavy tails
 DIFFER = 5.0  # a bug stands out
@@ -36,14 +36,28 @@ def against(known, result):
     return deviation(known[NAMES[0]], known[NAMES[1]], result.mean, result.variance_of_mean)
 
 
+def deviation(mean, variance, other_mean, other_variance):
+    """Return the mean square of what two estimates differ by over the standard error of both: about 1 if they agree.
+
+    Values that neither has an error of, such as pixels without surface, must be equal: inf if they are not.
+    """
+    both = np.asarray(variance, np.float64) + other_variance
+    apart = np.asarray(mean, np.float64) - other_mean
+    if np.any(apart[both == 0] != 0):
+        return np.inf
+    return float((apart[both > 0] ** 2 / both[both > 0]).mean()) if np.any(both > 0) else 0.0
+
+
+@pytest.mark.slow("truth-two-bounces")
 @pytest.mark.parametrize("name", CASES)
 def test_the_chain_is_the_method(name):
     known, settings = made(name)[1], cases.VIEWS[name][1]
     assert against(known, trace_truth(frame_of(name), settings)) < SAME
     assert known[NAMES[0]].mean() > 0
-    assert (known[NAMES[2]] == settings.samples * (known["gbuffer.triangle_id"] >= 0)).all()
+    assert (known[NAMES[2]] == settings.samples * (known["rsm.visible_triangles"] >= 0)).all()
 
 
+@pytest.mark.slow("truth-visible")
 @pytest.mark.parametrize("name", [name if name in cases.QUICK else pytest.param(name, marks=pytest.mark.slow)
                                   for name in CASES])
 def test_another_estimator_agrees(name):
@@ -54,17 +68,18 @@ def test_another_estimator_agrees(name):
     assert 0.5 < against(known, trace_truth(frame_of(name), other)) < AGREE
 
 
+@pytest.mark.slow
 def test_a_sum_over_the_light_s_cone_agrees():
     """The twin: a midpoint rule over directions of the lamp, each ray against every triangle."""
     known = made("truth-matte")[1]
     light = cases.VIEWS["truth-matte"][0].lights[0]
     arrays = {key: array.astype(float) if array.dtype.kind == "f" else array for key, array in known.items()}
     albedo = arrays["materials.diffuse"][arrays["scene.material_of_face"]]
-    pixels = np.argwhere(arrays["gbuffer.triangle_id"] >= 0)[3::30]
+    pixels = np.argwhere(arrays["rsm.visible_triangles"] >= 0)[3::30]
     apart = []
     for at in (tuple(pixel) for pixel in pixels):
         exact = one_bounce(arrays["scene.vertices"], arrays["scene.faces"], albedo, light,
-                           arrays["gbuffer.position"][:, *at], arrays["gbuffer.normal"][:, *at], CELLS)
+                           arrays["rsm.surface.position"][:, *at], arrays["rsm.surface.normal"][:, *at], CELLS)
         error = arrays[NAMES[1]][:, *at] + (QUADRATURE * known[NAMES[0]].mean()) ** 2
         apart.append((arrays[NAMES[0]][:, *at] - exact) ** 2 / error)
     assert len(apart) >= 4

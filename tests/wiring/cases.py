@@ -38,7 +38,7 @@ class Case:
 
     `values` are the keys under test; `over` holds what it takes for them to matter, which other cases test. `scene`
     names one of `SCENES`, `frame` are options of `Frame`. `same` says why the picture stays as it is without
-    `values`, if it does: a bound, an order of passes.
+    `values`, if it does: a bound, an order of passes. `parts` are the cases that are folded into it.
     """
 
     values: Mapping[str, Any]
@@ -46,6 +46,7 @@ class Case:
     scene: str = "lamps"
     frame: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     same: str = ""
+    parts: tuple[str, ...] = ()
 
     def settings(self, kind: type, base: Mapping[str, Any] = NOTHING) -> Any:
         """Return the settings of the case over those that make every case small."""

@@ -9,8 +9,9 @@ from refgi.frame import Frame
 from refgi.scene import DirectionalLight, SpotLight
 from refgi.splat import GatherSettings, Receivers, gather
 from refgi.splat.gather.gather import gather_counted, gather_irradiance
-from tests.naive import gather as naive
+from tests.literal.whole import gather as naive
 from tests.wiring.cases import LAMPS, SCENES, Case, uncovered
+from tests.wiring.fold import fold
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
@@ -34,6 +35,7 @@ CASES = {
     "likeness of places": Case({"interpolation.reach": 0.3}),
     "likeness of a ball": Case({"interpolation.reach": 0.4, "interpolation.least_cosine": 0.3}, scene="smooth"),
 }
+FOLDED = fold(GatherSettings, CASES, BASE)
 EXACT = Case({"interpolation": "none"}, over={"disc.samples": 8}, frame={"width": 70, "height": 66})
 
 
@@ -42,9 +44,9 @@ def test_every_field_has_a_case():
     assert "GatherSettings.interpolation = none" not in uncovered(GatherSettings, {"exact": EXACT})
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_twin(name):
-    check(CASES[name].seen(), CASES[name].settings(GatherSettings, BASE))
+@pytest.mark.parametrize("name", FOLDED)
+def test_the_literal_text(name):
+    check(FOLDED[name].seen(), FOLDED[name].settings(GatherSettings, BASE))
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -60,7 +62,7 @@ def test_without_interpolation():
 
 
 def check(frame, settings):
-    """Compare the picture, and how many pixels ran the sum, with the twin's."""
+    """Compare the picture, and how many pixels ran the sum, with those by the literal text."""
     got = gather_counted(frame, settings)
     expected, ran = naive.gather(frame, settings)
     np.testing.assert_allclose(got.irradiance, expected, rtol=0, atol=ROUNDING * expected.max())

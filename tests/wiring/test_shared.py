@@ -31,7 +31,7 @@ def test_the_method_sums_the_chosen_lights(name, method):
     with observe(record=True) as log:
         function(frame, settings)
     expected = choose_lights(frame, settings.lights)
-    summed = [run.inputs["lights"] for run in log.runs if run.name in SUMS]
+    summed = [run.arguments["lights"] for run in log.runs if run.name in SUMS]
     assert summed
     for lights in summed:
         for field in ("position", "normal", "flux", "lobe_flux", "lobe_axis", "lobe_exponent"):

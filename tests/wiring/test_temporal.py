@@ -11,8 +11,9 @@ from refgi.settings import of, replaced
 from refgi.sssil.hssil import hssil
 from refgi.sssil.settings import HssilSettings, TemporalSettings
 from refgi.sssil.temporal import Sequence
-from tests.naive import temporal
+from tests.literal.whole import temporal
 from tests.wiring.cases import SCENES, Case, uncovered
+from tests.wiring.fold import fold
 
 ROUNDING = 1e-9  # of the brightest pixel: float64 in another order
 COUNTS = 1e-3  # of the brightest pixel: a key that is not heeded
@@ -33,6 +34,7 @@ CASES = {
     "clamped to few pixels": Case({"clamp_radius": 1}, {"clamp": 0.5}),
     "clamped at the edge": Case({"clamp": 0.3}, {"entering_speed": 5.0}),
 }
+FOLDED = fold(TemporalSettings, CASES)
 
 
 def scenes():
@@ -86,11 +88,12 @@ def test_every_field_has_a_case():
     assert uncovered(TemporalSettings, CASES) == set()
 
 
-def test_the_twin(made, computed, evidence):
-    case, settings, pictures = made
+@pytest.mark.parametrize("name", FOLDED)
+def test_the_literal_text(name, computed, evidence):
+    settings = FOLDED[name].settings(TemporalSettings)
     expected = temporal.filtered(*computed, settings)
-    off = max(np.abs(a - b).max() / b.max() for a, b in zip(pictures, expected, strict=True))
-    evidence(f"{case.values}: off by {off:.0e} of the brightest pixel")
+    off = max(np.abs(a - b).max() / b.max() for a, b in zip(rendered(settings), expected, strict=True))
+    evidence(f"{FOLDED[name].parts}: off by {off:.0e} of the brightest pixel")
     assert off < ROUNDING
 
 

@@ -116,6 +116,7 @@ def compared(name):
     return got.mean(axis=0) - expected.mean(axis=0), error, expected.mean(axis=0)
 
 
+@pytest.mark.slow("visible emitters, not blocked")
 @pytest.mark.parametrize("name", CASES)
 def test_the_mean(name, evidence):
     off, error, expected = compared(name)

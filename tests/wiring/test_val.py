@@ -6,9 +6,10 @@ import pytest
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.lights.settings import LightSettings
-from tests.naive import clustered
-from tests.naive.pair_term import with_clamp
+from tests.literal.whole import val as clustered
+from tests.literal.whole.pairs import with_clamp
 from tests.wiring.cases import Case, needed, uncovered, under
+from tests.wiring.fold import fold
 from tests.wiring.pair_cases import PAIR_CASES
 from tests.wiring.shadow_cases import FEW, few, shadow_cases
 
@@ -37,6 +38,8 @@ CASES = {
     "a blur around corners": few({"blur.cosine": -1.0}, BLOCKS | {"blur.extent": 0.4}),
 }
 
+FOLDED = fold(ValSettings, CASES, BASE, elsewhere=("pairs.",))
+
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # what a clamp takes
 
 
@@ -52,11 +55,13 @@ def made(request):
     return case, frame, settings, val(frame, settings)
 
 
-def test_the_twin(made, evidence):
-    case, frame, settings, picture = made
+@pytest.mark.parametrize("name", FOLDED)
+def test_the_literal_text(name, evidence):
+    case = FOLDED[name]
+    frame, settings = case.seen(), case.settings(ValSettings, BASE)
     expected = clustered.picture(frame, with_clamp(settings))
-    off = np.abs(picture - expected).max() / expected.max()
-    evidence(f"{case.values}: off by {off:.0e} of the brightest pixel")
+    off = np.abs(val(frame, settings) - expected).max() / expected.max()
+    evidence(f"{case.parts}: off by {off:.0e} of the brightest pixel")
     assert off < tolerance(settings)
 
 

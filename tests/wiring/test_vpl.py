@@ -7,8 +7,9 @@ import pytest
 
 from refgi.lights import choose_pixel_lights
 from refgi.truth.vpl import VplSettings, vpl
-from tests.naive.vpl import picture as twin
+from tests.literal.whole.vpl import picture as twin
 from tests.wiring.cases import Case, uncovered
+from tests.wiring.fold import fold
 
 SINGLE = 2e-6  # of the brightest pixel: rays and what they carry are float32, some 30 roundings of 6e-8
 COUNTS = 1e-3  # of the brightest pixel: a key that is not heeded
@@ -37,6 +38,9 @@ CASES = {
 }
 
 
+FOLDED = fold(VplSettings, CASES, BASE)
+
+
 def test_every_field_has_a_case():
     assert uncovered(VplSettings, CASES, BASE) == set()
 
@@ -49,14 +53,16 @@ def made(request):
     return case, frame, settings, vpl(frame, settings)
 
 
-def test_the_twin(made, evidence):
-    case, frame, settings, picture = made
+@pytest.mark.parametrize("name", FOLDED)
+def test_the_literal_text(name, evidence):
+    case = FOLDED[name]
+    frame, settings = case.seen(), case.settings(VplSettings, BASE)
     chosen = settings.lights
     lights = choose_pixel_lights(frame.rsms, count=None if chosen.pattern == "all" else chosen.count,
                                  pattern=chosen.pattern, seed=chosen.seed, filtered=chosen.filtered)
     expected = twin(frame, lights, settings.visibility, settings.maps, chosen.seed)
-    off = np.abs(picture - expected).max() / expected.max()
-    evidence(f"{case.values}: off by {off:.0e} of the brightest pixel")
+    off = np.abs(vpl(frame, settings) - expected).max() / expected.max()
+    evidence(f"{case.parts}: off by {off:.0e} of the brightest pixel")
     assert off < SINGLE
 
 

@@ -103,11 +103,11 @@ class Step(NamedTuple):
 
 
 STEPS = (Step("deferred rendering", ("rsm.gbuffer", "rsm.resolve", "rsm.rasterize", "rsm.direct", "rsm.shadow_map",
-                                     "rsm.facing", "frame."), 0.4),
-         Step("VPL generation", ("rsm.reflective", "lights.draw", "lights.choose", "lights.refraction",
-                                 "rsm.solid_angles"), 0.1),
+                                     "rsm.lamp_irradiance", "rsm.facing", "frame."), 0.4),
+         Step("VPL generation", ("rsm.reflective", "lights.", "rsm.solid_angles"), 0.1),
          Step("VAL clustering", ("cluster.kmeans", "cluster.area_lights"), 0.5),
-         Step("CSSM", ("cluster.shadow_maps", "cluster.occluders", "cluster.blockers", "rsm.paraboloid"), 4.2),
+         Step("CSSM", ("cluster.shadow_maps", "cluster.occluders", "cluster.blockers", "cluster.distances",
+                       "cluster.seen_vertices", "rsm.paraboloid"), 4.2),
          Step("indirect illumination", ("cluster.irradiance", "cluster.visibility", "pairs."), 35.0),
          Step("geometry-aware blur", ("cluster.blur",), 10.7))
 REST = "all else"  # between stages: memory, arrays that are laid out anew

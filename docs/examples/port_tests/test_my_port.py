@@ -17,14 +17,15 @@ def inputs(refgi_kit):
 
 
 def test_lights(inputs):
-    lights = my_port.lights_of(inputs["rsm0.texel"], inputs["rsm0.weight"], inputs["rsm0.position"],
-                               inputs["rsm0.normal"], inputs["rsm0.flux"])
+    lights = my_port.lights_of(inputs["lights.texels0.texel"], inputs["lights.texels0.weight"],
+                               inputs["rsm.map_surface0.position"], inputs["rsm.map_surface0.normal"],
+                               inputs["rsm.reflected_flux0.flux"])
     for name, array in zip(("position", "normal", "flux"), lights, strict=True):
-        assert_stage_close(array, CASE, f"lights.{name}")
+        assert_stage_close(array, CASE, f"lights.pixel_lights.{name}")
 
 
 def test_sum(inputs):
-    lights = [inputs[f"lights.{name}"] for name in ("position", "normal", "flux")]
-    total = my_port.irradiance(inputs["gbuffer.position"], inputs["gbuffer.normal"],
-                               inputs["gbuffer.triangle_id"] >= 0, lights)
-    assert_stage_close(total, CASE, "sum.irradiance")
+    lights = [inputs[f"lights.pixel_lights.{name}"] for name in ("position", "normal", "flux")]
+    total = my_port.irradiance(inputs["rsm.surface.position"], inputs["rsm.surface.normal"],
+                               inputs["rsm.visible_triangles"] >= 0, lights)
+    assert_stage_close(total, CASE, "pairs.sum")

@@ -31,15 +31,13 @@ static void blur_along(const Surface *s, const float *in, float *out, int dy, in
     }
 }
 
-void blur_stage(Case *c, int level) {
-    const Array *light = get(c, "gather%d.irradiance", level);
-    const char *how = fact(c, "blur");
-    Surface s = {light->shape[1], light->shape[2], get(c, "level%d.depth", level)->f, get(c, "level%d.normal", level)->f,
-                 get(c, "level%d.position", level)->f, (float)json_number(json_at(how, "plane_tolerance"), 0),
-                 (float)json_number(json_at(how, "cosine"), 0), (int)json_number(json_at(how, "size"), 1)};
+void blur_stage(Case *c) {
+    const Array *light = get(c, "");
+    Surface s = {light->shape[1], light->shape[2], get(c, ".depth")->f, get(c, ".normal")->f, get(c, ".position")->f,
+                 number(c, "plane_tolerance"), number(c, "cosine"), (int)number(c, "size")};
     float *between = calloc((size_t)light->size, sizeof *between);
     blur_along(&s, light->f, between, 0, 1);
-    blur_along(&s, between, make(c, "blur%d.irradiance", level)->f, 1, 0);
+    blur_along(&s, between, make(c, "")->f, 1, 0);
     free(between);
 }
 
@@ -99,24 +97,18 @@ static vec3 upsampled(const Upsampling *u, int k) {
     return nearest < 0 ? v3(0, 0, 0) : plane3(u->light, texels, nearest);
 }
 
-/* `level` -1: the picture. The light of coarser levels is that of the coarsest, blurred where there is a blur. */
-void light_stage(Case *c, int level) {
-    int picture = level < 0, blurred = has(c, "blur0.irradiance"), above = level + 1;
-    const char *own = blurred ? "blur%d.irradiance" : "gather%d.irradiance", *how = fact(c, "upsampling");
-    const Array *light = get(c, has(c, "light%d.irradiance", above) ? "light%d.irradiance" : own, above);
-    const Array *depth = picture ? get(c, "gbuffer.depth") : get(c, "level%d.depth", level);
-    const float *added = picture ? 0 : get(c, own, level)->f;
-    float *out = picture ? make(c, "picture.irradiance")->f : make(c, "light%d.irradiance", level)->f;
-    Upsampling u = {depth->shape[0], depth->shape[1], light->shape[1], light->shape[2], 1, depth->f,
-                    picture ? get(c, "gbuffer.normal")->f : get(c, "level%d.normal", level)->f,
-                    get(c, "level%d.depth", above)->f, get(c, "level%d.normal", above)->f, light->f,
-                    (float)json_number(json_at(how, "depth_sigma"), 0), (float)json_number(json_at(how, "normal_power"), 0)};
-    while ((u.h + u.factor - 1) / u.factor != u.ch || (u.w + u.factor - 1) / u.factor != u.cw) u.factor *= 2;
+/* Light of a coarser level, its depth and normal, those of the finer one, and what that has gathered itself; the last
+   is missing where the finer level is the picture. */
+void upsample_stage(Case *c) {
+    const Array *light = get(c, ""), *depth = get_at(c, ".depth", 1);
+    const float *added = c->reads > 5 ? get_at(c, "", 5)->f : NULL;
+    float *out = make(c, "")->f;
+    Upsampling u = {depth->shape[0], depth->shape[1], light->shape[1], light->shape[2], (int)number(c, "factor"),
+                    depth->f, get_at(c, ".normal", 1)->f, get(c, ".depth")->f, get(c, ".normal")->f, light->f,
+                    number(c, "depth_sigma"), number(c, "normal_power")};
     for (int k = 0; k < u.h * u.w; k++) {
         if (u.depth[k] == INFINITY) continue;
         vec3 total = upsampled(&u, k);
         put3(out, u.h * u.w, k, added ? add(total, plane3(added, u.h * u.w, k)) : total);
     }
 }
-
-void picture_stage(Case *c) { light_stage(c, -1); }

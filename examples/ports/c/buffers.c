@@ -1,17 +1,23 @@
 /* What each texel of a camera or map sees: the nearest triangle, and depth, position, normal, albedo there. */
 #include "json.h"
 #include "stages.h"
+#include <string.h>
 
-View view_of(Case *c, const char *name) {
-    const char *known = fact(c, "%s", name);
+/* The manifest says at the stage of its ids what a view is: rsm.map_triangles0.projection.origin. */
+View view_of(Case *c) {
+    char name[96] = "";
+    for (int k = 0; k < c->reads; k++)
+        if (strstr(c->read[k].name, ".projection.origin")) strcpy(name, c->read[k].name);
+    *strstr(name, ".projection") = 0;
+    const char *known = json_at(c->facts, name);
     View v;
-    v.kind = json_is(json_at(known, "projection"), "orthographic") ? ORTHOGRAPHIC : PERSPECTIVE;
+    v.kind = json_is(json_at(known, "projection"), "parallel") ? ORTHOGRAPHIC : PERSPECTIVE;
     v.maps = (int)json_number(json_at(known, "maps"), 1);
     v.rows = (int)json_number(json_at(known, "rows"), 0);
     v.columns = (int)json_number(json_at(known, "columns"), 0);
-    v.origin = get(c, "%s.origin", name)->f;
-    v.frame = get(c, "%s.frame", name)->f;
-    v.half = get(c, "%s.half", name)->f;
+    v.origin = get(c, "projection.origin")->f;
+    v.frame = get(c, "projection.frame")->f;
+    v.half = get(c, "projection.half")->f;
     return v;
 }
 
@@ -97,9 +103,9 @@ vec3 normal_at(Case *c, int triangle, Ray ray) {
     return shading_normal(c, triangle, face, add(ray.origin, scale(ray.direction, ray_depth(c, triangle, face, ray))));
 }
 
-void ids_stage(Case *c, const char *name, const char *view) {
-    View v = view_of(c, view);
-    int *id = make(c, "%s.triangle_id", name)->i, triangles = get(c, "scene.faces")->shape[0];
+void ids_stage(Case *c) {
+    View v = view_of(c);
+    int *id = make(c, "")->i, triangles = get(c, "scene.faces")->shape[0];
     for (int map = 0; map < v.maps; map++)
         for (int row = 0; row < v.rows; row++)
             for (int column = 0; column < v.columns; column++, id++) {
@@ -117,14 +123,13 @@ void ids_stage(Case *c, const char *name, const char *view) {
             }
 }
 
-void surface_stage(Case *c, const char *name, const char *view) {
-    View v = view_of(c, view);
-    const int *id = get(c, "%s.triangle_id", name)->i, *material = get(c, "scene.material_of_face")->i;
+void surface_stage(Case *c) {
+    View v = view_of(c);
+    const int *id = get(c, "_triangles")->i, *material = get(c, "scene.material_of_face")->i;
     const float *diffuse = get(c, "materials.diffuse")->f;
     int count = v.maps * v.rows * v.columns;
-    float *depth = make(c, "%s.depth", name)->f, *position = make(c, "%s.position", name)->f;
-    float *normal = make(c, "%s.normal", name)->f;
-    float *albedo = has(c, "%s.albedo", name) ? make(c, "%s.albedo", name)->f : 0;
+    float *depth = make(c, ".depth")->f, *position = make(c, ".position")->f;
+    float *normal = make(c, ".normal")->f, *albedo = make(c, ".albedo")->f;
     for (int k = 0; k < count; k++) {
         depth[k] = INFINITY;
         if (id[k] < 0) continue;
@@ -134,6 +139,6 @@ void surface_stage(Case *c, const char *name, const char *view) {
         depth[k] = ray_depth(c, id[k], n, ray);
         put3(position, count, k, add(ray.origin, scale(ray.direction, depth[k])));
         put3(normal, count, k, shading_normal(c, id[k], n, plane3(position, count, k)));
-        if (albedo) put3(albedo, count, k, row3(diffuse + 3 * material[id[k]]));
+        put3(albedo, count, k, row3(diffuse + 3 * material[id[k]]));
     }
 }

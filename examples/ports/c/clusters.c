@@ -1,44 +1,49 @@
 /* Clusters of pixel lights by k-means over position and normal (VAL Sec. 5.1, E-VAL-11), and their shared visibility. */
 #include "json.h"
 #include "stages.h"
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 typedef struct { int lights, count; const float *position, *normal; float *center, *axis; float wx, wa, diagonal; } Clusters;
 
-static float number(Case *c, const char *object, const char *key) {
-    return (float)json_number(json_at(fact(c, "%s", object), key), 0);
+typedef struct { float *low, *high; } Box;
+
+static Box box_of(Case *c) {
+    Box box = {make(c, ".low")->f, make(c, ".high")->f};
+    for (int k = 0; k < 3; k++) box.low[k] = INFINITY, box.high[k] = -INFINITY;
+    return box;
 }
 
-static void widen(float *box, vec3 p) {
+static void widen(Box box, vec3 p) {
     const float xyz[3] = {p.x, p.y, p.z};
     for (int k = 0; k < 3; k++) {
-        box[k] = fminf(box[k], xyz[k]);
-        box[3 + k] = fmaxf(box[3 + k], xyz[k]);
+        box.low[k] = fminf(box.low[k], xyz[k]);
+        box.high[k] = fmaxf(box.high[k], xyz[k]);
     }
 }
 
-void extents_stage(Case *c) {
-    const Array *id = get(c, "gbuffer.triangle_id");
-    float *visible = make(c, "extents.visible")->f, *lit = make(c, "extents.illuminated")->f;
-    for (int k = 0; k < 3; k++) visible[k] = lit[k] = INFINITY, visible[3 + k] = lit[3 + k] = -INFINITY;
+void visible_extent_stage(Case *c) {
+    const Array *id = get(c, "_triangles");
+    Box visible = box_of(c);
     for (int k = 0; k < id->size; k++)
-        if (id->i[k] >= 0) widen(visible, plane3(get(c, "gbuffer.position")->f, id->size, k));
-    for (int map = 0; fact(c, "rsm%d", map); map++) {
-        const Array *position = get(c, "rsm%d.position", map);
+        if (id->i[k] >= 0) widen(visible, plane3(get(c, ".position")->f, id->size, k));
+}
+
+/* Of maps of at most 96 x 96 texels: every texel. */
+void illuminated_extent_stage(Case *c) {
+    Box lit = box_of(c);
+    for (int map = 0; map < has(c, ".position"); map++) {
+        const Array *position = get_at(c, ".position", map);
         for (int k = 0; k < position->size / 3; k++)
             if (sends(c, map, k)) widen(lit, plane3(position->f, position->size / 3, k));
     }
 }
 
-static Clusters clusters_of(Case *c, int round) {
-    Clusters k = {get(c, "lights.position")->shape[1], (int)number(c, "kmeans", "clusters"), get(c, "lights.position")->f,
-                  get(c, "lights.normal")->f, 0, 0, number(c, "kmeans", "w_x"), number(c, "kmeans", "w_a"), 1.0f};
-    if (round >= 0) k.center = get(c, "kmeans.center%d", round)->f, k.axis = get(c, "kmeans.normal%d", round)->f;
-    if (!has(c, "kmeans.center0")) return k;
-    const float *box = get(c, "extents.illuminated")->f;
-    k.diagonal = length(sub(row3(box + 3), row3(box)));
+static Clusters clusters_of(Case *c) {
+    const Array *position = get(c, ".position"), *center = has(c, ".center") ? get(c, ".center") : NULL;
+    Clusters k = {position->shape[1], (int)number(c, "count"), position->f, get(c, ".normal")->f, 0, 0,
+                  number(c, "w_x"), number(c, "w_a"), 1.0f};
+    if (center) k.count = center->shape[1], k.center = center->f, k.axis = get(c, ".axis")->f;
+    if (has(c, ".low")) k.diagonal = length(sub(row3(get(c, ".high")->f), row3(get(c, ".low")->f)));
     return k;
 }
 
@@ -72,8 +77,8 @@ static void means(const Clusters *k, const int *of, float *center, float *axis) 
 }
 
 void kmeans_start_stage(Case *c) {
-    Clusters k = clusters_of(c, -1);
-    float *center = make(c, "kmeans.center0")->f, *axis = make(c, "kmeans.normal0")->f;
+    Clusters k = clusters_of(c);
+    float *center = make(c, ".center")->f, *axis = make(c, ".axis")->f;
     for (int j = 0; j < k.count; j++) {
         int light = j * k.lights / k.count;
         put3(center, k.count, j, plane3(k.position, k.lights, light));
@@ -81,29 +86,37 @@ void kmeans_start_stage(Case *c) {
     }
 }
 
-void kmeans_assign_stage(Case *c, int round) {
-    Clusters k = clusters_of(c, round);
-    int *of = make(c, "kmeans.of%d", round)->i;
-    float *distance = make(c, "kmeans.distance%d", round)->f;
+void kmeans_assign_stage(Case *c) {
+    Clusters k = clusters_of(c);
+    int *of = make(c, ".of")->i;
+    float *distance = make(c, ".distance")->f;
     for (int light = 0; light < k.lights; light++) of[light] = nearest(&k, light, distance + light);
 }
 
-void kmeans_means_stage(Case *c, int round) {
-    Clusters k = clusters_of(c, round - 1);
-    means(&k, get(c, "kmeans.of%d", round - 1)->i, make(c, "kmeans.center%d", round)->f, make(c, "kmeans.normal%d", round)->f);
+void kmeans_means_stage(Case *c) {
+    Clusters k = clusters_of(c);
+    means(&k, get(c, ".of")->i, make(c, ".center")->f, make(c, ".axis")->f);
 }
 
-/* Rounds from the second on, until no light changes its cluster. */
-void kmeans_stage(Case *c) {
-    int rounds = has(c, "kmeans.center2");
-    Clusters k = clusters_of(c, rounds ? 2 : -1);
-    float *center = make(c, "clusters.center")->f, *axis = make(c, "clusters.normal")->f, distance;
-    int *of = make(c, "clusters.of")->i, changed = rounds;
+/* Each light is a cluster where as many are asked for. */
+void kmeans_each_stage(Case *c) {
+    const Array *position = get(c, ".position"), *normal = get(c, ".normal");
+    int *of = make(c, ".of")->i, lights = position->shape[1];
+    for (int light = 0; light < lights; light++) of[light] = light;
+    memcpy(make(c, ".center")->f, position->f, (size_t)position->size * sizeof(float));
+    memcpy(make(c, ".normal")->f, normal->f, (size_t)normal->size * sizeof(float));
+}
+
+/* Further rounds, until no light changes its cluster. */
+void kmeans_rounds_stage(Case *c) {
+    Clusters k = clusters_of(c);
+    float *center = make(c, ".center")->f, *axis = make(c, ".normal")->f, distance;
+    int *of = make(c, ".of")->i, changed = 1;
     size_t size = 3 * (size_t)k.count * sizeof(float);
-    for (int light = 0; light < k.lights; light++) of[light] = rounds ? nearest(&k, light, &distance) : light;
-    memcpy(center, rounds ? k.center : k.position, size);
-    memcpy(axis, rounds ? k.axis : k.normal, size);
-    for (int round = 2; changed && round < (int)number(c, "kmeans", "most rounds"); round++) {
+    for (int light = 0; light < k.lights; light++) of[light] = nearest(&k, light, &distance);
+    memcpy(center, k.center, size);
+    memcpy(axis, k.axis, size);
+    for (int round = 0; changed && round < (int)number(c, "rounds"); round++) {
         k.center = center;
         k.axis = axis;
         means(&k, of, center, axis);
@@ -118,8 +131,8 @@ void kmeans_stage(Case *c) {
 
 /* E = sum V_m E_m over all clusters. */
 void shared_sum_stage(Case *c) {
-    const Array *parts = get(c, "parts.irradiance"), *share = get(c, "visibility.share");
-    Array *made = make(c, "sum.irradiance");
+    const Array *parts = get_at(c, "", 0), *share = get_at(c, "", 1);
+    Array *made = make(c, "");
     int plane = made->size / 3;
     for (int k = 0; k < parts->size; k++)
         made->f[k % made->size] += parts->f[k] * share->f[k / made->size * plane + k % plane];

@@ -8,13 +8,13 @@ static float turn(double x) {
 }
 
 /* Points of the sequence and the shift of texel n of a tile; the manifest asks for double precision here. */
-void shifts_stage(Case *c, int level) {
-    const char *known = fact(c, "samples%d", level), *steps = json_at(known, "steps");
+void shifts_stage(Case *c) {
+    const char *steps = fact(c, "steps");
     double step[2] = {json_number(json_first(steps), 0), json_number(json_next(json_first(steps)), 0)};
-    const float *shift = get(c, "samples%d.shift", level)->f;
-    Array *points = make(c, "samples%d.points", level), *shifts = make(c, "samples%d.shifts", level);
-    double crown = json_number(json_at(known, "crown"), 0);
-    int disc = (int)json_number(json_at(known, "disc"), 0);
+    const float *shift = get(c, ".start")->f;
+    Array *points = make(c, ".points"), *shifts = make(c, ".shifts");
+    double crown = number(c, "crown");
+    int disc = (int)number(c, "inner");
     for (int k = 0; k < points->shape[0]; k++) {
         int j = k < disc ? k : k - disc; /* of the disc and of the crown, both counted from 0 */
         double v = 0.5 + j * step[1];
@@ -26,14 +26,12 @@ void shifts_stage(Case *c, int level) {
     for (int k = 0; k < shifts->size; k++) shifts->f[k] = turn(shift[k % 2] + k / 2 * crown * step[k % 2]);
 }
 
-void samples_stage(Case *c, int level) {
-    const char *known = fact(c, "samples%d", level);
-    const Array *points = get(c, "samples%d.points", level), *shifts = get(c, "samples%d.shifts", level);
-    int disc = (int)json_number(json_at(known, "disc"), 0), crown = (int)json_number(json_at(known, "crown"), 0);
-    int uniform = json_is(json_at(known, "density"), "uniform"), n = points->shape[0], texels = shifts->size / 2;
-    float r = (float)json_number(json_at(known, "radius"), 0);
-    int *offset = make(c, "samples%d.offsets", level)->i;
-    Array *weight = make(c, "samples%d.weight", level);
+void samples_stage(Case *c) {
+    const Array *points = get(c, ".points"), *shifts = get(c, ".shifts");
+    int n = points->shape[0], texels = shifts->size / 2, disc = (int)number(c, "inner"), crown = n - disc;
+    int uniform = json_is(fact(c, "density"), "uniform"), *offset = make(c, ".offsets")->i;
+    float r = number(c, "radius");
+    Array *weight = make(c, ".weight");
     for (int k = 0; k < texels * n; k++) {
         const float *point = points->f + k % n * 3, *shift = shifts->f + k / n * 2;
         int inner = k % n < disc;
@@ -61,12 +59,10 @@ static float disc_factor(vec3 x, vec3 n, vec3 sender, vec3 facing, float area) {
     return PI * received * disc / (square + disc);
 }
 
-void gather_stage(Case *c, int level) {
-    const Array *areas = get(c, "level%d.area", level), *offsets = get(c, "samples%d.offsets", level);
-    const Array *weights = get(c, "samples%d.weight", level);
-    const float *position = get(c, "level%d.position", level)->f, *normal = get(c, "level%d.normal", level)->f;
-    const float *radiance = get(c, "level%d.radiance", level)->f;
-    float *out = make(c, "gather%d.irradiance", level)->f;
+void gather_stage(Case *c) {
+    const Array *areas = get(c, ".area"), *offsets = get(c, ".offsets"), *weights = get(c, ".weight");
+    const float *position = get(c, ".position")->f, *normal = get(c, ".normal")->f, *radiance = get(c, ".radiance")->f;
+    float *out = make(c, "")->f;
     int h = areas->shape[0], w = areas->shape[1], n = offsets->shape[2], plane = h * w;
     for (int k = 0; k < plane; k++) {
         if (areas->f[k] <= 0.0f) continue;

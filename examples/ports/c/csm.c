@@ -15,8 +15,6 @@ static float phase(int k, float t) {
     return PI * ((product - 2.0f * rintf(0.5f * product)) + rest);
 }
 
-static int terms(Case *c) { return (int)json_number(json_at(fact(c, "csm"), "terms"), 0); }
-
 /* f_M - 1 of depths that differ by x. */
 static float series(int m, float x) {
     float f = -0.5f;
@@ -25,31 +23,30 @@ static float series(int m, float x) {
 }
 
 void series_stage(Case *c) {
-    int m = terms(c);
+    int m = (int)number(c, "terms");
     float low = 0.0f, high = 0.5f / (float)m; /* f is 1 for the first time at about 0.305 / M */
     for (int k = 0; k < 40; k++) {
         float middle = 0.5f * (low + high);
         if (series(m, middle) < 0.0f) low = middle;
         else high = middle;
     }
-    Array *bias = make(c, "series.bias"), *weight = make(c, "series.weight");
+    Array *bias = make(c, ".bias"), *weight = make(c, ".weight");
     for (int k = 0; k < bias->size; k++) bias->f[k] = high;
     for (int k = 0; k < weight->size; k++) weight->f[k] = 2.0f / frequency(k);
-    make(c, "series.range")->f[0] = 1.0f - 2.0f * high;
+    make(c, ".end")->f[0] = 1.0f - 2.0f * high;
 }
-
-static int logarithmic(Case *c) { return json_is(json_at(fact(c, "csm"), "depth_scale"), "log_map"); }
 
 /* Depth 0 at what is nearest, h = max(2 e - 1, e / 2) at what is farthest; in between by the distance or its log. */
 void scale_stage(Case *c) {
-    const Array *near = get(c, "maps.near");
-    const float *far = get(c, "maps.far")->f;
-    float e = get(c, "series.range")->f[0], *origin = make(c, "scale.origin")->f, *slope = make(c, "scale.slope")->f;
+    const Array *near = get(c, ".near");
+    const float *far = get(c, "ranges.far")->f;
+    float e = get(c, ".end")->f[0], *origin = make(c, ".origin")->f, *slope = make(c, ".slope")->f;
+    int logarithmic = json_is(fact(c, "kind"), "log_map");
     for (int k = 0; k < near->size; k++) {
         if (near->f[k] == INFINITY) continue;
         origin[k] = near->f[k];
         float ratio = fmaxf(far[k] / near->f[k], LEAST_RATIO);
-        slope[k] = fmaxf(2.0f * e - 1.0f, 0.5f * e) / (logarithmic(c) ? log2f(ratio) : near->f[k] * (ratio - 1.0f));
+        slope[k] = fmaxf(2.0f * e - 1.0f, 0.5f * e) / (logarithmic ? log2f(ratio) : near->f[k] * (ratio - 1.0f));
     }
 }
 
@@ -65,14 +62,15 @@ static float distance_of(const Scale *s, float t) {
 }
 
 static Scale scale_of(Case *c, int map) {
-    Scale s = {get(c, "scale.origin")->f[map], get(c, "scale.slope")->f[map], get(c, "series.range")->f[0], logarithmic(c)};
+    Scale s = {get(c, ".origin")->f[map], get(c, ".slope")->f[map], get(c, ".end")->f[0],
+               *fact(c, "logarithmic") == 't'};
     return s;
 }
 
 /* Beyond the disc stands what is mirrored at the light's plane: the texel at (s, t) / (s^2 + t^2). */
 void depths_stage(Case *c) {
-    const Array *depth = get(c, "maps.depth");
-    float *out = make(c, "maps.t")->f;
+    const Array *depth = get(c, "depth_maps");
+    float *out = make(c, "")->f;
     int n = depth->shape[1];
     for (int k = 0; k < depth->size; k++) {
         Scale scale = scale_of(c, k / (n * n));
@@ -88,13 +86,19 @@ void depths_stage(Case *c) {
     }
 }
 
+/* A map with something on it has depths above 0: its texels without are at the far end. */
+static int is_empty(const float *t, int texels) {
+    while (texels > 0 && t[texels - 1] == 0.0f) texels--;
+    return texels == 0;
+}
+
 void basis_stage(Case *c) {
-    const Array *t = get(c, "maps.t");
-    float *out = make(c, "basis.0")->f;
-    int plane = t->shape[1] * t->shape[2], m = terms(c), channels = 4 * m + 1;
+    const Array *t = get(c, "map_depths");
+    float *out = make(c, "")->f;
+    int plane = t->shape[1] * t->shape[2], m = (int)number(c, "terms"), channels = 4 * m + 1;
     for (int k = 0; k < t->size; k++) {
         float *to = out + (k / plane) * channels * plane + k % plane, z = t->f[k];
-        if (get(c, "scale.origin")->f[k / plane] <= 0.0f) continue;
+        if (is_empty(t->f + k / plane * plane, plane)) continue;
         for (int j = 0; j < m; j++) {
             to[j * plane] = sinf(phase(j, z));
             to[(m + j) * plane] = cosf(phase(j, z));
@@ -107,23 +111,24 @@ void basis_stage(Case *c) {
 
 /* Means of 2 x 2 texels; of an odd side the last counts twice. */
 void mip_stage(Case *c) {
-    for (int level = 1; has(c, "basis.%d", level); level++) {
-        Array *to = make(c, "basis.%d", level);
-        const Array *from = level > 1 ? made(c, "basis.%d", level - 1) : get(c, "basis.0");
+    const Array *from = get(c, "basis");
+    for (int level = 1; level <= writes(c, ""); level++) {
+        Array *to = make_at(c, "", level - 1);
         int n = to->shape[2], side = from->shape[2];
         for (int k = 0; k < to->size; k++) {
             const float *plane = from->f + k / (n * n) * side * side;
             int y = 2 * (k / n % n), x = 2 * (k % n), below = y + 1 < side ? y + 1 : y, right = x + 1 < side ? x + 1 : x;
             to->f[k] = 0.25f * (plane[y * side + x] + plane[y * side + right] + plane[below * side + x] + plane[below * side + right]);
         }
+        from = to;
     }
 }
 
 typedef struct { vec3 center; const float *frame; float delta, near; } Area;
 
 static Area area_of(Case *c, int map) {
-    Area a = {row3(get(c, "maps.center")->f + 3 * map), get(c, "areas.frame")->f + 9 * map, get(c, "areas.delta")->f[map],
-              get(c, "maps.near")->f[map]};
+    Area a = {row3(get(c, ".center")->f + 3 * map), get(c, ".frame")->f + 9 * map, get(c, ".delta")->f[map],
+              get(c, ".near")->f[map]};
     return a;
 }
 
@@ -137,14 +142,14 @@ static void put_region(const Area *a, vec3 away, float d, float z, float *region
 }
 
 void search_stage(Case *c) {
-    Array *pending = make(c, "search.pending");
-    float *region = make(c, "search.region")->f, *distance = make(c, "search.distance")->f;
-    const int *id = get(c, "gbuffer.triangle_id")->i;
+    Array *pending = make(c, ".pending");
+    float *region = make(c, ".region")->f, *distance = make(c, ".distance")->f;
+    const int *id = get(c, "_triangles")->i;
     int plane = pending->size / pending->shape[0];
     for (int k = 0; k < pending->size; k++) {
         int map = k / plane, pixel = k % plane;
         Area a = area_of(c, map);
-        vec3 away = sub(plane3(get(c, "gbuffer.position")->f, plane, pixel), a.center);
+        vec3 away = sub(plane3(get(c, ".position")->f, plane, pixel), a.center);
         float d = length(away);
         if (id[pixel] < 0 || a.near == INFINITY || a.delta <= 0.0f || dot(row3(a.frame + 6), away) <= 0.0f || d <= a.near) continue;
         pending->i[k] = 1;
@@ -163,11 +168,11 @@ static float bilinear(const float *plane, int side, float x, float y) {
 }
 
 /* Means of the channels over a disc, by 8 texels of two levels: level max(0, log2(radius side) - 1). */
-void means_stage(Case *c, const char *stage, const char *asked) {
-    const Array *wanted = get(c, "%s.%s", stage, asked), *region = get(c, "%s.region", stage), *level[12];
-    Array *out = make(c, "%s.means", stage);
-    int levels = 0, channels = out->shape[1], plane = wanted->size / wanted->shape[0], n = get(c, "basis.0")->shape[2];
-    for (; levels < 12 && has(c, "basis.%d", levels); levels++) level[levels] = get(c, "basis.%d", levels);
+void means_stage(Case *c) {
+    const Array *wanted = get_at(c, "", 0), *region = get(c, ".region"), *level[12] = {get(c, "basis")};
+    Array *out = make(c, "");
+    int levels = 1, channels = out->shape[1], plane = wanted->size / wanted->shape[0], n = level[0]->shape[2];
+    for (; levels < 12 && levels <= has(c, "mip_levels"); levels++) level[levels] = get_at(c, "mip_levels", levels - 1);
     for (int k = 0; k < wanted->size; k++) {
         const float *disc = region->f + 3 * plane * (k / plane) + k % plane;
         if (!wanted->i[k]) continue;
@@ -189,8 +194,8 @@ void means_stage(Case *c, const char *stage, const char *asked) {
 
 /* sum w_k (cos(c_k d) S_k - sin(c_k d) C_k), from channel `first` on. */
 static float test(Case *c, const Array *means, int k, int plane, int first, float d) {
-    int m = terms(c), channels = means->shape[1];
-    const float *at = means->f + (k / plane * channels + first) * plane + k % plane, *weight = get(c, "series.weight")->f;
+    int m = get(c, ".weight")->size, channels = means->shape[1];
+    const float *at = means->f + (k / plane * channels + first) * plane + k % plane, *weight = get(c, ".weight")->f;
     float sum = 0.0f;
     for (int j = 0; j < m; j++)
         sum += weight[j] * (cosf(phase(j, d)) * at[j * plane] - sinf(phase(j, d)) * at[(m + j) * plane]);
@@ -198,16 +203,16 @@ static float test(Case *c, const Array *means, int k, int plane, int first, floa
 }
 
 void penumbra_stage(Case *c) {
-    const Array *pending = get(c, "search.pending"), *means = get(c, "search.means");
-    int *shaded = make(c, "penumbra.shaded")->i, plane = pending->size / pending->shape[0], m = terms(c);
-    float *z_avg = make(c, "penumbra.z_avg")->f, *region = make(c, "penumbra.region")->f, *depth = make(c, "penumbra.t")->f;
-    float least = (float)json_number(json_at(fact(c, "csm"), "least blocked share"), 0), bias = get(c, "series.bias")->f[0];
+    const Array *pending = get(c, ".pending"), *means = get(c, "_means");
+    int *shaded = make(c, ".shaded")->i, plane = pending->size / pending->shape[0], m = get(c, ".weight")->size;
+    float *z_avg = make(c, ".z_avg")->f, *region = make(c, ".region")->f, *depth = make(c, ".t")->f;
+    float least = number(c, "least blocked share"), bias = get(c, ".bias")->f[0];
     for (int k = 0; k < pending->size; k++) {
         int map = k / plane, pixel = k % plane;
         if (!pending->i[k]) continue;
         Area a = area_of(c, map);
         Scale s = scale_of(c, map);
-        vec3 away = sub(plane3(get(c, "gbuffer.position")->f, plane, pixel), a.center);
+        vec3 away = sub(plane3(get(c, ".position")->f, plane, pixel), a.center);
         float d = length(away), t = depth[k] = depth_of(&s, d), blocked = 0.5f - test(c, means, k, plane, 0, t - bias);
         if (blocked < least) continue;
         float mean = 0.5f * means->f[(map * means->shape[1] + 4 * m) * plane + pixel];
@@ -220,16 +225,16 @@ void penumbra_stage(Case *c) {
 }
 
 void csm_visibility_stage(Case *c) {
-    const Array *shaded = get(c, "penumbra.shaded"), *means = get(c, "penumbra.means");
-    const float *depth = get(c, "penumbra.t")->f, *hard = has(c, "hard.share") ? get(c, "hard.share")->f : NULL;
-    float *share = make(c, "visibility.share")->f, gain = (float)json_number(json_at(fact(c, "csm"), "gain"), 1);
+    const Array *shaded = get(c, ".shaded"), *means = get(c, "_means");
+    const float *depth = get(c, ".t")->f, *hard = has(c, "depth_tests") ? get(c, "depth_tests")->f : NULL;
+    float *share = make(c, "")->f, gain = number(c, "gain");
     int plane = shaded->size / shaded->shape[0];
     for (int k = 0; k < shaded->size; k++) {
         if (!shaded->i[k] && !hard) { /* every light has an extent */
             share[k] = 1.0f;
             continue;
         }
-        float f = shaded->i[k] ? 0.5f + test(c, means, k, plane, 0, depth[k] - get(c, "series.bias")->f[1]) : 1.0f;
+        float f = shaded->i[k] ? 0.5f + test(c, means, k, plane, 0, depth[k] - get(c, ".bias")->f[1]) : 1.0f;
         share[k] = shaded->i[k] ? clampf(gain * f, 0.0f, 1.0f) : hard[k];
     }
 }

@@ -18,18 +18,16 @@ static vec3 times(const float *reflectance, const float *power, float measure) {
               reflectance[2] * power[2] * measure);
 }
 
-void flux_stage(Case *c, int number) {
-    char name[16] = {'r', 's', 'm', (char)('0' + number), 0};
-    const char *lamp = fact(c, "light%d", number);
-    int spot = json_is(lamp, "spot"), squared = json_is(fact(c, "light%d.falloff", number), "squared_ramp"), glossy = has(c, "%s.lobe_flux", name);
-    View v = view_of(c, name);
-    const int *id = get(c, "%s.triangle_id", name)->i, *material = get(c, "scene.material_of_face")->i;
-    const float *power = get(c, json_is(lamp, "directional") ? "light%d.irradiance" : "light%d.intensity", number)->f;
-    const float *cone = spot ? get(c, "light%d.half_angles", number)->f : 0;
-    float *angle = make(c, "%s.solid_angle", name)->f, *flux = make(c, "%s.flux", name)->f;
-    float *lobe_flux = glossy ? make(c, "%s.lobe_flux", name)->f : 0;
-    float *lobe_axis = glossy ? make(c, "%s.lobe_axis", name)->f : 0;
-    float *lobe_exponent = glossy ? make(c, "%s.lobe_exponent", name)->f : 0;
+void flux_stage(Case *c) {
+    int spot = json_is(fact(c, "lamp"), "spot"), squared = json_is(fact(c, "falloff"), "squared_ramp");
+    int glossy = writes(c, ".lobe_flux");
+    View v = view_of(c);
+    const int *id = get(c, "_triangles")->i, *material = get(c, "scene.material_of_face")->i;
+    const float *power = get(c, "lamp.strength")->f, *cone = spot ? get(c, "lamp.half_angles")->f : 0;
+    float *angle = make(c, ".solid_angle")->f, *flux = make(c, ".flux")->f;
+    float *lobe_flux = glossy ? make(c, ".lobe_flux")->f : 0;
+    float *lobe_axis = glossy ? make(c, ".lobe_axis")->f : 0;
+    float *lobe_exponent = glossy ? make(c, ".lobe_exponent")->f : 0;
     float dx = 2.0f * v.half[0] / (float)v.columns, dy = 2.0f * v.half[1] / (float)v.rows;
     int count = v.maps * v.rows * v.columns;
     for (int k = 0; k < count; k++) {

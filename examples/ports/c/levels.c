@@ -2,6 +2,8 @@
 #include "json.h"
 #include "stages.h"
 
+#define SHADOWS 3 /* among what direct light reads: after position, normal and ids */
+
 /* Smoothstep or squared ramp of a spot; the difference of cosines as one of tangents, which keeps its digits in float32. */
 static float spot_share(vec3 axis, vec3 to_point, float inner, float outer, int squared) {
     float along = dot(axis, to_point) / length(axis), tangent, limit = tanf(outer), cosine = cosf(outer);
@@ -15,18 +17,16 @@ static float spot_share(vec3 axis, vec3 to_point, float inner, float outer, int 
 }
 
 void direct_stage(Case *c) {
-    const Array *id = get(c, "gbuffer.triangle_id");
-    const float *position = get(c, "gbuffer.position")->f, *normal = get(c, "gbuffer.normal")->f;
-    float *out = make(c, "direct.irradiance")->f;
-    for (int lamp = 0; fact(c, "light%d", lamp); lamp++) {
-        const char *kind = fact(c, "light%d", lamp);
-        int squared = json_is(fact(c, "light%d.falloff", lamp), "squared_ramp");
-        int spot = json_is(kind, "spot"), far = json_is(kind, "directional");
-        const int *visible = get(c, "shadow%d.visible", lamp)->i;
-        const float *power = get(c, far ? "light%d.irradiance" : "light%d.intensity", lamp)->f;
-        vec3 place = far ? v3(0, 0, 0) : row3(get(c, "light%d.position", lamp)->f);
-        vec3 axis = spot || far ? row3(get(c, "light%d.direction", lamp)->f) : v3(0, 0, 0);
-        const float *cone = spot ? get(c, "light%d.half_angles", lamp)->f : 0;
+    const Array *id = get(c, "_triangles");
+    const float *position = get(c, ".position")->f, *normal = get(c, ".normal")->f;
+    const char *falloff = json_first(fact(c, "falloff"));
+    float *out = make(c, "")->f;
+    for (int lamp = 0; lamp < has(c, "lamp.strength"); lamp++, falloff = json_next(falloff)) {
+        Lamp l = lamp_of(c, lamp);
+        int squared = json_is(falloff, "squared_ramp"), spot = l.half_angles != 0, far = !l.place;
+        const int *visible = get_at(c, "", SHADOWS + lamp)->i;
+        const float *power = l.strength, *cone = l.half_angles;
+        vec3 place = far ? v3(0, 0, 0) : row3(l.place), axis = spot || far ? row3(l.direction) : v3(0, 0, 0);
         for (int k = 0; k < id->size; k++) {
             if (id->i[k] < 0 || !visible[k]) continue;
             vec3 d = far ? axis : sub(plane3(position, id->size, k), place);
@@ -55,22 +55,21 @@ static int covered(int h, int w, int size, int row, int column) {
 
 typedef struct { float *position, *depth, *normal, *radiance, *area; int *pixel, h, w; } Texels;
 
-static Texels texels_of(Case *c, int level, Array *(*of)(Case *, const char *, ...)) {
-    Array *depth = of(c, "level%d.depth", level);
-    Texels t = {of(c, "level%d.position", level)->f, depth->f, of(c, "level%d.normal", level)->f,
-                of(c, "level%d.radiance", level)->f, of(c, "level%d.area", level)->f, of(c, "level%d.pixel", level)->i,
-                depth->shape[0], depth->shape[1]};
+static Texels texels_of(Case *c, Array *(*of)(Case *, const char *)) {
+    Array *depth = of(c, ".depth");
+    Texels t = {of(c, ".position")->f, depth->f, of(c, ".normal")->f, of(c, ".radiance")->f, of(c, ".area")->f,
+                of(c, ".pixel")->i, depth->shape[0], depth->shape[1]};
     return t;
 }
 
 /* A pixel as a texel: its place from the eye, what it reflects, and Eq. 2 with half angles for one pixel. */
 static void put_pixel(Case *c, const View *v, Texels *t, int to, int pixel, int pixels) {
     int plane = t->h * t->w, count = v->rows * v->columns;
-    float depth = get(c, "gbuffer.depth")->f[pixel];
+    float depth = get(c, ".depth")->f[pixel];
     Ray ray = texel_ray(v, 0, (float)(pixel / v->columns) + 0.5f, (float)(pixel % v->columns) + 0.5f);
-    vec3 p = scale(ray.direction, depth), n = plane3(get(c, "gbuffer.normal")->f, count, pixel);
-    vec3 albedo = plane3(get(c, "gbuffer.albedo")->f, count, pixel);
-    vec3 light = scale(plane3(get(c, "direct.irradiance")->f, count, pixel), 1.0f / PI);
+    vec3 p = scale(ray.direction, depth), n = plane3(get(c, ".normal")->f, count, pixel);
+    vec3 albedo = plane3(get(c, ".albedo")->f, count, pixel);
+    vec3 light = scale(plane3(get(c, "direct_irradiance")->f, count, pixel), 1.0f / PI);
     put3(t->position, plane, to, p);
     put3(t->normal, plane, to, n);
     put3(t->radiance, plane, to, v3(albedo.x * light.x, albedo.y * light.y, albedo.z * light.z));
@@ -89,13 +88,18 @@ static void put_texel(Texels *t, int to, const Texels *from, int k, int pixels, 
     t->area[to] = from->area[k] * (float)pixels / (float)pixels_from;
 }
 
-void level_stage(Case *c, int level) {
-    View v = view_of(c, "camera");
-    int first = (int)json_number(json_at(fact(c, "hssil"), "first level"), 0), size = first + level;
-    Texels t = texels_of(c, level, make), fine = {0};
-    const float *depth = level ? 0 : get(c, "gbuffer.depth")->f;
-    if (level) fine = texels_of(c, level - 1, get);
-    int side = level ? 2 : 1 << first, h = level ? fine.h : v.rows, w = level ? fine.w : v.columns;
+void level_stage(Case *c) {
+    int level = !has(c, "direct_irradiance"), size = (int)number(c, "number"); /* level 0 or a coarser one */
+    Texels t = texels_of(c, make), fine = {0};
+    View v = {0};
+    const float *depth = level ? 0 : get(c, ".depth")->f;
+    if (level) {
+        const char *picture = json_first(fact(c, "size"));
+        fine = texels_of(c, get);
+        v.rows = (int)json_number(picture, 0);
+        v.columns = (int)json_number(json_next(picture), 0);
+    } else v = view_of(c);
+    int side = level ? 2 : 1 << size, h = level ? fine.h : v.rows, w = level ? fine.w : v.columns;
     for (int k = 0; k < t.h * t.w; k++) {
         int row = k / t.w, column = k % t.w, best = -1;
         float least = INFINITY;

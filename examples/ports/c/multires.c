@@ -3,10 +3,6 @@
 #include "stages.h"
 #include <stdlib.h>
 
-static const char *setting(Case *c, const char *name) { return json_at(fact(c, "multires"), name); }
-
-int multires_top(Case *c) { return (int)json_number(setting(c, "coarsest_level"), 0); }
-
 /* Least and largest of one plane of values in every cell, with a rim of pixels around it. */
 static void ranges_of(const float *value, const int *id, int h, int w, int level, int rim, const Array *shape,
                       float *least, float *largest) {
@@ -24,39 +20,43 @@ static void ranges_of(const float *value, const int *id, int h, int w, int level
     }
 }
 
-void ranges_stage(Case *c, const char *what) {
-    const Array *value = get(c, "gbuffer.%s", what), *id = get(c, "gbuffer.triangle_id");
-    int rim = (int)json_number(setting(c, "rim"), 0), h = id->shape[0], w = id->shape[1];
-    for (int level = 1; level <= multires_top(c); level++) {
-        Array *least = make(c, "multires.%s_least.%d", what, level), *largest = make(c, "multires.%s_largest.%d", what, level);
+static void ranges(Case *c, const Array *value) {
+    const Array *id = get(c, "_triangles");
+    int rim = (int)number(c, "rim"), h = id->shape[0], w = id->shape[1];
+    for (int level = 1; level <= (int)number(c, "top"); level++) {
+        Array *least = make_at(c, ".low", level - 1), *largest = make_at(c, ".high", level - 1);
         int channels = least->ndim == 3 ? least->shape[0] : 1, cells = least->size / channels;
         for (int k = 0; k < channels; k++)
             ranges_of(value->f + k * id->size, id->i, h, w, level, rim, least, least->f + k * cells, largest->f + k * cells);
     }
 }
 
+void depth_ranges_stage(Case *c) { ranges(c, get(c, ".depth")); }
+void normal_ranges_stage(Case *c) { ranges(c, get(c, ".normal")); }
+
 static int depth_differs(Case *c, int level, int k) {
-    const char *rule = setting(c, "depth");
-    if (*rule != '{') return 0;
-    float least = get(c, "multires.depth_least.%d", level)->f[k], largest = get(c, "multires.depth_largest.%d", level)->f[k];
-    float threshold = (float)json_number(json_at(rule, "threshold"), 0);
-    return largest - least > (json_is(json_at(rule, "measure"), "absolute") ? threshold : threshold * least);
+    if (!has(c, "depth_ranges.low")) return 0;
+    float least = get_at(c, "depth_ranges.low", level - 1)->f[k];
+    float largest = get_at(c, "depth_ranges.high", level - 1)->f[k], threshold = number(c, "depth_threshold");
+    return largest - least > (json_is(fact(c, "depth_measure"), "absolute") ? threshold : threshold * least);
 }
 
 static int normal_differs(Case *c, int level, int k) {
-    const char *rule = setting(c, "normal");
-    if (*rule != '{') return 0;
-    const Array *least = get(c, "multires.normal_least.%d", level), *largest = get(c, "multires.normal_largest.%d", level);
+    if (!has(c, "normal_ranges.low")) return 0;
+    const Array *least = get_at(c, "normal_ranges.low", level - 1);
+    const Array *largest = get_at(c, "normal_ranges.high", level - 1);
     int components = least->shape[0], cells = least->size / components; /* xyz, or xy as in the authors' demo */
     for (int j = 0; j < components; j++)
-        if (largest->f[j * cells + k] - least->f[j * cells + k] > (float)json_number(json_at(rule, "threshold"), 0)) return 1;
+        if (largest->f[j * cells + k] - least->f[j * cells + k] > number(c, "normal_threshold")) return 1;
     return 0;
 }
 
 void discontinuities_stage(Case *c) {
-    for (int level = 1; level <= multires_top(c) && !has(c, "multires.slope.1"); level++) {
-        Array *differs = make(c, "multires.discontinuous.%d", level);
-        for (int k = 0; k < differs->size; k++) differs->i[k] = depth_differs(c, level, k) || normal_differs(c, level, k);
+    for (int level = 1; level <= (int)number(c, "top"); level++) {
+        Array *differs = make_at(c, "", level - 1);
+        int refinable = level > (int)number(c, "finest");
+        for (int k = 0; k < differs->size; k++)
+            differs->i[k] = refinable && (depth_differs(c, level, k) || normal_differs(c, level, k));
     }
 }
 
@@ -86,13 +86,13 @@ static int any_surface(const Array *id, int level, int row, int column) {
 }
 
 void states_stage(Case *c) {
-    const Array *id = get(c, "gbuffer.triangle_id");
-    for (int level = 1; level <= multires_top(c); level++) {
-        const Array *marks = get(c, "multires.discontinuous.%d", level);
-        Array *state = make(c, "multires.state.%d", level);
+    const Array *id = get(c, "_triangles");
+    for (int level = 1; level <= has(c, "discontinuities"); level++) {
+        const Array *marks = get_at(c, "discontinuities", level - 1);
+        Array *state = make_at(c, "", level - 1);
         for (int row = 0; row < state->shape[0]; row++)
             for (int column = 0; column < state->shape[1]; column++) {
-                int refined = marked(marks, row, column) || across(marks, setting(c, "diagonal"), row, column);
+                int refined = marked(marks, row, column) || across(marks, fact(c, "diagonal"), row, column);
                 state->i[row * state->shape[1] + column] = !any_surface(id, level, row, column) ? 0 : refined ? 2 : 1;
             }
     }
@@ -122,10 +122,10 @@ static int representative(const Array *id, int level, int row, int column) {
 static void visit(List *list, int level, int row, int column) {
     int w = list->id->shape[1], rows = (list->id->shape[0] + (1 << level) - 1) >> level, columns = (w + (1 << level) - 1) >> level;
     if (row >= rows || column >= columns) return;
-    int state = level ? get(list->c, "multires.state.%d", level)->i[row * columns + column]
+    int state = level ? get_at(list->c, "states", level - 1)->i[row * columns + column]
                       : list->id->i[row * w + column] >= 0;
     if (state == 0) return;
-    if (state == 2 && level > (int)json_number(setting(list->c, "finest_level"), 0)) {
+    if (state == 2) {
         for (int k = 0; k < 4; k++) visit(list, level - 1, 2 * row + k / 2, 2 * column + k % 2);
         return;
     }
@@ -137,12 +137,12 @@ static void visit(List *list, int level, int row, int column) {
 }
 
 void subsplats_stage(Case *c) {
-    static const char *names[4] = {"level", "row", "column", "pixel"};
-    List list = {c, get(c, "gbuffer.triangle_id"), {0}, 0};
-    int top = multires_top(c), rows = (list.id->shape[0] + (1 << top) - 1) >> top;
+    static const char *names[4] = {".level", ".row", ".column", ".pixel"};
+    List list = {c, get(c, "_triangles"), {0}, 0};
+    int top = has(c, "states"), rows = (list.id->shape[0] + (1 << top) - 1) >> top;
     int columns = (list.id->shape[1] + (1 << top) - 1) >> top;
     for (int pass = 0; pass < 2; pass++) {
-        for (int k = 0; pass && k < 4; k++) list.entry[k] = make_of(c, 'i', 1, &list.count, "multires.%s", names[k])->i;
+        for (int k = 0; pass && k < 4; k++) list.entry[k] = make_of(c, 'i', 1, &list.count, names[k])->i;
         list.count = 0;
         for (int k = 0; k < rows * columns; k++) visit(&list, top, k / columns, k % columns);
     }

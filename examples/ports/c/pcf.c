@@ -38,33 +38,30 @@ static float share_of(const Test *t, int side) {
     return count ? 1.0f - (float)hidden / (float)count : 1.0f;
 }
 
-/* `hard`: one test, of lights without extent alone. */
-static void tests(Case *c, const char *name, int hard) {
-    const char *how = fact(c, "%s.test", name);
-    const Array *depth = get(c, "maps.depth"), *id = get(c, "gbuffer.triangle_id");
-    Array *share = make(c, "%s.share", name);
-    int plane = id->size, side = (int)json_number(json_at(how, "side of the kernel, texels"), 1);
+/* `points_only`: one test, of lights without extent alone. */
+void depth_tests_stage(Case *c) {
+    const Array *depth = get(c, "depth_maps"), *id = get(c, "_triangles");
+    const float *facing = get(c, has(c, "facing") ? "facing" : ".normal")->f;
+    Array *share = make(c, "");
+    int plane = id->size, side = (int)number(c, "texels"), hard = *fact(c, "points_only") == 't';
     for (int k = 0; k < share->size; k++) {
         int map = k / plane, pixel = k % plane;
-        float delta = get(c, "areas.delta")->f[map];
-        Test t = {row3(get(c, "maps.center")->f + 3 * map), plane3(get(c, "gbuffer.position")->f, plane, pixel),
-                  plane3(get(c, "gbuffer.facing")->f, plane, pixel), get(c, "areas.frame")->f + 9 * map,
+        float delta = get(c, ".delta")->f[map];
+        Test t = {row3(get(c, ".center")->f + 3 * map), plane3(get(c, ".position")->f, plane, pixel),
+                  plane3(facing, plane, pixel), get(c, ".frame")->f + 9 * map,
                   depth->f + map * depth->shape[1] * depth->shape[2], depth->shape[1],
-                  (float)json_number(json_at(how, "slack, of the distance"), 0)};
+                  number(c, "slack, of the distance")};
         share->f[k] = 1.0f;
-        if (id->i[pixel] < 0 || get(c, "maps.near")->f[map] == INFINITY || (hard && delta > 0.0f)) continue;
+        if (id->i[pixel] < 0 || get(c, ".near")->f[map] == INFINITY || (hard && delta > 0.0f)) continue;
         if (dot(row3(t.frame + 6), sub(t.place, t.center)) <= 0.0f) continue;
         share->f[k] = share_of(&t, delta > 0.0f ? side : 1);
     }
 }
 
-void hard_stage(Case *c) { tests(c, "hard", 1); }
-void pcf_stage(Case *c) { tests(c, "visibility", 0); }
-
 void facing_stage(Case *c) {
-    const Array *id = get(c, "gbuffer.triangle_id");
-    const float *normal = get(c, "gbuffer.normal")->f;
-    float *out = make(c, "gbuffer.facing")->f;
+    const Array *id = get(c, "_triangles");
+    const float *normal = get(c, ".normal")->f;
+    float *out = make(c, "")->f;
     for (int k = 0; k < id->size; k++)
         if (id->i[k] >= 0) put3(out, id->size, k, face_normal(c, id->i[k], scale(plane3(normal, id->size, k), -1.0f)));
 }

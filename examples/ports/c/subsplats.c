@@ -3,15 +3,15 @@
 #include "stages.h"
 #include <stdlib.h>
 
-static const char *how(Case *c, const char *name) { return json_at(fact(c, "multires.upsampling"), name); }
+#define LIGHT 4 /* among what a stage reads: after ids, level, row and column of subsplats */
 
 /* Mean of a cell's surface, or its representative pixel. */
 void subsplat_points_stage(Case *c) {
-    const Array *id = get(c, "gbuffer.triangle_id"), *level = get(c, "multires.level");
-    const float *position = get(c, "gbuffer.position")->f, *normal = get(c, "gbuffer.normal")->f;
-    const int *row = get(c, "multires.row")->i, *column = get(c, "multires.column")->i, *pixel = get(c, "multires.pixel")->i;
-    int mean = json_is(json_at(fact(c, "multires"), "representative"), "mean"), shape[2] = {3, level->size};
-    float *point = make_of(c, 'f', 2, shape, "multires.point")->f, *facing = make_of(c, 'f', 2, shape, "multires.normal")->f;
+    const Array *id = get(c, "_triangles"), *level = get(c, ".level");
+    const float *position = get(c, ".position")->f, *normal = get(c, ".normal")->f;
+    const int *row = get(c, ".row")->i, *column = get(c, ".column")->i, *pixel = get(c, ".pixel")->i;
+    int mean = json_is(fact(c, "representative"), "mean"), shape[2] = {3, level->size};
+    float *point = make_of(c, 'f', 2, shape, ".point")->f, *facing = make_of(c, 'f', 2, shape, ".normal")->f;
     for (int k = 0; k < level->size; k++) {
         vec3 p = plane3(position, id->size, pixel[k]), n = plane3(normal, id->size, pixel[k]);
         int size = 1 << level->i[k], count = 0, w = id->shape[1];
@@ -36,8 +36,8 @@ typedef struct {
     int *known, *own;
 } Level;
 
-static Level level_of(Case *c, int level) {
-    Array *out = make(c, "multires.upsampled.%d", level), *known = make(c, "multires.known.%d", level);
+static Level level_of(Case *c) {
+    Array *out = make(c, ".light"), *known = make(c, ".known");
     Level made = {known->shape[0], known->shape[1], calloc((size_t)out->size, sizeof(float)), out->f, known->i,
                   calloc((size_t)known->size, sizeof(int))};
     return made;
@@ -51,11 +51,11 @@ static int surface_in(const Array *id, int level, int row, int column) {
 }
 
 static void fill(Case *c, Level *l, int level, int top) {
-    const Array *levels = get(c, "multires.level"), *light = get(c, "multires.irradiance"), *id = get(c, "gbuffer.triangle_id");
+    const Array *levels = get(c, ".level"), *light = get_at(c, "", LIGHT), *id = get(c, "_triangles");
     int cells = l->rows * l->columns, lists = levels->size;
-    for (int k = 0; k < cells && level < top; k++) {
+    for (int k = 0; k < cells && !top; k++) {
         int row = k / l->columns, column = k % l->columns;
-        const Array *known = get(c, "multires.known.%d", level + 1), *coarse = get(c, "multires.upsampled.%d", level + 1);
+        const Array *known = get(c, ".known"), *coarse = get(c, ".light");
         int from = row / 2 * known->shape[1] + column / 2;
         if (!known->i[from] || !surface_in(id, level, row, column)) continue;
         l->known[k] = 1;
@@ -63,7 +63,7 @@ static void fill(Case *c, Level *l, int level, int top) {
     }
     for (int k = 0; k < lists; k++) {
         if (levels->i[k] != level) continue;
-        int to = get(c, "multires.row")->i[k] * l->columns + get(c, "multires.column")->i[k];
+        int to = get(c, ".row")->i[k] * l->columns + get(c, ".column")->i[k];
         l->known[to] = l->own[to] = 1;
         put3(l->light, cells, to, plane3(light->f, lists, k));
     }
@@ -92,14 +92,13 @@ static vec3 tent(const Level *l, int row, int column, int corner_rule) {
     return scale(sum, 1.0f / weights);
 }
 
-void upsample_level_stage(Case *c, int level) {
-    int top = multires_top(c), all = *how(c, "filter_all") == 't', corners = *how(c, "corner_rule") == 't';
-    if (json_is(how(c, "mode"), "demo")) return;
-    Level l = level_of(c, level);
-    fill(c, &l, level, top);
+void upsample_level_stage(Case *c) {
+    int top = !has(c, ".light"), all = *fact(c, "filter_all") == 't', corners = *fact(c, "corner_rule") == 't';
+    Level l = level_of(c);
+    fill(c, &l, (int)number(c, "at"), top);
     for (int k = 0; k < l.rows * l.columns; k++) {
         vec3 here = plane3(l.light, l.rows * l.columns, k);
-        int kept = level == top || (l.own[k] && !all);
+        int kept = top || (l.own[k] && !all);
         if (l.known[k]) put3(l.out, l.rows * l.columns, k, kept ? here : tent(&l, k / l.columns, k % l.columns, corners));
     }
     free(l.light);
@@ -108,10 +107,10 @@ void upsample_level_stage(Case *c, int level) {
 
 /* Without a filter each pixel has the light of its subsplat. */
 void upsample_nearest_stage(Case *c) {
-    const Array *level = get(c, "multires.level"), *light = get(c, "multires.irradiance"), *id = get(c, "gbuffer.triangle_id");
-    float *out = make(c, "multires.upsampled.0")->f;
+    const Array *level = get(c, ".level"), *light = get_at(c, "", LIGHT), *id = get(c, "_triangles");
+    float *out = make(c, "")->f;
     for (int k = 0; k < level->size; k++) {
-        int size = 1 << level->i[k], row = get(c, "multires.row")->i[k] * size, column = get(c, "multires.column")->i[k] * size;
+        int size = 1 << level->i[k], row = get(c, ".row")->i[k] * size, column = get(c, ".column")->i[k] * size;
         for (int y = row; y < row + size && y < id->shape[0]; y++)
             for (int x = column; x < column + size && x < id->shape[1]; x++)
                 if (id->i[y * id->shape[1] + x] >= 0)
@@ -121,11 +120,11 @@ void upsample_nearest_stage(Case *c) {
 
 /* Eq. 3: E (a <V, N> + 1 - a). */
 void detail_stage(Case *c) {
-    const Array *id = get(c, "gbuffer.triangle_id");
-    const float *light = get(c, "multires.upsampled.0")->f, *position = get(c, "gbuffer.position")->f;
-    const float *normal = get(c, "gbuffer.normal")->f, a = (float)json_number(fact(c, "multires.detail"), 0);
-    float *out = make(c, "multires.detailed")->f;
-    vec3 eye = row3(get(c, "camera.origin")->f);
+    const Array *id = get(c, "_triangles");
+    const float *light = get(c, "")->f, *position = get(c, ".position")->f;
+    const float *normal = get(c, ".normal")->f, a = number(c, "a");
+    float *out = make(c, "")->f;
+    vec3 eye = row3(get(c, ".origin")->f);
     for (int k = 0; k < id->size; k++) {
         if (id->i[k] < 0) continue;
         float facing = fmaxf(0.0f, dot(normalize(sub(eye, plane3(position, id->size, k))), plane3(normal, id->size, k)));

@@ -9,13 +9,15 @@ typedef struct {
     float *norm; /* of each light's lobe */
 } Lights;
 
-static Lights lights_of(Case *c, int clamped) {
-    Lights l = {get(c, "lights.position")->shape[1], get(c, "lights.position")->f, get(c, "lights.normal")->f,
-                get(c, "lights.flux")->f, 0, 0, 0, clamped ? get(c, "lights.area")->f : 0, 0};
-    if (!has(c, "lights.lobe_flux")) return l;
-    l.lobe_flux = get(c, "lights.lobe_flux")->f;
-    l.lobe_axis = get(c, "lights.lobe_axis")->f;
-    l.lobe_exponent = get(c, "lights.lobe_exponent")->f;
+/* Position and normal stand first of receivers, then of lights. */
+static Lights lights_of(Case *c, int first, int clamped) {
+    const Array *position = get_at(c, "", first);
+    Lights l = {position->shape[1], position->f, get_at(c, "", first + 1)->f, get(c, ".flux")->f, 0, 0, 0,
+                clamped ? get(c, "footprints")->f : 0, 0};
+    if (!has(c, ".lobe_flux")) return l;
+    l.lobe_flux = get(c, ".lobe_flux")->f;
+    l.lobe_axis = get(c, ".lobe_axis")->f;
+    l.lobe_exponent = get(c, ".lobe_exponent")->f;
     l.norm = calloc((size_t)l.count + 1, sizeof *l.norm);
     for (int k = 0; k < l.count; k++)
         l.norm[k] = lobe_norm(plane3(l.normal, l.count, k), plane3(l.lobe_axis, l.count, k), l.lobe_exponent[k]);
@@ -37,8 +39,9 @@ static vec3 pair(const Lights *l, int k, vec3 x, vec3 n) {
 }
 
 /* At receivers whose `id`, where there is one, is not -1; `own`: light k meets receiver k alone. */
-static void irradiance(Case *c, Array *made, const float *position, const float *normal, const int *id, int own, int clamped) {
-    Lights l = lights_of(c, clamped);
+static void irradiance(Case *c, Array *made, const int *id, int own, int clamped) {
+    Lights l = lights_of(c, id ? 3 : 2, clamped);
+    const float *position = get_at(c, "", 0)->f, *normal = get_at(c, "", 1)->f;
     int n = made->size / 3;
     for (int k = 0; k < n; k++) {
         vec3 total = v3(0.0f, 0.0f, 0.0f);
@@ -49,15 +52,10 @@ static void irradiance(Case *c, Array *made, const float *position, const float 
     free(l.norm);
 }
 
-static void at_pixels(Case *c, Array *made, int own, int clamped) {
-    irradiance(c, made, get(c, "gbuffer.position")->f, get(c, "gbuffer.normal")->f, get(c, "gbuffer.triangle_id")->i, own, clamped);
-}
-
-void sum_stage(Case *c) { at_pixels(c, make(c, "sum.irradiance"), 0, json_is(fact(c, "sum.clamp"), "disc")); }
-void pairs_stage(Case *c) { at_pixels(c, make(c, "pairs.irradiance"), 1, 0); }
+void sum_stage(Case *c) { irradiance(c, make(c, ""), get(c, "_triangles")->i, 0, json_is(fact(c, "clamp"), "disc")); }
+void pairs_stage(Case *c) { irradiance(c, make(c, ""), 0, 1, 0); }
 
 void subsplat_irradiance_stage(Case *c) {
-    const Array *point = get(c, "multires.point");
-    Array *made = make_of(c, 'f', 2, point->shape, "multires.irradiance");
-    irradiance(c, made, point->f, get(c, "multires.normal")->f, 0, 0, json_is(fact(c, "multires.clamp"), "disc"));
+    const Array *point = get(c, ".point");
+    irradiance(c, make_of(c, 'f', 2, point->shape, ""), 0, 0, json_is(fact(c, "clamp"), "disc"));
 }

@@ -77,26 +77,24 @@ static int choose_map(const Map *maps, int count, float *v, float *weight) {
     return count - 1;
 }
 
-void warp_stage(Case *c, int number) {
-    char name[16] = {'r', 's', 'm', (char)('0' + number), 0};
-    View f = view_of(c, name);
+void warp_stage(Case *c) {
     Map maps[6];
-    const char *how = fact(c, "%s.warp", name);
-    int method = json_is(json_at(how, "method"), "A") ? 'A' : 'B', levels = (int)json_number(json_at(how, "levels"), 0);
-    const float *importance = get(c, "%s.importance", name)->f, *points = get(c, "%s.points", name)->f;
-    for (int k = 0; k < f.maps; k++) {
-        Map one = {importance + k * f.rows * f.columns, f.rows, f.columns,
-                   depth_of(f.rows > f.columns ? f.rows : f.columns)};
+    const Array *importance = get(c, ".importance");
+    int method = json_is(fact(c, "method"), "A") ? 'A' : 'B', levels = (int)number(c, "levels");
+    int count = (int)number(c, "maps"), rows = importance->shape[0] / count, columns = importance->shape[1];
+    const float *points = get(c, "points")->f;
+    for (int k = 0; k < count; k++) {
+        Map one = {importance->f + k * rows * columns, rows, columns, depth_of(rows > columns ? rows : columns)};
         maps[k] = one;
     }
-    float *warped = make(c, "%s.warped", name)->f;
-    Array *weight = make(c, "%s.density_weight", name);
+    float *warped = make(c, ".warped")->f;
+    Array *weight = make(c, ".density_weight");
     for (int k = 0; k < weight->size; k++) {
         float u = points[2 * k], v = points[2 * k + 1], w = 1.0f;
-        int map = f.maps > 1 ? choose_map(maps, f.maps, &v, &w) : 0;
+        int map = count > 1 ? choose_map(maps, count, &v, &w) : 0;
         warp_in_map(maps + map, method, levels, &u, &v, &w);
         warped[2 * k] = fminf(u, BELOW_1);
-        warped[2 * k + 1] = fminf(((float)map + v) / (float)f.maps, BELOW_1);
+        warped[2 * k + 1] = fminf(((float)map + v) / (float)count, BELOW_1);
         weight->f[k] = w;
     }
 }

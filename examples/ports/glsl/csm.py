@@ -4,48 +4,48 @@ import numpy as np
 from device import Arrays, Gpu
 
 
-def basis(gpu: Gpu, arrays: Arrays, _: str) -> None:
+def basis(gpu: Gpu, arrays: Arrays, stage: dict) -> None:
     """Run csm_basis.comp."""
-    depth, terms = arrays["maps.t"], arrays.facts["csm"]["terms"]
+    (name,) = stage["reads"]
+    depth, terms = arrays[name], arrays.facts[stage["name"]]["terms"]
     result = gpu.empty(depth.size * (4 * terms + 1))
     gpu.run("csm_basis.comp", (), {0: depth, 1: result}, depth.size, maps=len(depth), texels=depth[0].size, terms=terms)
-    arrays.write("basis.0", gpu.read(result))
+    arrays.write(stage["writes"][0], gpu.read(result))
 
 
-def mip(gpu: Gpu, arrays: Arrays, _: str) -> None:
+def mip(gpu: Gpu, arrays: Arrays, stage: dict) -> None:
     """Run csm_mip.comp for each level."""
-    level = arrays["basis.0"]
-    for number in range(1, len(arrays.facts["basis.sides"])):
+    level = arrays[stage["reads"][0]]
+    for name in stage["writes"]:
         planes, side = level.shape[0] * level.shape[1], level.shape[-1]
         half_side = (side + 1) // 2
         result = gpu.empty(planes * half_side**2)
         gpu.run("csm_mip.comp", (), {0: gpu.stored(level), 1: result}, planes * half_side**2, planes=planes, side=side)
         level = gpu.read(result).reshape(*level.shape[:2], half_side, half_side)
-        arrays.write(f"basis.{number}", level)
+        arrays.write(name, level)
 
 
-def means(gpu: Gpu, arrays: Arrays, stage: str) -> None:
-    """Run csm_means.comp on the discs of the search or of the penumbra."""
-    name = stage.removesuffix(".means")
-    asked = arrays["search.pending" if name == "search" else "penumbra.shaded"].astype(np.int32)
-    sides, terms = arrays.facts["basis.sides"], arrays.facts["csm"]["terms"]
-    channels = 4 * terms + 1 if name == "search" else 2 * terms
-    chain = np.concatenate([arrays[f"basis.{number}"].reshape(-1) for number in range(len(sides))])
+def means(gpu: Gpu, arrays: Arrays, stage: dict) -> None:
+    """Run csm_means.comp on the discs of the search, whose basis has all channels, or of the penumbra."""
+    which, region, *levels = (arrays[name] for name in stage["reads"])
+    terms, weighed = (arrays.facts[stage["name"]][key] for key in ("terms", "weighed"))
+    asked, channels = which.astype(np.int32), 4 * terms + 1 if weighed else 2 * terms
+    chain = np.concatenate([level.reshape(-1) for level in levels])
     result = gpu.empty(asked.size * channels)
-    gpu.run("csm_means.comp", (), {0: asked, 1: arrays[f"{name}.region"], 2: gpu.stored(chain), 3: result}, asked.size,
-            maps=len(asked), pixels=asked[0].size, levels=len(sides), stored_channels=4 * terms + 1, channels=channels,
-            side=sides[0])
-    arrays.write(f"{stage}", gpu.read(result))
+    gpu.run("csm_means.comp", (), {0: asked, 1: region, 2: gpu.stored(chain), 3: result}, asked.size, maps=len(asked),
+            pixels=asked[0].size, levels=len(levels), stored_channels=levels[0].shape[1], channels=channels,
+            side=levels[0].shape[-1])
+    arrays.write(stage["writes"][0], gpu.read(result))
 
 
-def visibility(gpu: Gpu, arrays: Arrays, _: str) -> None:
+def visibility(gpu: Gpu, arrays: Arrays, stage: dict) -> None:
     """Run csm_visibility.comp."""
-    csm, shaded = arrays.facts["csm"], arrays["penumbra.shaded"].astype(np.int32)
-    otherwise = arrays["hard.share"] if "hard.share" in arrays else np.ones(shaded.shape, np.float32)
+    which, depth, averages, weight, bias, *tested = (arrays[name] for name in stage["reads"])
+    shaded = which.astype(np.int32)
+    otherwise = tested[0] if tested else np.ones(shaded.shape, np.float32)
     result = gpu.empty(shaded.size)
     gpu.run("csm_visibility.comp", (), {
-        0: shaded, 1: arrays["penumbra.t"], 2: gpu.stored(arrays["penumbra.means"]), 3: arrays["series.weight"],
-        4: gpu.stored(otherwise), 5: result,
-    }, shaded.size, maps=len(shaded), pixels=shaded[0].size, terms=csm["terms"], bias=float(arrays["series.bias"][1]),
-        gain=csm["gain"])
-    arrays.write("visibility.share", gpu.read(result))
+        0: shaded, 1: depth, 2: gpu.stored(averages), 3: weight, 4: gpu.stored(otherwise), 5: result,
+    }, shaded.size, maps=len(shaded), pixels=shaded[0].size, terms=len(weight), bias=float(bias[1]),
+        gain=arrays.facts[stage["name"]]["gain"])
+    arrays.write(stage["writes"][0], gpu.read(result))

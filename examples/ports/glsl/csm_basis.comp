@@ -1,4 +1,4 @@
-// Stage basis: channels of a convolution shadow map for each texel's depth t (E-VAL-02):
+// Stage cluster.basis: channels of a convolution shadow map for each texel's depth t (E-VAL-02):
 // sin(c_k t) for all k, cos(c_k t), t sin(c_k t), t cos(c_k t), t, with c_k = (2k - 1) pi. Empty maps hold 0.
 layout(local_size_x = 64) in;
 #include "arrays.glsl"

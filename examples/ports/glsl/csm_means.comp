@@ -1,4 +1,4 @@
-// Stages search.means and penumbra.means: means of a map's channels over a disc, by a trilinear read of the level whose
+// Stage cluster.mip_means: means of a map's channels over a disc, by a trilinear read of the level whose
 // texels are half the disc's diameter wide: level max(0, log2(radius side) - 1), the radius in units of [-1, 1].
 layout(local_size_x = 64) in;
 #include "arrays.glsl"

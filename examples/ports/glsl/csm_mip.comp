@@ -1,4 +1,4 @@
-// Stage mip: a level is the mean of 2 x 2 texels of the one before; of an odd side the last counts twice.
+// Stage cluster.mip_levels: a level is the mean of 2 x 2 texels of the one before; of an odd side the last counts twice.
 layout(local_size_x = 64) in;
 #include "arrays.glsl"
 

@@ -1,4 +1,4 @@
-// Stage visibility of convolution shadow maps (E-VAL-02), from 0 to 1 where there are blockers:
+// Stage cluster.csm, visibility by convolution shadow maps (E-VAL-02), from 0 to 1 where there are blockers:
 // V = gain (1/2 + sum w_k (cos(c_k d') S_k - sin(c_k d') C_k)), d' = d - b; elsewhere the hard test's, or 1.
 layout(local_size_x = 64) in;
 #include "arrays.glsl"

@@ -24,8 +24,9 @@ class Arrays:
         mine = self.out / f"{name}.npy"
         return np.load(mine if self.own and mine.is_file() else self.home / self.manifest["arrays"][name]["file"])
 
-    def __contains__(self, name: str) -> bool:
-        return name in self.manifest["arrays"]
+    def of_map(self, name: str, k: int) -> str:
+        """Return an array's name for map k; maps for which a stage would make the same share that of map 0."""
+        return name.format(k if name.format(k) in self.manifest["arrays"] else 0)
 
     def write(self, name: str, flat: np.ndarray) -> None:
         """Write an output in the shape that the manifest says."""

@@ -1,4 +1,4 @@
-// Stage footprints: the surface that each pixel light of one map stands for, Omega d^2 / cos of its texel, times T/N w.
+// Stage lights.footprints: the surface that each pixel light of one map stands for, Omega d^2 / cos of its texel, times T/N w.
 // A directional light has its texels' perpendicular areas for Omega, and no d^2.
 layout(local_size_x = 64) in;
 

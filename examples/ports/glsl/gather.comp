@@ -1,4 +1,4 @@
-// Stage gather of a level: irradiance of its texels by samples of the crown, HSS Eq. 4 with its pi (E-HSS-04):
+// Stage sssil.gather_samples of a level: irradiance of its texels by samples of the crown, HSS Eq. 4 with its pi (E-HSS-04):
 // pi L cos R^2 / (r^2 + R^2), R^2 = cos' ds / pi. Samples outside the picture are left out, and the texel itself.
 // An invocation takes a texel; where TREE is defined a work group does, and its invocations one sample each in turn.
 layout(local_size_x = 64) in;

@@ -1,4 +1,4 @@
-// Stage pairs: irradiance of light k at receiver k.
+// Stage pairs.pairs: irradiance of light k at receiver k.
 layout(local_size_x = 64) in;
 #include "pair.glsl"
 

@@ -23,75 +23,72 @@ VARIANTS = {  # what a port may do otherwise: macros of the shaders
 }
 
 
-def irradiance(gpu: Gpu, arrays: Arrays, stage: str) -> None:
-    """Run sum.comp or pairs.comp."""
-    receivers, lights = arrays["gbuffer.triangle_id"].size, arrays["lights.flux"].shape[1]
-    lobes, disc = "lights.lobe_flux" in arrays, arrays.facts.get("sum.clamp") == "disc"
+def irradiance(gpu: Gpu, arrays: Arrays, stage: dict) -> None:
+    """Run pairs.comp, each receiver with the light of its number, or sum.comp, with all lights."""
+    one_each = kind_of(stage) == "pairs.pairs"
+    at, light = ("pairs.pairs", "pairs.pairs.light_") if one_each else ("rsm.surface", "lights.pixel_lights.")
+    flux = "pairs.pairs." if one_each else light
+    lights, receivers = arrays[f"{flux}flux"].shape[1], arrays[f"{at}.normal"][0].size
+    lobes, disc = f"{flux}lobe_flux" in stage["reads"], arrays.facts[stage["name"]]["clamp"] == "disc"
     result = gpu.empty(3 * receivers)
-    buffers: dict[int, np.ndarray | moderngl.Buffer] = {2: arrays["gbuffer.triangle_id"], 11: result}
-    plain = {1: "gbuffer.normal", 4: "lights.normal", 5: "lights.flux"}
-    plain |= {6: "lights.lobe_flux", 7: "lights.lobe_axis", 8: "lights.lobe_exponent"} if lobes else {}
-    plain |= {10: "lights.area"} if disc else {}
+    ids = np.zeros(receivers, np.int32) if one_each else arrays["rsm.visible_triangles"]
+    buffers: dict[int, np.ndarray | moderngl.Buffer] = {2: ids, 11: result}
+    plain = {1: f"{at}.normal", 4: f"{light}normal", 5: f"{flux}flux"}
+    plain |= {6: f"{flux}lobe_flux", 7: f"{flux}lobe_axis", 8: f"{flux}lobe_exponent"} if lobes else {}
+    plain |= {10: "lights.footprints"} if disc else {}
     buffers |= {binding: gpu.stored(arrays[name]) for binding, name in plain.items()}
     buffers |= {binding: gpu.stored(arrays[name], place=True) for binding, name in
-                {0: "gbuffer.position", 3: "lights.position"}.items()}
+                {0: f"{at}.position", 3: f"{light}position"}.items()}
     if lobes:
         peaks = buffers[9] = gpu.empty(lights)
         gpu.run("lobe_norm.comp", (), {0: buffers[4], 1: buffers[7], 2: buffers[8], 3: peaks}, lights,
                 light_count=lights)
-    tree = GROUP if "TREE" in gpu.variant and stage == "sum" else 1
-    gpu.run(f"{stage}.comp", ("LOBES",) * lobes + ("DISC",) * disc, buffers, receivers * tree, light_count=lights,
-            receiver_count=receivers)
+    tree = GROUP if "TREE" in gpu.variant and not one_each else 1
+    gpu.run("pairs.comp" if one_each else "sum.comp", ("LOBES",) * lobes + ("DISC",) * disc, buffers, receivers * tree,
+            light_count=lights, receiver_count=receivers)
     if lobes:
         peaks.release()
-    arrays.write(f"{stage}.irradiance", gpu.read(result))
+    arrays.write(stage["writes"][0], gpu.read(result))
 
 
-def footprints(gpu: Gpu, arrays: Arrays, _: str) -> None:
+def footprints(gpu: Gpu, arrays: Arrays, stage: dict) -> None:
     """Run footprints.comp on each map of lights."""
-    lights = arrays["lights.flux"].shape[1]
+    common = {k: arrays[f"lights.pixel_lights.{name}"] for k, name in enumerate(
+        ("position", "normal", "texel", "map_index"))}
+    lights = len(common[2])
     areas = gpu.empty(lights)
-    common = {k: arrays[f"lights.{name}"] for k, name in enumerate(("position", "normal", "texel", "map"))}
-    for k in range(sum(f"rsm{k}.texel" in arrays for k in range(100))):
-        near, chosen = f"light{k}.position" in arrays, arrays[f"rsm{k}.texel"]
-        gpu.run("footprints.comp", (), {**common, 4: arrays[f"rsm{k}.solid_angle"], 5: chosen,
-                                        6: arrays[f"rsm{k}.weight"], 7: areas}, lights,
-                light_count=lights, chosen_count=len(chosen), map=k, near=int(near),
-                lamp=tuple(arrays[f"light{k}.{'position' if near else 'direction'}"].tolist()))
-    arrays.write("lights.area", gpu.read(areas, whole=True))
+    for k, near in enumerate(arrays.facts[stage["name"]]["near"]):
+        chosen = arrays[arrays.of_map("lights.texels{}.texel", k)]
+        gpu.run("footprints.comp", (), {
+            **common, 4: arrays[arrays.of_map("rsm.reflected_flux{}.solid_angle", k)], 5: chosen,
+            6: arrays[arrays.of_map("lights.texels{}.weight", k)], 7: areas,
+        }, lights, light_count=lights, chosen_count=len(chosen), map=k, near=int(near),
+            lamp=tuple(arrays[f"rsm.reflected_flux{k}.lamp.{'place' if near else 'direction'}"].tolist()))
+    arrays.write(stage["writes"][0], gpu.read(areas, whole=True))
 
 
-def gather(gpu: Gpu, arrays: Arrays, stage: str) -> None:
+def gather(gpu: Gpu, arrays: Arrays, stage: dict) -> None:
     """Run gather.comp on a level."""
-    index = stage.removeprefix("gather")
-    area, offsets = arrays[f"level{index}.area"], arrays[f"samples{index}.offsets"]
-    weight = arrays[f"samples{index}.weight"]
+    position, normal, radiance, area, offsets, weight = (arrays[name] for name in stage["reads"])
     result = gpu.empty(3 * area.size)
-    places = gpu.stored(arrays[f"level{index}.position"], place=True)
     gpu.run("gather.comp", (), {
-        0: places, 1: gpu.stored(arrays[f"level{index}.normal"]), 2: gpu.stored(arrays[f"level{index}.radiance"]),
-        3: gpu.stored(area), 4: offsets, 5: gpu.stored(weight), 6: result,
+        0: gpu.stored(position, place=True), 1: gpu.stored(normal), 2: gpu.stored(radiance), 3: gpu.stored(area),
+        4: offsets, 5: gpu.stored(weight), 6: result,
     }, area.size * (GROUP if "TREE" in gpu.variant else 1), size=area.shape[::-1], tile=offsets.shape[1::-1],
         weight_tile=weight.shape[1::-1], samples=offsets.shape[2])
-    arrays.write(f"{stage}.irradiance", gpu.read(result))
+    arrays.write(stage["writes"][0], gpu.read(result))
 
 
-STAGES: dict[tuple[str, str], Callable[[Gpu, Arrays, str], None]] = {  # by what is first written, numbers left out
-    ("pairs", "pairs.irradiance"): irradiance, ("sum", "sum.irradiance"): irradiance,
-    ("footprints", "lights.area"): footprints, ("gather", "gather.irradiance"): gather,
-    ("basis", "basis."): csm.basis, ("mip", "basis."): csm.mip, ("search.means", "search.means"): csm.means,
-    ("penumbra.means", "penumbra.means"): csm.means, ("visibility", "visibility.share"): csm.visibility,
+STAGES: dict[str, Callable[[Gpu, Arrays, dict], None]] = {  # by their names, numbers of runs left out
+    "pairs.pairs": irradiance, "pairs.sum": irradiance, "lights.footprints": footprints,
+    "sssil.gather_samples": gather, "cluster.basis": csm.basis, "cluster.mip_levels": csm.mip,
+    "cluster.mip_means": csm.means, "cluster.csm": csm.visibility,
 }
 
 
-def runner_of(stage: dict, method: str, facts: dict) -> Callable[[Gpu, Arrays, str], None] | None:
-    """Return what runs a stage, None where this port has it not."""
-    name, written = (re.sub(r"\d", "", text) for text in (stage["name"], stage["writes"][0]))
-    if (name == "sum" and method == "val") or (name == "visibility" and "csm" not in facts):
-        return None  # of other inputs, by the same name
-    if name in ("basis", "mip") and "basis.stored" in facts:
-        return None  # in 8 and 16 bits
-    return STAGES.get((name, written))
+def kind_of(stage: dict) -> str:
+    """Return a stage's name without the number of its run."""
+    return re.sub(r"\d+$", "", stage["name"])
 
 
 def main() -> int:
@@ -110,9 +107,9 @@ def main() -> int:
             continue
         arrays = Arrays(asked.kit, asked.out, case["id"], asked.chained)
         for stage in arrays.manifest["stages"]:
-            run = runner_of(stage, case["method"], arrays.facts)
-            if run is not None:
-                run(gpu, arrays, stage["name"])
+            run, facts = STAGES.get(kind_of(stage)), arrays.facts.get(stage["name"], {})
+            if run is not None and not facts.get("in_bytes"):  # a basis in 8 and 16 bits
+                run(gpu, arrays, stage)
                 print(case["id"], stage["name"])
     return 0
 

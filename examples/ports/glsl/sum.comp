@@ -1,4 +1,4 @@
-// Stage sum: irradiance of every pixel light at every pixel, without visibility and albedo / pi.
+// Stage pairs.sum: irradiance of every pixel light at every pixel, without visibility and albedo / pi.
 // An invocation takes a pixel and runs through the lights; where TREE is defined a work group takes a pixel, and
 // its invocations add up every 64th light each, then one another in pairs.
 layout(local_size_x = 64) in;

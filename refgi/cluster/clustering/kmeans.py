@@ -4,17 +4,20 @@ What a clustering is contribution: how much normals differ in a cluster (Fig. 6)
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.clustering.rounds import LINES, TILE, Metric, Rounds, iterate, move_to_means, sort_lights
-from refgi.cluster.settings import Distance
+from refgi.cluster.settings import Distance, KMeansSettings
 from refgi.errors import expect
 from refgi.jit import thread_count, threads
 from refgi.skips import left_out
 from refgi.stages import skip, stage
+
+if TYPE_CHECKING:
+    from refgi.rsm.buffers.extent import Extent
 
 Array = npt.NDArray[Any]
 
@@ -33,7 +36,41 @@ class Clustering(NamedTuple):
     objective: Array  # (rounds + 1,) float64: sum of all distances, at the start and after each round
 
 
-@stage("cluster.kmeans")
+def _steps(*args: Any, **kwargs: Any) -> dict[str, Array]:
+    from refgi.cluster.clustering.steps import kmeans_steps
+
+    return kmeans_steps(*args, **kwargs)
+
+
+@stage("cluster.kmeans", steps=_steps)
+def clusters_of(
+    position: Array, normal: Array, count: int, settings: KMeansSettings, illuminated: "Extent"
+) -> Clustering:
+    """Group lights by k-means as settings say (VAL Sec. 5.1).
+
+    Parameters
+    ----------
+    position : (3, N) ndarray
+        Lights, m.
+    normal : (3, N) ndarray
+        Their normals.
+    count : int
+        M; no more than N are made.
+    settings : KMeansSettings
+        Distance, weights and rounds.
+    illuminated : Extent
+        Box of what reflects direct light, in shares of whose diagonal distances are.
+
+    Returns
+    -------
+    Clustering
+        As of `cluster`.
+    """
+    return cluster(position, normal, count, distance=settings.distance,
+                   weights=(settings.position_weight, settings.normal_weight), diagonal=illuminated.diagonal,
+                   rounds=settings.rounds)
+
+
 def cluster(
     position: Array, normal: Array, count: int, *, distance: Distance = "normalised",
     weights: tuple[float, float] = (0.7, 0.3), diagonal: float, rounds: int = 50, start: Clustering | None = None,
@@ -186,20 +223,7 @@ def _metric(distance: Distance, weights: tuple[float, float], diagonal: float, s
 
 
 def mean_angle(normal: Array, clusters: Clustering) -> float:
-    """Return the mean over lights of the angle between a light's normal and its cluster's.
-
-    Parameters
-    ----------
-    normal : (3, N) ndarray
-        Unit normals of the lights.
-    clusters : Clustering
-        Their clusters.
-
-    Returns
-    -------
-    float
-        Radians; 0 without lights.
-    """
+    """Return the mean angle between a light's normal, (3, N), and its cluster's, radians; 0 without lights."""
     if normal.shape[1] == 0:
         return 0.0
     ours, own = np.asarray(normal, np.float64), clusters.normal[:, clusters.of]
@@ -208,16 +232,5 @@ def mean_angle(normal: Array, clusters: Clustering) -> float:
 
 
 def in_use(clusters: Clustering) -> int:
-    """Return how many clusters have lights.
-
-    Parameters
-    ----------
-    clusters : Clustering
-        The clusters.
-
-    Returns
-    -------
-    int
-        0 to M.
-    """
+    """Return how many clusters have lights, 0 to M."""
     return int(np.count_nonzero(clusters.members))

@@ -30,19 +30,10 @@ FLAT = 1e-5  # of a cluster's radius: a narrower rectangle is a line, of no widt
 
 
 def turn_of(flat: Array, axes: Axes) -> float:
-    """Return by how much the axes are turned within the plane.
+    """Return the angle by which the axes are turned within the plane, from the first axis towards the second.
 
-    Parameters
-    ----------
-    flat : (2, n) ndarray
-        Points of the plane, m.
-    axes : {"fixed", "pca", "min_area"}
-        Not at all; along the greatest variance; along the sides of the rectangle of least area.
-
-    Returns
-    -------
-    float
-        Angle from the first axis towards the second; 0 where no direction stands out.
+    `flat` (2, n) are points of the plane, m. "fixed": not at all; "pca": along the greatest variance; "min_area": along
+    the sides of the rectangle of least area. 0 where no direction stands out.
     """
     if axes == "fixed" or flat.shape[1] < 2:
         return 0.0
@@ -105,7 +96,13 @@ class AreaLights(NamedTuple):
     of: Array  # (N,) int32: C(i), the area light of each pixel light
 
 
-@stage("cluster.area_lights")
+def _steps(*args: Any, **kwargs: Any) -> dict[str, Array]:
+    from refgi.cluster.clustering.steps import area_steps
+
+    return area_steps(*args, **kwargs)
+
+
+@stage("cluster.area_lights", steps=_steps)
 def area_lights(
     lights: "PixelLights", clusters: Clustering, settings: AreaLightSettings, footprint: Array | None = None
 ) -> AreaLights:
@@ -141,16 +138,23 @@ def area_lights(
     out, (n + 1) / (n - 1) a side.
     """
     position = np.asarray(lights.position, np.float64)
-    total, count = position.shape[1], clusters.center.shape[1]
+    total = position.shape[1]
     expect(clusters.of.shape == (total,), "clusters.of", f"shape ({total},)", clusters.of.shape)
     if settings.single_light == "footprint":
         expect(footprint is not None and footprint.shape == (total,), "footprint",
                f"the area of each of {total} lights", None if footprint is None else footprint.shape)
-    frames = map_frames(clusters.normal)
+    return rectangles(position, clusters, settings, footprint)
+
+
+def rectangles(
+    position: Array, clusters: Clustering, settings: AreaLightSettings, footprint: Array | None = None
+) -> AreaLights:
+    """Return the rectangles around lights at places (3, N) float64, m; footprint (N,), m^2."""
+    frames, count = map_frames(clusters.normal), clusters.center.shape[1]
     used, away, starts = _grouped(position, clusters)
     axes = _axes(away, frames, clusters, settings.axes)
     side, offset, radius = np.zeros((2, count)), np.zeros((2, count)), np.zeros(count)
-    if total:
+    if position.shape[1]:
         flat = np.einsum("nac,cn->an", np.repeat(axes[used], clusters.members[used], axis=0), away)
         low, high = np.minimum.reduceat(flat, starts, axis=1), np.maximum.reduceat(flat, starts, axis=1)
         side[:, used], offset[:, used] = high - low, (low + high) / 2
@@ -166,17 +170,9 @@ def area_lights(
 
 
 def map_frames(normal: Array) -> Array:
-    """Return the frames of paraboloid maps along normals, those of `paraboloid_projection`.
+    """Return the frames of paraboloid maps along unit normals (3, M), those of `paraboloid_projection`.
 
-    Parameters
-    ----------
-    normal : (3, M) ndarray
-        Unit vectors.
-
-    Returns
-    -------
-    (M, 3, 3) ndarray
-        Rows right, down, forward.
+    (M, 3, 3), rows right, down, forward.
     """
     forward = np.ascontiguousarray(normal.T)
     up = np.where(np.abs(forward[:, 1:2]) < UPRIGHT, (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))

@@ -143,19 +143,9 @@ def fill_basis(depth: Array, terms: int, quantised: bool, basis: Array, basis_z:
 
 @functools.lru_cache(maxsize=8)
 def beyond_disc(size: int, mirrored: bool) -> Array:
-    """Pair the texels beyond the unit disc with those they mirror.
+    """Pair the texels beyond the unit disc of an n x n map with those they mirror, if any, row by row.
 
-    Parameters
-    ----------
-    size : int
-        Texels along a side of the map, n.
-    mirrored : bool
-        Whether they mirror any; no pairs otherwise.
-
-    Returns
-    -------
-    (count, 2) ndarray
-        Int32: a texel beyond and the one it copies, row by row.
+    (count, 2) int32: a texel beyond and the one it copies.
     """
     if not mirrored:
         return np.zeros((0, 2), np.int32)

@@ -37,27 +37,11 @@ class Brute(NamedTuple):
 def brutes(
     size: int, terms: int, dtype: npt.DTypeLike, *, box: bool = False, quantised: bool = False, mirrored: bool = False
 ) -> Brute:
-    """Allocate the filters of one map.
+    """Allocate the filters of one map of n x n texels with M terms, not yet filled.
 
-    Parameters
-    ----------
-    size : int
-        Texels along a side of the map, n.
-    terms : int
-        M.
-    dtype : dtype
-        Float32 or float64.
-    box : bool
-        Filter over the square around the disc instead of the disc.
-    quantised : bool
-        Keep 8 bits of the basis and 16 of the basis-z.
-    mirrored : bool
-        Mirror the disc in the square beyond it, which otherwise holds the far end; boxes alone look there.
-
-    Returns
-    -------
-    Brute
-        Arrays not yet filled.
+    `box` filters over the square around the disc instead of the disc; `quantised` keeps 8 bits of the basis and 16 of
+    the basis-z; `mirrored` mirrors the disc in the square beyond it, which otherwise holds the far end; boxes alone
+    look there.
     """
     return Brute(np.zeros((size, size), dtype), np.zeros((size, size, 2 * terms), dtype),
                  np.zeros((size, size, 2 * terms + 1), dtype), box, quantised, beyond_disc(size, mirrored))

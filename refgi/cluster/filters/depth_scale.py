@@ -40,28 +40,12 @@ def joined(scales: Sequence[DepthScale]) -> DepthScale:
 
 
 def depth_scale(kind: str, near: float, far: float, scene_far: float, most: float) -> DepthScale:
-    """Return the scale of one map.
+    """Return the scale of one map, whose nearest and farthest distances are 0 < near <= far, m, as Python floats.
 
-    Parameters
-    ----------
-    kind : {"log_map", "map", "scene"}
-        The logarithm of distances between `near` and `far`; distances between them; distances up to `scene_far`.
-    near, far : float
-        Nearest and farthest of what the map holds, m; 0 < near <= far.
-    scene_far : float
-        The farthest place of the scene's extent, m.
-    most : float
-        The far end of the series' range.
-
-    Returns
-    -------
-    DepthScale
-        Python floats.
-
-    Notes
-    -----
-    What the map holds ends 1 - `most` below the far end, both biases, so that its farthest blocker still hides wholly
-    what lies beyond; or in the middle where so few terms leave less than that.
+    "log_map": the logarithm of distances between these; "map": distances between them; "scene": distances up to
+    `scene_far`, the farthest place of the scene's extent, m. `most` is the far end of the series' range. What the map
+    holds ends 1 - `most` below that, both biases, so that its farthest blocker still hides wholly what lies beyond; or
+    in the middle where so few terms leave less than that.
     """
     if kind == "scene":
         return DepthScale(False, 0.0, most / scene_far, most)

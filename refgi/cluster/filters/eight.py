@@ -24,13 +24,7 @@ Emitted = tuple[Any, Callable[..., Any]]
 
 
 class EightType(types.Type):
-    """Eight float32 or eight float64.
-
-    Parameters
-    ----------
-    real : numba type
-        Which.
-    """
+    """Eight float32 or eight float64, a type of Numba."""
 
     def __init__(self, real: Any) -> None:
         self.real = real
@@ -39,15 +33,7 @@ class EightType(types.Type):
 
 @register_model(EightType)
 class EightModel(models.PrimitiveModel):
-    """Held as an LLVM vector.
-
-    Parameters
-    ----------
-    manager : DataModelManager
-        Of Numba.
-    kind : EightType
-        What is held.
-    """
+    """Held as an LLVM vector."""
 
     def __init__(self, manager: Any, kind: EightType) -> None:
         element = ir.FloatType() if kind.real == types.float32 else ir.DoubleType()
@@ -137,17 +123,7 @@ def _transpose(_: Any, rows: Any) -> Emitted:
 def stack_array(rows: int, lanes: int, kind: Any = None) -> Any:
     """Return a function for kernels that gives scratch on their stack, the same scratch for every call in one kernel.
 
-    Parameters
-    ----------
-    rows, lanes : int
-        Its shape.
-    kind : numba type, optional
-        Of its numbers; absent, that of the array the function gets.
-
-    Returns
-    -------
-    callable
-        ``scratch(like)``: a (rows, lanes) array that holds anything.
+    ``scratch(like)`` is a (rows, lanes) array that holds anything, of numbers of `kind`, else of the type of `like`'s.
     """
 
     def scratch(_: Any, like: Any) -> Emitted:

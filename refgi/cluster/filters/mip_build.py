@@ -57,7 +57,7 @@ def build_mip(depth: Array, scale: DepthScale, mip: Mip) -> None:
             halve(mip.basis, mip.basis_z, mip.mean_depth, mip.first[level - 1], mip.first[level], side)
             side = (side + 1) // 2
         if mip.quantised:
-            _round(mip, mip.first[level], side * side)
+            round_texels(mip, mip.first[level], side * side)
 
 
 @kernel
@@ -225,7 +225,8 @@ def _store_mean(array: Array, a: int, b: int, c: int, d: int, target: int) -> No
 
 
 @kernel
-def _round(mip: Mip, first: int, count: int) -> None:
+def round_texels(mip: Mip, first: int, count: int) -> None:
+    """Round texels of a level, from its first on, to 8 bits and half floats."""
     for texel in range(first, first + count):
         for c in range(2 * mip.terms):
             mip.basis[texel, c] = eight_bits(mip.basis[texel, c])

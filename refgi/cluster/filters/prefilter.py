@@ -21,22 +21,10 @@ MEANS: dict[Any, Any] = {Mip: mip_means, Brute: brute_means}
 def filter_means(
     filters: Any, s: Array, t: Array, radius: Array, active: Array, count: int, with_z: bool, out: Array
 ) -> None:
-    """Read the means of the channels over a disc for each lane of a tile.
+    """Read the means of the channels over a disc for each active lane of the `count` in use of a tile.
 
-    Parameters
-    ----------
-    filters : Mip or Brute
-        The filtered map.
-    s, t, radius : (lanes,) ndarray
-        Centre and radius of the discs, in units of the map's half side.
-    active : (lanes,) ndarray of bool
-        Lanes to read.
-    count : int
-        Lanes in use.
-    with_z : bool
-        All 4 M + 1 channels instead of the first 2 M.
-    out : (channels, lanes) ndarray
-        Filled where active.
+    Centres (s, t) and radii are in units of the map's half side; `out` (channels, lanes) is filled where active: all 4
+    M + 1 channels with `with_z`, else the first 2 M.
     """
     MEANS[type(filters)](filters, s, t, radius, active, count, with_z, out)
 
@@ -56,23 +44,9 @@ def _by_type(
 
 
 def build_filters(depth: Array, scale: DepthScale, settings: Csm, box: bool) -> Any:
-    """Filter one map as settings ask for.
+    """Filter one map (n, n), radial distances in m, inf where it is empty, as settings ask for; in its dtype.
 
-    Parameters
-    ----------
-    depth : (n, n) ndarray
-        Radial distance, m; inf where the map is empty.
-    scale : DepthScale
-        From metres to the series' scale.
-    settings : Csm
-        Terms, filter and quantisation.
-    box : bool
-        Brute force filters over squares instead of discs.
-
-    Returns
-    -------
-    Mip or Brute
-        In the dtype of `depth`.
+    `scale` takes metres to the series' scale. `box`: brute force filters over squares instead of discs.
     """
     return build_several(depth[None], (scale,), settings, box)[0]
 
@@ -80,30 +54,11 @@ def build_filters(depth: Array, scale: DepthScale, settings: Csm, box: bool) -> 
 def build_several(
     depth: Array, scales: Sequence[DepthScale], settings: Csm, box: bool, scratch: Mip | None = None
 ) -> list[Any]:
-    """Filter several maps at once, one on each thread.
+    """Filter several maps (k, n, n) at once, one on each thread, as `build_filters` does one.
 
-    Parameters
-    ----------
-    depth : (k, n, n) ndarray
-        Radial distances, m; inf where a map is empty.
-    scales : sequence of DepthScale
-        From metres to the series' scale, of each map.
-    settings : Csm
-        Terms, filter and quantisation.
-    box : bool
-        Brute force filters over squares instead of discs.
-    scratch : Mip, optional
-        Of `allocate_mips` for k maps or more with the same settings; overwritten.
-
-    Returns
-    -------
-    list of Mip or Brute
-        In the dtype of `depth`.
-
-    Notes
-    -----
-    Sec. 6 filters square maps. The square beyond the unit disc, which the hemisphere does not reach, mirrors what lies
-    within: holding nothing, it would let light leak in over the rim. Texel by texel, it is left out.
+    `scratch`, of `allocate_mips` for k maps or more with the same settings, is overwritten. Sec. 6 filters square maps.
+    The square beyond the unit disc, which the hemisphere does not reach, mirrors what lies within: holding nothing, it
+    would let light leak in over the rim. Texel by texel, it is left out.
     """
     size, dtype = depth.shape[1], depth.dtype
     if settings.prefilter == "mip":
@@ -118,23 +73,6 @@ def build_several(
 
 
 def allocate_mips(count: int, size: int, dtype: npt.DTypeLike, settings: Csm) -> Mip:
-    """Allocate the pyramids of several maps.
-
-    Parameters
-    ----------
-    count : int
-        Maps.
-    size : int
-        Texels along a side of a map.
-    dtype : dtype
-        Of the maps.
-    settings : Csm
-        Terms and quantisation.
-
-    Returns
-    -------
-    Mip
-        With a leading axis of `count`, not yet filled.
-    """
+    """Allocate the pyramids of `count` maps of size x size texels, a leading axis, not yet filled."""
     return mips(count, size, settings.terms, dtype, shift=LEVEL_SHIFT, quantised=settings.quantisation == "published",
                 mirrored=True)

@@ -43,19 +43,10 @@ class Mip(NamedTuple):
 
 
 def level_offsets(size: int) -> tuple[Array, int]:
-    """Return where each level of a pyramid starts, levels 1 and up laid end to end.
+    """Return where each level of a pyramid starts, (levels,) int64, and the texels of levels 1 and up, laid end to end.
 
-    Parameters
-    ----------
-    size : int
-        Texels along a side of level 0; each level has half of the one before, rounded up.
-
-    Returns
-    -------
-    first : (levels,) ndarray
-        Int64; 0 for level 0, which is not among them, as for level 1.
-    total : int
-        Texels of levels 1 and up.
+    Each level has half of the texels along a side of the one before, rounded up, from `size` on. Level 0 is not among
+    them and starts at 0, as level 1.
     """
     sides = [size]
     while sides[-1] > 1:
@@ -68,29 +59,11 @@ def mips(
     count: int, size: int, terms: int, dtype: npt.DTypeLike, *, shift: float = 0.0, quantised: bool = False,
     mirrored: bool = False,
 ) -> Mip:
-    """Allocate the filters of the pyramids of several maps.
+    """Allocate the filters of the pyramids of `count` maps of n x n texels with M terms, not yet filled; padding is 0.
 
-    Parameters
-    ----------
-    count : int
-        Maps.
-    size : int
-        Texels along a side of a map, n.
-    terms : int
-        M.
-    dtype : dtype
-        Float32 or float64.
-    shift : float
-        Added to the level of every read; 0 as published, negative for a narrower filter.
-    quantised : bool
-        Keep 8 bits of the basis and 16 of the basis-z on every level.
-    mirrored : bool
-        Mirror the disc in the square beyond it, which otherwise holds the far end.
-
-    Returns
-    -------
-    Mip
-        Arrays with a leading axis of `count`, not yet filled; padding is 0.
+    The leading axis is `count`. `shift` is added to the level of every read; 0 as published, negative for a narrower
+    filter. `quantised` keeps 8 bits of the basis and 16 of the basis-z on every level; `mirrored` mirrors the disc in
+    the square beyond it, which otherwise holds the far end.
     """
     first, total = level_offsets(size)
     shape, width = (count, total + SLACK), -(-2 * terms // EIGHT) * EIGHT

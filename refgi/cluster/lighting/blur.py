@@ -20,6 +20,7 @@ from refgi.cluster.settings import MOST_BLOCK, GeometryBlur
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers
+from refgi.rsm.buffers.extent import Extent
 from refgi.stages import stage
 
 if TYPE_CHECKING:
@@ -33,9 +34,9 @@ NOWHERE = np.zeros((0, 0, 0, 2), np.int64)  # places of missing subsets where th
 
 @stage("cluster.blur")
 def blur(
-    irradiance: Array, receivers: Receivers, size: int, settings: "BoxBlur | GeometryBlur", diagonal: float
+    irradiance: Array, receivers: Receivers, size: int, settings: "BoxBlur | GeometryBlur", visible: Extent
 ) -> Array:
-    """Average irradiance over n x n pixels of the same surface.
+    """Average irradiance over n x n pixels of a surface, each subset once (VAL Sec. 6, E-VAL-13; docs/methods/val).
 
     Parameters
     ----------
@@ -47,8 +48,8 @@ def blur(
         n, 1 to 64: pixels along a side of the window.
     settings : BoxBlur or GeometryBlur
         How far apart points of one surface may be and how their normals may differ; a box asks neither.
-    diagonal : float
-        Of the scene, m.
+    visible : Extent
+        Box of what the camera sees, of whose diagonal distances are shares.
 
     Returns
     -------
@@ -75,7 +76,7 @@ def blur(
     real = position.dtype.type
     extent, cosine, places = FAR / 4, -np.inf, NOWHERE
     if isinstance(settings, GeometryBlur):
-        extent = min(settings.extent * diagonal, FAR / 4)
+        extent = min(settings.extent * visible.diagonal, FAR / 4)
         cosine = settings.cosine if settings.cosine > -1 else -np.inf
         places = places_of_subsets(size) if settings.every_subset else NOWHERE
     result = np.empty_like(values)

@@ -25,15 +25,8 @@ REACH = 1  # windows on each side that are searched
 def places_of_subsets(size: int) -> Array:
     """Return where else each place of a window of n x n pixels finds its subset, from near to far.
 
-    Parameters
-    ----------
-    size : int
-        n.
-
-    Returns
-    -------
-    (n, n, (2 REACH + 1)^2 - 1, 2) ndarray
-        Int64: rows and columns from the pixel that the window is of; equally far ones by row, then column.
+    (n, n, (2 REACH + 1)^2 - 1, 2) int64: rows and columns from the pixel that the window is of; equally far ones by
+    row, then column.
     """
     steps = np.arange(-REACH, REACH + 1) * size
     aside = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)

@@ -55,7 +55,13 @@ Array = npt.NDArray[Any]
 BEYOND_REACH = 1e15  # m: bounds of a tile that every light reaches
 
 
-@stage("cluster.irradiance")
+def _steps(*args: Any, **kwargs: Any) -> Array:
+    from refgi.cluster.lighting.steps import irradiance_steps
+
+    return irradiance_steps(*args, **kwargs)
+
+
+@stage("cluster.irradiance", steps=_steps)
 def clustered_irradiance(
     receivers: Receivers, facing: Array, lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps | None",
     settings: "ValSettings", footprint: Array | None = None, visibility_of: VisibilityFunction | None = None,

@@ -38,24 +38,10 @@ class Subsets(NamedTuple):
 
 
 def subsets(covered: Array, side: int) -> Subsets:
-    """Sort pixels by the subset of lights that they sum.
+    """Sort covered pixels, (h, w) bool, by the subset of lights that they sum, each once.
 
-    Parameters
-    ----------
-    covered : (h, w) ndarray of bool
-        Whether there is a surface.
-    side : int
-        n, pixels along a side of a block; 1 to 64.
-
-    Returns
-    -------
-    Subsets
-        Every covered pixel once; those of a subset by blocks of `BLOCK` x `BLOCK` of them.
-
-    Raises
-    ------
-    InputError
-        If the side is out of range.
+    `side` n is that of a block, 1 to 64 pixels, else `InputError`. Those of a subset come by blocks of `BLOCK` x
+    `BLOCK` of them.
     """
     expect(1 <= side <= MOST_BLOCK, "interleaving", f"1 to {MOST_BLOCK} pixels", side)
     covered = np.ascontiguousarray(covered)
@@ -74,28 +60,13 @@ def subsets(covered: Array, side: int) -> Subsets:
 
 
 def assigned_subsets(area_of: Array, side: int, assignment: "Assignment") -> Array:
-    """Say which subset each light belongs to.
+    """Return which subset each light belongs to, (N,) int64, 0 to n^2 - 1, for area lights C(i), (N,), and side n.
 
-    Parameters
-    ----------
-    area_of : (N,) ndarray of int
-        C(i), the area light of each.
-    side : int
-        n, pixels along a side of a block.
-    assignment : {"index", "cluster"}
-        Light i to the subset i mod n^2; or lights sorted by area light, cut into equal runs and these assigned in
-        turn, `RUNS` to each subset, fewer where lights are few.
-
-    Returns
-    -------
-    (N,) ndarray of int64
-        Subsets, 0 to n^2 - 1.
-
-    Notes
-    -----
+    "index": light i to the subset i mod n^2; "cluster": lights sorted by area light, cut into equal runs and these
+    assigned in turn, `RUNS` to each subset, fewer where lights are few.
     [Dong09] Sec. 6 does not say which lights a pixel takes. By index it meets a part of nearly every area light, and
-    the visibility of each costs as much as for all its lights; by cluster it meets two to four of 30. Runs that
-    follow each other lie far apart in the block, as the lights of a cluster should in any part of a window.
+    the visibility of each costs as much as for all its lights; by cluster it meets two to four of 30. Runs that follow
+    each other lie far apart in the block, as the lights of a cluster should in any part of a window.
     """
     count, subset_count = len(area_of), side * side
     lights = np.arange(count)
@@ -171,26 +142,7 @@ class MemberLights(NamedTuple):
 
 
 def member_lights(packed: Packed, area_of: Array, count: int, subset: Array, subsets: int) -> MemberLights:
-    """Sort packed lights by what they belong to.
-
-    Parameters
-    ----------
-    packed : Packed
-        The lights.
-    area_of : (N,) ndarray of int
-        C(i), the area light of each.
-    count : int
-        M, how many area lights there are.
-    subset : (N,) ndarray of int
-        Of interleaved sampling, the subset that each light belongs to.
-    subsets : int
-        n^2, how many subsets there are.
-
-    Returns
-    -------
-    MemberLights
-        The same lights, sorted.
-    """
+    """Sort packed lights by their area light C(i), (N,), one of M (`count`), and their subset, (N,), one of n^2."""
     key = np.asarray(area_of, np.int64) * subsets + subset
     order, start = _sorted(key[packed.shines], count, subsets)
     lobe_order, lobe_start = _sorted(key[packed.glossy], count, subsets)
@@ -206,20 +158,9 @@ def member_lights(packed: Packed, area_of: Array, count: int, subset: Array, sub
 def add_members(
     position: Array, normal: Array, parts: Subsets, members: MemberLights, m: int, irradiance: Array
 ) -> None:
-    """Add the lights of one area light, of any kind, to the receivers of each subset.
+    """Add the lights of area light m, of any kind, to the receivers of each subset, (3, n) in the order of `parts`.
 
-    Parameters
-    ----------
-    position, normal : (3, n) ndarray
-        Receivers in the order of `parts`.
-    parts : Subsets
-        Which of them sum which lights.
-    members : MemberLights
-        The lights.
-    m : int
-        Which area light.
-    irradiance : (3, n) ndarray
-        W/m^2; zeros, which are filled.
+    `irradiance` (3, n), W/m^2, is zeros, which are filled.
     """
     for subset, (first, last) in enumerate(zip(parts.start[:-1], parts.start[1:], strict=True)):
         ends = slice(subset, subset + 2)

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.buffers.extent import Extent
+from refgi.rsm.buffers.extent import Extent, joined
 from refgi.rsm.raster.depth_maps import whole_chunks
 from refgi.rsm.raster.paraboloid import CutChunks, cut_chunks
 from refgi.rsm.raster.triangle import Chunks, chunks
@@ -56,46 +56,54 @@ class Blockers(NamedTuple):
 class Ends(NamedTuple):
     """Where segments of light end: all of them lie within the convex hull of `points`."""
 
-    points: Array  # (n, 3) float64, m
-    extent: Extent  # the box of what takes part
+    vertices: Array  # (n, 3) float64, m
+    visible: Extent  # the box of what the camera sees
     illuminated: Extent  # the box of what light begins at
+    lights: Array = np.zeros((3, 0))  # (3, N), m
+
+    @property
+    def points(self) -> Array:
+        """Vertices, then lights, (n + N, 3) float64, m."""
+        return np.ascontiguousarray(np.concatenate([self.vertices, np.asarray(self.lights, np.float64).T]))
+
+    @property
+    def extent(self) -> Extent:
+        """The box of what takes part."""
+        return joined(self.visible, self.illuminated)
 
 
 def ends_of(frame: "Frame", lights: "PixelLights") -> Ends:
     """Return where the light of pixel lights begins and ends.
 
-    Parameters
-    ----------
-    frame : Frame
-        The camera's view.
-    lights : PixelLights
-        N lights.
-
-    Returns
-    -------
-    Ends
-        Vertices of the triangles that the camera sees, places of the lights, and the scene's extent.
+    Vertices of the triangles that the camera sees, places of the lights, and the scene's extent.
     """
-    geometry, used = frame.scene.geometry, np.zeros(len(frame.scene.geometry.vertices), np.bool_)
-    _flag_corners(frame.gbuffer.triangle_id, geometry.faces, used)
-    places = np.asarray(lights.position, np.float64).T
-    return Ends(np.ascontiguousarray(np.concatenate([geometry.vertices[used], places])), frame.extent,
-                frame.illuminated_extent)
+    vertices = seen_vertices(frame.scene.geometry, frame.gbuffer.triangle_id)
+    return Ends(vertices, frame.visible_extent, frame.illuminated_extent, lights.position)
 
 
-def everywhere(geometry: Geometry) -> Ends:
-    """Return ends at any two points of the scene.
+@stage("cluster.seen_vertices")
+def seen_vertices(geometry: Geometry, triangle_id: Array) -> Array:
+    """Gather the vertices of the triangles that pixels see (docs/methods/val_visibility).
 
     Parameters
     ----------
     geometry : Geometry
-        The scene's triangles.
+        The triangles.
+    triangle_id : (h, w) int ndarray
+        Which triangle a pixel sees; -1 for none.
 
     Returns
     -------
-    Ends
-        All vertices that triangles use, and their box.
+    (seen vertex, 3) ndarray
+        Places, m: each vertex once, in their order.
     """
+    used = np.zeros(len(geometry.vertices), np.bool_)
+    _flag_corners(triangle_id, geometry.faces, used)
+    return np.asarray(geometry.vertices[used])
+
+
+def everywhere(geometry: Geometry) -> Ends:
+    """Return ends at any two points of the scene: all vertices that triangles use, and their box."""
     vertices = np.ascontiguousarray(geometry.vertices, np.float64)
     whole = Extent(*geometry.bounds)
     return Ends(vertices[_used(len(vertices), geometry.faces)], whole, whole)
@@ -103,7 +111,7 @@ def everywhere(geometry: Geometry) -> Ends:
 
 @stage("cluster.occluders")
 def occluders(geometry: Geometry, ends: Ends | None = None, touching: bool = False) -> Array:
-    """Return which triangles may lie between two points.
+    """Find the triangles that may lie between two ends of light: some on either side (docs/methods/val_visibility).
 
     Parameters
     ----------
@@ -116,14 +124,15 @@ def occluders(geometry: Geometry, ends: Ends | None = None, touching: bool = Fal
 
     Returns
     -------
-    (m,) bool ndarray
-        False for triangles on or outside of the convex hull: a segment between two points meets them only
+    (triangle,) bool ndarray
+        Whether it may lie between. False on or outside of the convex hull: a segment between two points meets it only
         where one of its ends lies in their plane, to 1e-6 of the extent's diagonal. Triangles without area are False,
         and all are where there is no point.
     """
     faces = np.ascontiguousarray(geometry.faces)
     border = np.zeros(len(faces), np.bool_)
-    used, extent, _ = ends or everywhere(geometry)
+    ends = ends or everywhere(geometry)
+    used, extent = ends.points, ends.extent
     if not len(used):  # nothing is seen and nothing shines: no two points, so nothing lies between
         return border
     tolerance = TOLERANCE * extent.diagonal * (-1.0 if touching else 1.0)

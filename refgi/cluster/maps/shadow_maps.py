@@ -36,29 +36,12 @@ BACKWARD = np.diag([-1.0, 1.0, -1.0])  # the frame of the hemisphere behind: rig
 def traced_maps(
     projection: Projection, drawn: Blockers, ignored: Ignored, dtype: npt.DTypeLike, tracer: "Tracer | None" = None
 ) -> tuple[Array, Array, Array]:
-    """Measure distances on paraboloid maps by rays.
+    """Measure distances on k paraboloid maps of n x n texels by rays against the triangles drawn.
 
-    Parameters
-    ----------
-    projection : Projection
-        k paraboloid maps of n x n texels.
-    drawn : Blockers
-        The triangles.
-    ignored : Ignored
-        What lies too near the centres to count.
-    dtype : dtype
-        Float32 or float64; rays themselves are float32.
-    tracer : Tracer, optional
-        Rays against the same triangles; made where it is absent.
-
-    Returns
-    -------
-    distance : (k, n, n) ndarray
-        Distance, m; inf where the map is empty and outside the disc.
-    nearest : (k,) ndarray
-        Float64: smallest distance on each map, m; inf where nothing is.
-    left_out : (k,) ndarray
-        Int64: triangles that reach into each map's hemisphere and are ignored for their planes or lie in its ball.
+    Rays are float32, of `tracer` or one made of the triangles; what lies too near the centres is ignored. Returns
+    distances (k, n, n), m, inf where the map is empty and outside the disc; the smallest on each map (k,) float64, inf
+    where nothing is; and the triangles (k,) int64 that reach into each map's hemisphere and are ignored for their
+    planes or lie in its ball.
     """
     n = projection.width
     distance, left_out = np.full((projection.maps, n, n), np.inf, dtype), np.zeros(projection.maps, np.int64)
@@ -116,7 +99,13 @@ class ShadowMaps(NamedTuple):
     left_out: int = 0  # triangles left out because they are near a centre, summed over all maps
 
 
-@stage("cluster.shadow_maps")
+def _steps(*args: Any, **kwargs: Any) -> dict[str, Array]:
+    from refgi.cluster.maps.steps import map_steps
+
+    return map_steps(*args, **kwargs)
+
+
+@stage("cluster.shadow_maps", steps=_steps)
 def shadow_maps(
     geometry: Geometry, areas: AreaLights, settings: ShadowMapSettings, dtype: npt.DTypeLike,
     tracer: "Tracer | None" = None, ends: Ends | None = None,

@@ -38,33 +38,14 @@ def free_share(
     contribution: Callable[[Array, Array], Array] | None, grain: float, ball: Ball | None = None,
     shading: Array | None = None,
 ) -> Array:
-    """Return the share of each receiver's rays that arrives, each ray weighted by its contribution.
+    """Return the share of each receiver's rays that arrives, each weighted by its contribution: (n,), 1 without weight.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        What blocks.
-    points, facing : (3, n) ndarray
-        Receivers (m) and the unit normals of their faces, off which rays start.
-    targets : (3, k) ndarray
-        Points on lights, m.
-    upward : (3, k) or (3, 1) ndarray
-        Unit normals at the targets, on the side that rays come from.
-    contribution : callable or None
-        ``(toward (n, k, 3), up (n, 3)) -> (n, k)``: the weight of each ray, 0 or more, by vectors from some receivers
-        to the targets and the receivers' normals; None: all the same. Targets below the horizon of `shading` do not
-        count; those above it and below the face count as hidden.
-    grain : float
-        The scene tracer's: how far above their surfaces rays start and end, as `ray_offset` has it, m.
-    ball : Ball, optional
-        Rays end where they enter it.
-    shading : (3, n) ndarray, optional
-        Unit normals that cosines are taken with; the faces' where absent.
-
-    Returns
-    -------
-    (n,) ndarray
-        In the dtype of the points, 0 to 1; 1 where no ray has any weight.
+    Receivers `points` and the unit normals of their faces, off which rays start, are (3, n), `targets` on lights (3,
+    k), m, `upward` (3, k) or (3, 1) unit normals there, on the side that rays come from. `contribution` takes vectors
+    from some receivers to the targets (n, k, 3) and the receivers' normals (n, 3) to weights (n, k), 0 or more; None:
+    all the same. Targets below the horizon of `shading` (3, n), the unit normals that cosines are taken with (the
+    faces' where absent), do not count; those above it and below the face count as hidden. `grain`: how far above their
+    surfaces rays start and end, as `ray_offset` has it, m; rays end where they enter `ball`.
     """
     from refgi.rays import STEPS
 
@@ -163,22 +144,7 @@ def rectangle_visibility(
 
 
 def rectangle_points(areas: AreaLights, m: int, on_square: Array) -> Array:
-    """Return points of an area light's rectangle.
-
-    Parameters
-    ----------
-    areas : AreaLights
-        The area lights.
-    m : int
-        Which.
-    on_square : (2, k) ndarray
-        Places in [0, 1]^2.
-
-    Returns
-    -------
-    (3, k) ndarray
-        World space, m.
-    """
+    """Return points (3, k), world space, m, of area light m's rectangle at places (2, k) in [0, 1]^2."""
     along = areas.offset[:, m, None] + (on_square - 0.5) * areas.side[:, m, None]
     points: Array = areas.center[:, m, None] + areas.axes[m].T @ along
     return points
@@ -187,25 +153,9 @@ def rectangle_points(areas: AreaLights, m: int, on_square: Array) -> Array:
 def tracer_without_near(
     frame: "Frame", drawn: Blockers, areas: AreaLights, m: int, settings: ShadowMapSettings
 ) -> Tracer:
-    """Return rays against what an area light's map is drawn from.
+    """Return rays against what area light m's map is drawn from, of triangles that can block at all.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene.
-    drawn : Blockers
-        Triangles that can block at all.
-    areas : AreaLights
-        The area lights.
-    m : int
-        Which.
-    settings : ShadowMapSettings
-        Whether planes near the centre are left out.
-
-    Returns
-    -------
-    Tracer
-        That of the frame where nothing is left out.
+    The frame's tracer where settings leave out no planes near the centre.
     """
     distance = settings.near_share * areas.radius[m]
     if settings.near_geometry != "planes" or distance == 0:

@@ -55,18 +55,7 @@ class FilterSizing(NamedTuple):
 
 
 def filter_sizing(settings: ValSettings) -> FilterSizing:
-    """Return how settings size filters.
-
-    Parameters
-    ----------
-    settings : ValSettings
-        `as_published`, `area.foreshortened` and the `blocker_depth` count.
-
-    Returns
-    -------
-    FilterSizing
-        One flag each.
-    """
+    """Return how settings size filters, a flag each: `as_published`, `area.foreshortened`, `blocker_depth`."""
     published, kind = settings.as_published, settings.visibility
     return FilterSizing("val_alpha" in published, "val_alpha_over_pi" in published,
                         "val_search_solid_angle" in published, settings.area.foreshortened,
@@ -76,25 +65,10 @@ def filter_sizing(settings: ValSettings) -> FilterSizing:
 def light_constants(
     maps: ShadowMaps, k: int, delta: float, chain: Series | None = None, behind: bool = False
 ) -> Array:
-    """Return the constants of one area light and its map that kernels read.
+    """Return the constants of one area light and its map that kernels read, (CONSTANTS,), in the dtype of the maps.
 
-    Parameters
-    ----------
-    maps : ShadowMaps
-        The maps.
-    k : int
-        The map.
-    delta : float
-        Size of its area light, m.
-    chain : Series, optional
-        Its biases and gain, for convolution shadow maps.
-    behind : bool
-        Of the map of the hemisphere behind.
-
-    Returns
-    -------
-    (CONSTANTS,) ndarray
-        In the dtype of the maps; see the places named above.
+    See the places named above. `delta` is the light's size, m; `chain` gives biases and gain, for convolution shadow
+    maps; `behind`: of the map of the hemisphere behind.
     """
     constants = np.zeros(CONSTANTS, maps.depth.dtype)
     near = maps.near if maps.near_behind is None or not behind else maps.near_behind
@@ -107,25 +81,9 @@ def light_constants(
 
 
 def scale_of(maps: ShadowMaps, k: int, kind: DepthScaleName, chain: Series, behind: bool = False) -> DepthScale:
-    """Return the scale on which depths of one map are compared.
+    """Return the scale, from metres to the series', on which depths of one map that holds something are compared.
 
-    Parameters
-    ----------
-    maps : ShadowMaps
-        The maps.
-    k : int
-        The map; it holds something.
-    kind : {"log_map", "map", "scene"}
-        As in `depth_scale`.
-    chain : Series
-        Its range of depths.
-    behind : bool
-        Of the map of the hemisphere behind.
-
-    Returns
-    -------
-    DepthScale
-        From metres to the series' scale.
+    `kind` as in `depth_scale`; `chain` gives the range of depths; `behind`: of the map of the hemisphere behind.
     """
     near, far = (maps.near_behind, maps.far_behind) if behind else (maps.near, maps.far)
     assert near is not None

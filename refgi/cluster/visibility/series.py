@@ -33,35 +33,14 @@ class Series(NamedTuple):
 
 
 def frequencies(terms: int) -> Array:
-    """Return c_k = (2k - 1) pi.
-
-    Parameters
-    ----------
-    terms : int
-        M.
-
-    Returns
-    -------
-    (M,) ndarray
-        Angular frequencies on the series' scale of depths.
-    """
+    """Return c_k = (2k - 1) pi, (M,), angular frequencies on the series' scale of depths."""
     return (2.0 * np.arange(1, terms + 1) - 1.0) * np.pi
 
 
 def weights(terms: int, attenuation: float = 0.0) -> Array:
-    """Return w_k = 2 L_k / c_k with L_k = exp(-A (k / M)^2).
+    """Return w_k = 2 L_k / c_k with L_k = exp(-A (k / M)^2), (M,): factors of sin(c_k (z - d)).
 
-    Parameters
-    ----------
-    terms : int
-        M.
-    attenuation : float
-        A; 0 keeps the plain series and its overshoot of 9 %.
-
-    Returns
-    -------
-    (M,) ndarray
-        Factors of sin(c_k (z - d)).
+    A attenuates; 0 keeps the plain series and its overshoot of 9 %.
     """
     damping = np.exp(-attenuation * (np.arange(1, terms + 1) / terms) ** 2)
     # Sec. 4.1: f(d, z) = 1/2 + 2 sum_k (1 / c_k) sin(c_k (z - d)), c_k = (2k - 1) pi
@@ -69,19 +48,9 @@ def weights(terms: int, attenuation: float = 0.0) -> Array:
 
 
 def above_half(difference: npt.ArrayLike, weight: Array) -> Array:
-    """Return f_M - 1/2 = sum_k w_k sin(c_k (z - d)).
+    """Return f_M - 1/2 = sum_k w_k sin(c_k (z - d)) of differences z - d on the series' scale (> 0 is lit).
 
-    Parameters
-    ----------
-    difference : (...) array_like
-        z - d on the series' scale; > 0 is lit.
-    weight : (M,) ndarray
-        w_k.
-
-    Returns
-    -------
-    (...) ndarray
-        About 1/2 where lit, about -1/2 where shadowed, 0 at 0.
+    About 1/2 where lit, about -1/2 where shadowed, 0 at 0.
     """
     return np.asarray(np.sin(np.multiply.outer(difference, frequencies(len(weight)))) @ weight)
 
@@ -89,15 +58,7 @@ def above_half(difference: npt.ArrayLike, weight: Array) -> Array:
 def plateau(weight: Array) -> float:
     """Return what a damped series makes of fully lit: its mean from where it is nearly at its top, to its mirror image.
 
-    Parameters
-    ----------
-    weight : (M,) ndarray
-        w_k.
-
-    Returns
-    -------
-    float
-        f_M - 1/2: about 1/2 for a plain series, 0.47 for A = 1 and M = 4.
+    f_M - 1/2: about 1/2 for a plain series, 0.47 for A = 1 and M = 4.
     """
     c, start = frequencies(len(weight)), first_lit(weight)
     # the integral of w sin(c u) over [b, 1 - b], as cos(c (1 - b)) = -cos(c b)
@@ -105,18 +66,10 @@ def plateau(weight: Array) -> float:
 
 
 def first_lit(weight: Array) -> float:
-    """Return b*, the first z - d at which the series is 1.
+    """Return b*, the first z - d at which the series is 1: about 0.305 / M; below 0.41.
 
-    Parameters
-    ----------
-    weight : (M,) ndarray
-        w_k.
-
-    Returns
-    -------
-    float
-        b*, about 0.305 / M; below 0.41. For a series that stays below 1: where it has come 95 % of the way to its top,
-        the highest of 64 values for each term.
+    For a series that stays below 1: where it has come 95 % of the way to its top, the highest of 64 values for each
+    term.
     """
     from scipy.optimize import brentq  # here, as methods that cast no such shadows need none of it
 
@@ -140,24 +93,12 @@ def _known(terms: int, attenuation: float, rescale: str, bias: float | None) -> 
 
 
 def series(settings: Csm) -> Series:
-    """Return the series that settings ask for.
+    """Return the series that settings ask for: weights, biases and the range of depths.
 
-    Parameters
-    ----------
-    settings : Csm
-        Terms, attenuation, rescaling and bias.
-
-    Returns
-    -------
-    Series
-        Weights, biases and the range of depths: [0, 1 - 2 b*], so that no difference of two depths, biased, comes
-        nearer to the series' other crossing at 1 than b*.
-
-    Notes
-    -----
-    Sec. 4.1 says nothing of a bias; without one, every lit receiver would be half shadowed (f_M(0) = 1/2). The default
-    b* is the least that makes it fully lit. "scale2" compares without bias and doubles; its search keeps b*, as an
-    unbiased mean of blockers would count the receiver. "plateau" stretches a damped series about 1/2 until its plateau
-    is 1. A `bias` above b* narrows the range.
+    The range is [0, 1 - 2 b*], so that no difference of two depths, biased, comes nearer to the series' other crossing
+    at 1 than b*; a `bias` above b* narrows it. Sec. 4.1 says nothing of a bias; without one, every lit receiver would
+    be half shadowed (f_M(0) = 1/2). The default b* is the least that makes it fully lit. "scale2" compares without bias
+    and doubles; its search keeps b*, as an unbiased mean of blockers would count the receiver. "plateau" stretches a
+    damped series about 1/2 until its plateau is 1.
     """
     return _known(settings.terms, settings.attenuation, settings.rescale, settings.bias)

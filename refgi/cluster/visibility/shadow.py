@@ -26,27 +26,10 @@ TILES: dict[Any, Any] = {PcfShadow: pcf_tile, PcssShadow: pcss_tile, CsmShadow: 
 def shadow_of(
     maps: ShadowMaps, areas: AreaLights, m: int, settings: "ValSettings", behind: bool = False, filters: Any = None
 ) -> Any:
-    """Return the shadow of one area light.
+    """Return the shadow of area light m, which has a map and, without extent, casts a hard shadow, for `shadow_tile`.
 
-    Parameters
-    ----------
-    maps : ShadowMaps
-        The maps.
-    areas : AreaLights
-        The area lights that the maps were drawn for.
-    m : int
-        One that has a map. Without extent, it casts a hard shadow.
-    settings : ValSettings
-        `visibility` is one of `BY_MAPS`.
-    behind : bool
-        Of the map of the hemisphere behind.
-    filters : Mip or Brute, optional
-        The filtered map of `Csm`; made where absent.
-
-    Returns
-    -------
-    PcfShadow, PcssShadow or CsmShadow
-        What `shadow_tile` reads.
+    `visibility` is one of `BY_MAPS`; `behind`: of the map of the hemisphere behind; `filters`, the filtered map of
+    `Csm`, is made where absent.
     """
     k, delta, kind = int(maps.map_of[m]), float(areas.delta[m]), settings.visibility
     if isinstance(kind, Hard) or delta == 0.0:
@@ -76,22 +59,10 @@ def filter_channels(shadow: Any) -> int:
 def shadow_tile(
     shadow: Any, points: Array, facing: Array, size: int, active: Array, visible: Array, scratch: Any
 ) -> None:
-    """Fill V of the active ones of `size` receivers.
+    """Fill V, 0 to 1, of the active ones of `size` receivers; `active` is overwritten with nothing but True.
 
-    Parameters
-    ----------
-    shadow : PcfShadow, PcssShadow or CsmShadow
-        The area light's.
-    points, facing : (>= 3, >= size) ndarray
-        Receivers, world space, m, and the normals of their surfaces, on either side; the latter may be empty for CSM.
-    size : int
-        How many.
-    active : (>= size,) ndarray of bool
-        Receivers that count; overwritten, with nothing but True.
-    visible : (>= size,) ndarray
-        Filled with V, 0 to 1.
-    scratch : Scratch
-        Overwritten.
+    Points and the normals of their surfaces, on either side, are (>= 3, >= size), world space, m; the normals may be
+    empty for CSM. `scratch` is overwritten.
     """
     TILES[type(shadow)](shadow, points, facing, size, active, visible, scratch)
 

@@ -64,20 +64,7 @@ class Album(NamedTuple):
 
 
 def album(views: Sequence[View], limit: int = LIMIT) -> Album:
-    """Return the pictures of a page for its template and script.
-
-    Parameters
-    ----------
-    views : sequence of View
-        In the page's order.
-    limit : int
-        Characters that all pictures may take.
-
-    Returns
-    -------
-    Album
-        The same for equal input.
-    """
+    """Return the pictures of a page for its template and script, within `limit` characters."""
     store = Store()
     described = [_described(view, store) for view in views]
     store.fit(limit)

@@ -20,14 +20,10 @@ GRACE = 1.5  # levels that each step of importance is spared
 
 
 class Blob:
-    """Planes of one size at every level of coarseness, and the level that is used.
+    """Planes of one size at every level of coarseness, from all pixels on, and the level that is used.
 
-    Parameters
-    ----------
-    importance : int
-        Those of higher numbers are made coarse first.
-    levels : iterable of dict
-        From all pixels on, each with its `text` and what the script must know to unpack it.
+    Each level has its `text` and what the script must know to unpack it; planes of higher `importance` are made coarse
+    first.
     """
 
     def __init__(self, importance: int, levels: Iterable[Mapping[str, Any]]) -> None:
@@ -54,62 +50,22 @@ class Store:
         self._blobs: list[Blob] = []
 
     def add(self, planes: Array, covered: Array, importance: int = FIRST) -> int:
-        """Put numbers in.
+        """Put in planes, (c, h, w), which have a mean over blocks of covered pixels; return their number.
 
-        Parameters
-        ----------
-        planes : (c, h, w) ndarray
-            Numbers, which have a mean over blocks.
-        covered : (h, w) ndarray of bool
-            Pixels that count.
-        importance : int
-            `FIRST`, `SECOND` or `THIRD`.
-
-        Returns
-        -------
-        int
-            Their number.
+        `importance`: `FIRST`, `SECOND` or `THIRD`.
         """
         return self._put(importance, (_numbers(block_means(planes, covered, level)) for level in range(COARSEST + 1)))
 
     def add_mask(self, covered: Array) -> int:
-        """Put in which pixels show a surface; it is never made coarse.
-
-        Parameters
-        ----------
-        covered : (h, w) ndarray of bool
-            The mask.
-
-        Returns
-        -------
-        int
-            Its number.
-        """
+        """Put in which pixels, (h, w), show a surface; it is never made coarse. Return its number."""
         return self._put(FIRST, [_numbers(covered[None].astype(np.float64))])
 
     def add_ids(self, ids: Array) -> int:
-        """Put ids in: two planes of 16 bits, the lower one first.
-
-        Parameters
-        ----------
-        ids : (h, w) ndarray of uint32
-            One id a pixel.
-
-        Returns
-        -------
-        int
-            Their number.
-        """
+        """Put in ids, (h, w), uint32: two planes of 16 bits, the lower one first. Return their number."""
         return self._put(SECOND, (_words(every(ids, level)) for level in range(COARSEST + 1)))
 
     def fit(self, limit: int) -> None:
-        """Make planes coarser until all are within the limit, the least important and the last first.
-
-        Parameters
-        ----------
-        limit : int
-            Characters.
-        """
+        """Make planes coarser until all are within `limit` characters, the least important and the last first."""
         size = sum(blob.size for blob in self._blobs)
         steps = sorted((level + GRACE * (THIRD - importance), importance, level)
                        for importance in (FIRST, SECOND, THIRD) for level in range(1, COARSEST + 1))
@@ -123,23 +79,11 @@ class Store:
                     size += blob.size
 
     def texts(self) -> list[str]:
-        """Return what the page holds, by number.
-
-        Returns
-        -------
-        list of str
-            Base64.
-        """
+        """Return what the page holds as Base64, by number."""
         return [blob.text for blob in self._blobs]
 
     def facts(self) -> list[dict[str, Any]]:
-        """Return what the script must know to unpack each.
-
-        Returns
-        -------
-        list of dict
-            By number: channels, exponent and level.
-        """
+        """Return what the script must know to unpack each, by number: channels, exponent and level."""
         return [{**{key: value for key, value in blob.levels[blob.level].items() if key != "text"},
                  "level": blob.level} for blob in self._blobs]
 

@@ -23,19 +23,9 @@ class Crop(NamedTuple):
 
 
 def worst_crops(error: Array, covered: Array) -> tuple[Crop, ...]:
-    """Return the squares with the most squared error, worst first, none over another.
+    """Return up to `PLACES` squares with the most squared error, (h, w), worst first, none over another.
 
-    Parameters
-    ----------
-    error : (h, w) ndarray
-        Any error; where it is not finite it counts as the largest that is.
-    covered : (h, w) ndarray of bool
-        Pixels that count.
-
-    Returns
-    -------
-    tuple of Crop
-        Up to `PLACES`; none where there is no error.
+    An error that is not finite counts as the largest that is; no square where there is no error on covered pixels.
     """
     squares = _squares(error, covered)
     side = min(*error.shape, max(LEAST_SIDE, min(error.shape) // SHARE_OF_SIDE))

@@ -44,21 +44,9 @@ class Seen(NamedTuple):
 
 
 def findings(irradiance: Array, mean: Array, variance: Array, covered: Array) -> tuple[Finding, ...]:
-    """Return what stands out in a picture's error.
+    """Return what stands out in a picture's error: findings whose figure reaches its threshold.
 
-    Parameters
-    ----------
-    irradiance : (3, h, w) ndarray
-        The picture, W/m^2.
-    mean, variance : (3, h, w) ndarray
-        Reference that the picture converges to, and the variance of its mean.
-    covered : (h, w) ndarray of bool
-        Pixels that count.
-
-    Returns
-    -------
-    tuple of Finding
-        Those whose figure reaches its threshold.
+    Irradiance, the reference that it converges to and the variance of the reference's mean are (3, h, w), W/m^2.
     """
     error = luminance(irradiance) - luminance(mean)
     counted = covered & np.isfinite(error)
@@ -72,19 +60,9 @@ def findings(irradiance: Array, mean: Array, variance: Array, covered: Array) ->
 def streaks(seen: Seen) -> Iterator[Finding]:
     """Yield how much further the error's detail goes on along rows than along columns, and the other way round.
 
-    Detail across rows is e less the mean of the pixels above and below; where it goes on along x there are streaks.
-    The median over tiles of its autocorrelation, less that of columns; in a picture of few tiles objects have edges in
-    too many of them.
-
-    Parameters
-    ----------
-    seen : Seen
-        The error.
-
-    Yields
-    ------
-    Finding
-        Of rows or of columns.
+    Detail across rows is e less the mean of the pixels above and below; where it goes on along x there are streaks. The
+    median over tiles of its autocorrelation, less that of columns; in a picture of few tiles objects have edges in too
+    many of them.
     """
     height, width = (side // TILE for side in seen.error.shape)
     places = [(slice(TILE * y, TILE * y + TILE), slice(TILE * x, TILE * x + TILE))
@@ -102,16 +80,6 @@ def spikes(seen: Seen) -> Iterator[Finding]:
     """Yield how many pixels in 10,000 are far too bright and alone.
 
     Their error is several times the second largest around them, and more than the reference itself and its noise.
-
-    Parameters
-    ----------
-    seen : Seen
-        The error.
-
-    Yields
-    ------
-    Finding
-        One.
     """
     height, width = seen.error.shape
     wide = np.pad(np.abs(seen.error), 1)
@@ -126,15 +94,7 @@ def spikes(seen: Seen) -> Iterator[Finding]:
 def blocks(seen: Seen) -> Iterator[Finding]:
     """Yield how much larger steps of the error are between blocks than inside them, along x and y alike.
 
-    Parameters
-    ----------
-    seen : Seen
-        The error.
-
-    Yields
-    ------
-    Finding
-        Of the block size with the largest steps.
+    Of the block size with the largest steps.
     """
     size, figure = max(((period, min(_step_ratio(seen, period), _step_ratio(_turned(seen), period)))
                         for period in PERIODS), key=lambda pair: pair[1])
@@ -142,18 +102,7 @@ def blocks(seen: Seen) -> Iterator[Finding]:
 
 
 def factor(seen: Seen) -> Iterator[Finding]:
-    """Yield which share of the squared error one constant factor on the picture would leave out.
-
-    Parameters
-    ----------
-    seen : Seen
-        The error.
-
-    Yields
-    ------
-    Finding
-        One.
-    """
+    """Yield which share of the squared error one constant factor on the picture would leave out."""
     noise = float((seen.deviation**2).sum())
     whole, scale = float((seen.error**2).sum()) - noise, float((seen.reference**2).sum()) - noise
     product = float((seen.error * seen.reference).sum()) + noise  # the noise of both is one, of opposite sign

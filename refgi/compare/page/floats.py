@@ -23,22 +23,10 @@ BASE = 1  # the channel that others are predicted from: green
 
 
 def halves(planes: Array) -> tuple[Bits, int]:
-    """Return numbers as the bits of half floats.
+    """Return numbers, (c, h, w), over 2^exponent as the bits of half floats, uint16, and the exponent.
 
-    Parameters
-    ----------
-    planes : (c, h, w) ndarray of float
-        Any numbers, NaN and infinity among them.
+    NaN and infinity may be among them.
 
-    Returns
-    -------
-    bits : (c, h, w) ndarray of uint16
-        Of planes / 2^exponent.
-    exponent : int
-        The power of two that all were divided by.
-
-    Examples
-    --------
     >>> bits, exponent = halves(np.array([[[1.0, 0.5]]]))
     >>> (bits.view(np.float16) * 2.0**exponent).tolist()
     [[[1.0, 0.5]]]
@@ -51,18 +39,7 @@ def halves(planes: Array) -> tuple[Bits, int]:
 
 
 def packed(bits: Bits) -> str:
-    """Return planes of 16 bits as the text that the page's script unpacks.
-
-    Parameters
-    ----------
-    bits : (c, h, w) ndarray of uint16
-        Planes of one size.
-
-    Returns
-    -------
-    str
-        Base64 of a zlib stream.
-    """
+    """Return planes of 16 bits, (c, h, w), as the text that the page's script unpacks: Base64 of a zlib stream."""
     if len(bits) > BASE:
         base = bits[BASE].copy()
         bits = bits - base  # modulo 2^16, as all sums here and in the script
@@ -75,19 +52,7 @@ def packed(bits: Bits) -> str:
 def block_means(values: Array, covered: Array, level: int) -> Array:
     """Return the mean of covered pixels in each block of 2^level x 2^level.
 
-    Parameters
-    ----------
-    values : (c, h, w) ndarray
-        Any numbers.
-    covered : (h, w) ndarray of bool
-        Pixels that count.
-    level : int
-        0 for the pixels themselves.
-
-    Returns
-    -------
-    (c, h / 2^level, w / 2^level) ndarray
-        Rounded up at the far edges; 0 where nothing is covered.
+    (c, h, w) to (c, h / 2^level, w / 2^level), rounded up at the far edges; 0 where nothing is covered.
     """
     if level == 0:
         return values
@@ -98,19 +63,9 @@ def block_means(values: Array, covered: Array, level: int) -> Array:
 
 
 def every(values: Array, level: int) -> Array:
-    """Return the upper left pixel of each block of 2^level x 2^level, for planes that have no mean.
+    """Return the upper left pixel of each block of 2^level x 2^level, for planes that have no mean, such as ids.
 
-    Parameters
-    ----------
-    values : (..., h, w) ndarray
-        Such as ids.
-    level : int
-        0 for all pixels.
-
-    Returns
-    -------
-    (..., h / 2^level, w / 2^level) ndarray
-        Rounded up.
+    (..., h, w) to (..., h / 2^level, w / 2^level), rounded up.
     """
     step = 1 << level
     return values[..., ::step, ::step]

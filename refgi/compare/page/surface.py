@@ -18,25 +18,16 @@ TOLERANCE = 2.0**-10  # of the radiance: two roundings to half floats
 
 
 class SurfaceFit:
-    """Sums over the pictures of a view, taken one after the other.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        (3, h, w).
-    """
+    """Sums over the pictures of a view, (3, h, w), taken one after the other."""
 
     def __init__(self, shape: tuple[int, ...]) -> None:
         self._count: Array = np.zeros(shape, np.int64)
         self._sums = np.zeros((4, *shape))  # of E, L, E^2, E L
 
     def add(self, irradiance: Array, radiance: Array) -> None:
-        """Count a picture; pixels of it that are not finite do not count.
+        """Count a picture: indirect irradiance, W/m^2, and the radiance that the camera receives.
 
-        Parameters
-        ----------
-        irradiance, radiance : (3, h, w) ndarray
-            Indirect irradiance, W/m^2, and the radiance that the camera receives.
+        Pixels that are not finite do not count.
         """
         expect(irradiance.shape == radiance.shape == self._sums.shape[1:], "picture", f"shape {self._sums.shape[1:]}",
                irradiance.shape)
@@ -47,15 +38,7 @@ class SurfaceFit:
         self._sums += np.stack([e, light, e * e, e * light])
 
     def solve(self) -> tuple[Array, Array]:
-        """Return L_0 and k.
-
-        Returns
-        -------
-        emitted : (3, h, w) ndarray
-            L_0, W/m^2/sr.
-        reflectance : (3, h, w) ndarray
-            k, 1/sr.
-        """
+        """Return L_0, W/m^2/sr, and k, 1/sr, each (3, h, w)."""
         count = np.maximum(self._count, 1)
         e, light, squares, products = self._sums / count
         spread = squares - e * e
@@ -67,19 +50,9 @@ class SurfaceFit:
 
 
 def follows(irradiance: Array, radiance: Array, surface: tuple[Array, Array]) -> bool:
-    """Return whether a picture's radiance is what the surface makes of its irradiance.
+    """Return whether a picture's radiance is what the surface, L_0 and k, makes of its irradiance.
 
-    Parameters
-    ----------
-    irradiance, radiance : (3, h, w) ndarray
-        The picture.
-    surface : tuple of two (3, h, w) ndarray
-        What `SurfaceFit.solve` gave.
-
-    Returns
-    -------
-    bool
-        True where every finite pixel differs by less than a rounding to half floats.
+    True where every finite pixel differs by less than a rounding to half floats.
     """
     emitted, reflectance = surface
     finite = np.isfinite(irradiance) & np.isfinite(radiance)

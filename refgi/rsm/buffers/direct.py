@@ -18,6 +18,7 @@ from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.buffers.texel_rays import row_view
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection, image_of_view, texel_coordinates
+from refgi.scene.lamps import Lamp, lamp_of, light_of
 from refgi.scene.model import Light, LightTable, light_table
 from refgi.stages import stage
 
@@ -31,8 +32,8 @@ NO_SHADOW = np.zeros((0, 0), np.bool_)
 class ShadowMap(NamedTuple):
     """Depth and position of the nearest surface at each texel of a light's map."""
 
-    depth: Array  # (T,) m
-    position: Array  # (3, T) m
+    depth: Array  # (T,) or (H, W) m
+    position: Array  # (3, T) or (3, H, W) m
     bias: float  # m; negative: compare with the receiver's plane
 
 
@@ -44,7 +45,17 @@ class SurfacePoints(NamedTuple):
     covered: Array  # (h, w) bool
 
 
-@stage("rsm.shadow_map_visibility")
+def _shadow_steps(
+    position: Array, normal: Array, covered: Array, rsm: Rsm, bias: float | None = None, interpolated: bool = False
+) -> Array:
+    from refgi.rsm.buffers.steps import shadow_map
+
+    depth, map_position = rsm.resolve("depth", "position")
+    return shadow_map(position, normal, covered, rsm.projection, depth, map_position, lamp_of(rsm.light), bias,
+                      interpolated)
+
+
+@stage("rsm.shadow_map_visibility", steps=_shadow_steps)
 def shadow_map_visibility(
     position: Array, normal: Array, covered: Array, rsm: Rsm, bias: float | None = None, interpolated: bool = False
 ) -> Array:
@@ -82,13 +93,21 @@ def shadow_map_visibility(
     slope.
     """
     expect(bias is None or (math.isfinite(bias) and bias >= 0), "bias", "a finite number >= 0, m", bias)
-    visible = plane(covered.shape, np.bool_)
     depth, map_position = rsm.resolve("depth", "position")
-    shadow_map = ShadowMap(depth.reshape(-1), map_position.reshape(3, -1), -1.0 if bias is None else bias)
-    receivers = SurfacePoints(position, normal, covered)
-    _shadow_lookup(rsm.projection, receivers, shadow_map, thread_count(), visible)
+    shadow_map = ShadowMap(depth, map_position, -1.0 if bias is None else bias)
+    return looked_up(SurfacePoints(position, normal, covered), rsm.projection, shadow_map, rsm.light, interpolated)
+
+
+def looked_up(
+    receivers: SurfacePoints, maps: Projection, shadow_map: ShadowMap, light: Light, interpolated: bool
+) -> Array:
+    """Return which receivers a light reaches by its map's depth (H, W), m, and positions (3, H, W), m."""
+    visible = plane(receivers.covered.shape, np.bool_)
+    depth, map_position, bias = shadow_map
+    flat = ShadowMap(depth.reshape(-1), map_position.reshape(3, -1), bias)
+    _shadow_lookup(maps, receivers, flat, thread_count(), visible)
     if interpolated:
-        _hide_turned_away(light_table((rsm.light,)), position, normal, visible)
+        _hide_turned_away(light_table((light,)), receivers.position, receivers.normal, visible)
     return visible
 
 
@@ -202,14 +221,66 @@ def _plane_bias(maps: Projection, m: int, point: Any, facing: Any) -> Any:
     return PLANE_BIAS * width * (1.0 + min(slope, LARGEST_SLOPE))
 
 
-@stage("rsm.direct_irradiance")
 def direct_irradiance(buffer: GBuffer, light: Light, visible: Array | None = None) -> Array:
-    """Sum the irradiance that a light gives directly: E = I(w) cos / d^2.
+    """Return the irradiance that a light gives directly: `lamp_irradiance` at a G-buffer's points.
 
     Parameters
     ----------
     buffer : GBuffer
         The receivers.
+    light : Light
+        The light.
+    visible : (h, w) ndarray of bool, optional
+        Where the light arrives; everywhere where absent.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Irradiance, W/m^2, linear RGB. Excludes albedo/pi; zero where there is no surface.
+    """
+    position, normal, covered = buffer.resolve("position", "normal", "covered")
+    return lamp_irradiance(position, normal, covered, light, visible)
+
+
+@stage("rsm.direct_irradiance")
+def irradiance_of_lamps(
+    position: Array, normal: Array, covered: Array, visible: list[Array], lamps: list[Lamp]
+) -> Array:
+    """Sum the direct irradiance of all lamps: E = I(w) cos / d^2 (HSS Sec. 4; docs/radiometry).
+
+    Parameters
+    ----------
+    position, normal : (3, h, w) ndarray
+        Receivers, world space, m, and unit normals.
+    covered : (h, w) ndarray of bool
+        Where there is a receiver.
+    visible : list of (h, w) ndarray of bool
+        Where each lamp arrives.
+    lamps : list of Lamp
+        The lamps.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Irradiance, W/m^2, linear RGB. Excludes albedo/pi; zero where there is no surface.
+    """
+    parts = [lamp_irradiance(position, normal, covered, light_of(lamp), reached)
+             for lamp, reached in zip(lamps, visible, strict=True)]
+    return parts[0] if len(parts) == 1 else np.asarray(sum(parts[1:], start=parts[0]))
+
+
+@stage("rsm.lamp_irradiance")
+def lamp_irradiance(
+    position: Array, normal: Array, covered: Array, light: Light, visible: Array | None = None
+) -> Array:
+    """Compute the irradiance that a light gives directly: E = I(w) cos / d^2.
+
+    Parameters
+    ----------
+    position, normal : (3, h, w) ndarray
+        Receivers, world space, m, and unit normals.
+    covered : (h, w) ndarray of bool
+        Where there is a receiver.
     light : Light
         The light.
     visible : (h, w) ndarray of bool, optional
@@ -225,7 +296,6 @@ def direct_irradiance(buffer: GBuffer, light: Light, visible: Array | None = Non
     Computed in float64 from the receivers as they are stored, and rounded once. What limits a narrow spot in float32
     is the rounding of positions: relative to the cone's radius, 6e-8 of the largest coordinate.
     """
-    position, normal, covered = buffer.resolve("position", "normal", "covered")
     out = plane(position.shape, position.dtype)
     table = light_table((light,))
     _irradiance(table, position, normal, covered, NO_SHADOW if visible is None else visible, out)

@@ -47,7 +47,13 @@ class Extent(NamedTuple):
         return self if self.diagonal > 0 else Extent(*geometry.bounds)
 
 
-@stage("frame.visible_extent")
+def _visible_steps(buffer: GBuffer) -> Extent:
+    from refgi.rsm.buffers.extent_steps import visible_extent
+
+    return Extent(*visible_extent(*buffer.resolve("position", "covered")))
+
+
+@stage("frame.visible_extent", steps=_visible_steps)
 def visible_extent(buffer: GBuffer) -> Extent:
     """Return the bounding box of the visible surfaces.
 
@@ -71,7 +77,14 @@ def bounds_of(position: Array, covered: Array) -> Extent:
     return Extent(rows[:3].min(axis=1), rows[3:].max(axis=1))
 
 
-@stage("frame.illuminated_extent")
+def _illuminated_steps(rsms: Sequence[Rsm]) -> Extent:
+    from refgi.rsm.buffers.extent_steps import illuminated_extent
+
+    return Extent(*illuminated_extent(*(tuple(getattr(rsm, name) for rsm in rsms) for name in (
+        "position", "flux", "lobe_flux"))))
+
+
+@stage("frame.illuminated_extent", steps=_illuminated_steps)
 def illuminated_extent(rsms: Sequence[Rsm]) -> Extent:
     """Return the bounding box of surfaces that reflect direct light, from a grid of each map's texels.
 
@@ -98,9 +111,9 @@ def joined(one: Extent, other: Extent) -> Extent:
     return Extent(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
 
 
-def texel_grid(rsm: Rsm, side: int) -> Array:
-    """Return texels of a map on a grid, `side` x `side` of each of its faces, or all where it has fewer."""
-    height, width = rsm.covered.shape
+def texel_grid(covered: Array, side: int) -> Array:
+    """Return texels of a map (H, W) on a grid, `side` x `side` of each of its faces, or all where it has fewer."""
+    height, width = covered.shape
     maps = max(1, height // width)
     rows, columns = ((np.arange(min(size, count)) + 0.5) * size / min(size, count)
                      for size, count in ((height, maps * side), (width, side)))
@@ -109,7 +122,7 @@ def texel_grid(rsm: Rsm, side: int) -> Array:
 
 def _reflecting_positions(rsm: Rsm) -> Array:
     """Return positions of a grid of texels, (3, n): those that reflect light."""
-    texel = texel_grid(rsm, SAMPLES)
+    texel = texel_grid(rsm.covered, SAMPLES)
     texel = texel[rsm.covered.reshape(-1)[texel]]
     position, flux = rsm.at(texel, "position", "flux")
     reflects = flux.any(axis=0)

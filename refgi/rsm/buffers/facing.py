@@ -16,7 +16,7 @@ Array = npt.NDArray[Any]
 
 @stage("rsm.facing")
 def facing_normals(geometry: Geometry, triangle_id: Array, normal: Array) -> Array:
-    """Return the normal of each pixel's triangle on the side of its shading normal.
+    """Return the normal of each pixel's triangle on the side of its shading normal (docs/conventions).
 
     Parameters
     ----------

@@ -137,22 +137,9 @@ class GBuffer:
         return self.resolve("material_id")[0]
 
     def resolve(self, *names: str) -> tuple[Array, ...]:
-        """Return channels by name, computing in one pass those not yet known.
+        """Return channels by name, in the order asked for, computing in one pass those not yet known.
 
-        Parameters
-        ----------
-        *names : str
-            Among depth, distance, position, normal, albedo, material_id, triangle_id, covered.
-
-        Returns
-        -------
-        tuple of ndarray
-            The channels, in the order asked for.
-
-        Raises
-        ------
-        InputError
-            If a name is not a channel.
+        Names: depth, distance, position, normal, albedo, material_id, triangle_id, covered; InputError for another.
         """
         for name in names:
             known = name in (*ChannelMask._fields, "triangle_id", "covered")
@@ -167,8 +154,8 @@ class GBuffer:
         return tuple(self._channels[n] if n in self._channels else getattr(self, n) for n in names)
 
     def recorded(self) -> dict[str, Array]:
-        """Return every channel by name, as logs keep them."""
-        names = (*ChannelMask._fields, "triangle_id", "covered")
+        """Return the channels that stages read by name, as logs keep them."""
+        names = ("triangle_id", "covered", "depth", "position", "normal", "albedo")
         return dict(zip(names, self.resolve(*names), strict=True))
 
     def with_channels(self, channels: Mapping[str, Array], dtype: np.dtype[Any]) -> "GBuffer":
@@ -178,19 +165,9 @@ class GBuffer:
         return GBuffer(self._geometry, self._materials, self.projection, visibility, dtype, known)
 
     def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
-        """Return channels at some texels alone, computing there those not yet known.
+        """Return channels at some texels alone, (n,) or (3, n), with the bits that `resolve` gives.
 
-        Parameters
-        ----------
-        texel : (n,) ndarray of int
-            Texels, row * w + column.
-        *names : str
-            As for `resolve`.
-
-        Returns
-        -------
-        tuple of (n,) or (3, n) ndarray
-            The channels, in the order asked for, with the bits that `resolve` gives.
+        `texel`: (n,) row * w + column; `names` as for `resolve`. What is not yet known is computed there.
         """
         size = self.visibility.triangle_id.size
         if MANY * len(texel) > size or not left_out("rsm.texels", lambda: (size - len(texel), size)):
@@ -216,7 +193,16 @@ def values_at(channel: Array, texel: Array) -> Array:
     return channel.reshape(*channel.shape[:-2], -1)[..., texel]
 
 
-@stage("rsm.gbuffer")
+def _gbuffer_steps(
+    geometry: Geometry, materials: MaterialTable, camera: Camera, width: int | None = None, height: int | None = None,
+    dtype: npt.DTypeLike = np.float32,
+) -> dict[str, Array]:
+    from refgi.rsm.buffers.steps import view_steps
+
+    return view_steps(geometry, materials, camera_projection(camera, width, height), dtype)
+
+
+@stage("rsm.gbuffer", steps=_gbuffer_steps)
 def gbuffer(
     geometry: Geometry,
     materials: MaterialTable,

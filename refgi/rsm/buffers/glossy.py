@@ -34,18 +34,7 @@ class GlossyPoints(NamedTuple):
 
 
 def glossy_materials(materials: MaterialTable) -> Array:
-    """Return which materials reflect by a lobe.
-
-    Parameters
-    ----------
-    materials : MaterialTable
-        m materials.
-
-    Returns
-    -------
-    (m,) ndarray of bool
-        False for clear glass.
-    """
+    """Return, (m,) bool, which materials reflect by a lobe; clear glass does not."""
     glossy: Array = (materials.specular > 0).any(axis=1) & (materials.ior == 0)
     return glossy
 
@@ -53,19 +42,7 @@ def glossy_materials(materials: MaterialTable) -> Array:
 def shows_glossy(buffer: GBuffer, materials: MaterialTable, material_of_face: Array) -> bool:
     """Return whether any visible surface reflects by a lobe; resolves no channel.
 
-    Parameters
-    ----------
-    buffer : GBuffer
-        The camera's.
-    materials : MaterialTable
-        The scene's materials.
-    material_of_face : (m,) ndarray of int
-        Which of them each triangle has.
-
-    Returns
-    -------
-    bool
-        False without looking where no material does.
+    `material_of_face`: (m,), by triangle. Looks at no pixel where no material has a lobe.
     """
     glossy = glossy_materials(materials)
     return bool(glossy.any()) and bool(_any_glossy(glossy, material_of_face, buffer.triangle_id))

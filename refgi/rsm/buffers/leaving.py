@@ -12,6 +12,7 @@ from refgi.jit import kernel, prange
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.pool import plane
 from refgi.scene.model import MaterialTable
+from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
@@ -46,6 +47,63 @@ def leaving_radiance(irradiance: Array, extra: Array | None, buffer: GBuffer, ma
     elif emits:
         radiance += buffer.emission
     return radiance
+
+
+@stage("rsm.emission", kept=False)
+def emission_of(triangle_id: Array, material_of_face: Array, emission: Array) -> Array:
+    """Find what each pixel's surface emits (docs/radiometry).
+
+    Parameters
+    ----------
+    triangle_id : (h, w) ndarray of int32
+        Nearest triangle, -1 for none.
+    material_of_face : (triangle,) ndarray of int32
+        Material of each triangle.
+    emission : (material, rgb) ndarray
+        Radiance of each, W/m^2/sr.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Radiance, W/m^2/sr; 0 without surface.
+    """
+    radiance = np.zeros((3, *triangle_id.shape), emission.dtype)
+    _emit(emission, np.where(triangle_id >= 0, material_of_face[triangle_id], np.int32(-1)), radiance)
+    return radiance
+
+
+@stage("rsm.leaving_radiance", kept=False)
+def radiance_of(irradiance: Array, extra: Array | None, albedo: Array, emission: Array | None) -> Array:
+    """Compute what the camera receives of diffuse surfaces: L = L_e + albedo/pi (E + extra) (docs/radiometry).
+
+    Parameters
+    ----------
+    irradiance : (3, h, w) ndarray
+        Direct irradiance E, W/m^2.
+    extra : (3, h, w) ndarray, optional
+        Indirect irradiance, W/m^2.
+    albedo : (3, h, w) ndarray
+        Diffuse reflectance.
+    emission : (3, h, w) ndarray, optional
+        Radiance that surfaces emit, W/m^2/sr.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Radiance, W/m^2/sr, linear RGB; 0 without surface.
+    """
+    radiance = np.empty_like(irradiance)
+    _reflect(irradiance, irradiance if extra is None else extra, extra is not None, albedo, radiance)
+    return radiance if emission is None else radiance + emission
+
+
+def leaving_steps(irradiance: Array, extra: Array | None, buffer: GBuffer, materials: MaterialTable) -> Array:
+    """Return what the camera receives, made by steps."""
+    emission = None
+    if materials.emission.any():
+        emission = buffer.emission if materials.emissive is not None else emission_of(
+            buffer.triangle_id, buffer._geometry.material_of_face, materials.emission)
+    return radiance_of(irradiance, extra, buffer.albedo, emission)
 
 
 @kernel(parallel=True)

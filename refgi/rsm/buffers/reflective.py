@@ -116,17 +116,9 @@ class Rsm:
         return self._lobe("lobe_exponent")
 
     def resolve(self, *names: str) -> tuple[Array, ...]:
-        """Return channels by name, computing in one pass those of the view not yet known.
+        """Return channels by name, in the order asked for, computing in one pass those of the view not yet known.
 
-        Parameters
-        ----------
-        *names : str
-            Among depth, position, normal, solid_angle, flux.
-
-        Returns
-        -------
-        tuple of ndarray
-            The channels, in the order asked for.
+        Names: depth, position, normal, solid_angle, flux.
         """
         self._view.resolve(*(name for name in names if name in VIEW_CHANNELS and name not in self._known))
         return tuple(self._whole(name) for name in names)
@@ -144,19 +136,9 @@ class Rsm:
             name: channels[name] for name in ("solid_angle", "flux", *LOBE)})
 
     def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
-        """Return channels at some texels alone, computing there those not yet known.
+        """Return channels at some texels alone, (n,) or (3, n), with the bits that they have on the whole map.
 
-        Parameters
-        ----------
-        texel : (n,) ndarray of int
-            Texels, row * W + column.
-        *names : str
-            Among depth, position, normal, solid_angle, flux.
-
-        Returns
-        -------
-        tuple of (n,) or (3, n) ndarray
-            The channels, in the order asked for, with the bits that they have on the whole map.
+        `texel`: (n,) row * W + column; `names` as for `resolve`. What is not yet known is computed there.
         """
         parts = {name: values_at(self._whole(name), texel) for name in names if name in self._known}
         absent = [name for name in names if name not in parts]
@@ -214,22 +196,20 @@ class Rsm:
         return self.triangle_id.size
 
     def project(self, position: Array) -> tuple[Array, Array, Array]:
-        """Return continuous row, column and depth of points on the stacked maps, nan outside.
-
-        Parameters
-        ----------
-        position : (3, ...) ndarray
-            World space, m.
-
-        Returns
-        -------
-        row, column, depth : (...) ndarray
-            As in `refgi.rsm.raster.projection.project`.
-        """
+        """Return continuous row, column and depth, (...), on the stacked maps of points, (3, ...), m; nan outside."""
         return project(self.projection, position)
 
 
-@stage("rsm.reflective_shadow_map")
+def _map_steps(
+    geometry: Geometry, materials: MaterialTable, light: Light, resolution: int, dtype: npt.DTypeLike = np.float32,
+    projection: MapShape = "auto",
+) -> dict[str, Array | None]:
+    from refgi.rsm.buffers.steps import map_steps
+
+    return map_steps(geometry, materials, light, resolution, dtype, projection)
+
+
+@stage("rsm.reflective_shadow_map", steps=_map_steps)
 def reflective_shadow_map(
     geometry: Geometry,
     materials: MaterialTable,

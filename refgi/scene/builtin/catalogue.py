@@ -35,22 +35,9 @@ class BuiltinScene:
         return {name: given.default for name, given in inspect.signature(self.builder).parameters.items()}
 
     def build(self, **parameters: Value) -> Scene:
-        """Return the scene.
+        """Return the scene, with some parameters other than their defaults.
 
-        Parameters
-        ----------
-        **parameters : int or float
-            What differs from the defaults.
-
-        Returns
-        -------
-        Scene
-            Named after the table's row.
-
-        Raises
-        ------
-        InputError
-            If a parameter is unknown, of the wrong type or out of its range.
+        Raises InputError if a parameter is unknown, of the wrong type or out of its range.
         """
         checked = {name: self._checked(name, value) for name, value in parameters.items()}
         try:

@@ -19,19 +19,10 @@ JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
 
 class Document:
-    """The JSON of one glTF file with checked look-ups, and its buffers.
+    """The JSON of one glTF file, ``.glb`` or ``.gltf``, with checked look-ups, and its buffers.
 
-    There are hundreds of thousands of look-ups: the text of an error is made only where there is one.
-
-    Parameters
-    ----------
-    path : Path
-        The file, ``.glb`` or ``.gltf``.
-
-    Raises
-    ------
-    InputError
-        If the container is damaged, or its JSON no glTF 2 document.
+    There are hundreds of thousands of look-ups: the text of an error is made only where there is one. Raises InputError
+    if the container is damaged, or its JSON no glTF 2 document.
     """
 
     def __init__(self, path: Path) -> None:

@@ -47,14 +47,7 @@ def pose_of(document: Document, node: dict[str, Any], where: str) -> Pose:
 class Deformer:
     """Morphs and skins primitives; matrices of joints are made once.
 
-    Parameters
-    ----------
-    document : Document
-        The file.
-    nodes : Nodes
-        Those of its scene.
-    pass_over : callable
-        Takes what is passed over.
+    `pass_over` takes the words for what is passed over.
     """
 
     def __init__(self, document: Document, nodes: Nodes, pass_over: Callable[[str], None]) -> None:

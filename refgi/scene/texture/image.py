@@ -30,25 +30,11 @@ _decoded: "weakref.WeakValueDictionary[str, Image]" = weakref.WeakValueDictionar
 
 
 class Image:
-    """A picture as it was stored: sRGB codes of 8 or 16 bits, or linear numbers.
+    """A picture as it was stored; equal to another if all pixels are, and their alpha.
 
-    Parameters
-    ----------
-    pixels : (h, w, 3) ndarray
-        Row 0 is v = 0. Uint8 or uint16: sRGB codes; float32 or float64: linear RGB from 0 to 1.
-    name : str
-        For messages; of no other meaning.
-    alpha : (h, w) ndarray, optional
-        In the type of `pixels`, codes without a curve or numbers from 0 to 1; absent: 1 throughout.
-
-    Raises
-    ------
-    InputError
-        If shape, type or a value is not usable.
-
-    Notes
-    -----
-    Images are equal if all their pixels are, and their alpha.
+    `pixels`: (h, w, 3), row 0 is v = 0; uint8 or uint16: sRGB codes; float32 or float64: linear RGB from 0 to 1.
+    `alpha`: (h, w), in their type, codes without a curve or numbers from 0 to 1; absent: 1 throughout. `name`: for
+    messages. Raises InputError if shape, type or a value is not usable.
     """
 
     def __init__(self, pixels: Array, name: str = "image", alpha: Array | None = None) -> None:

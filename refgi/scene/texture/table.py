@@ -30,13 +30,7 @@ class TextureTable(NamedTuple):
 
 
 class Textures:
-    """The textures of a scene's materials; equal materials have the same object as long as it is in use.
-
-    Parameters
-    ----------
-    textures : sequence of Texture or None
-        That of each material.
-    """
+    """The textures of a scene's materials; equal materials have the same object as long as it is in use."""
 
     def __init__(self, textures: "Sequence[Texture | None]") -> None:
         distinct = list(dict.fromkeys(one for one in textures if one is not None))

@@ -15,7 +15,6 @@ __all__ = [
     "GatherSettings",
     "Interpolation",
     "gather",
-    "gather_lobes",
 ]
 
 METHOD = Method("gather", "Reflective Shadow Maps (2005): gathering around the projected point", gather, GatherSettings,

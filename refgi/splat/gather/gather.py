@@ -27,6 +27,7 @@ from refgi.stages import skip, stage, tally
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.rsm import Rsm
+    from refgi.rsm.buffers.extent import Extent
 
 Array = npt.NDArray[Any]
 
@@ -107,43 +108,74 @@ def gather(frame: "Frame", settings: GatherSettings) -> Array:
 
 
 def gather_counted(frame: "Frame", settings: GatherSettings) -> Gathered:
-    """Light every pixel as `gather` does and count the pixels that ran the sum.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its buffers.
-    settings : GatherSettings
-        Disc, samples and interpolation.
-
-    Returns
-    -------
-    Gathered
-        Irradiance and counts.
-    """
+    """Light every pixel as `gather` does and count the pixels that ran the sum."""
     buffer = frame.gbuffer
     receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
     shown, covered = receiving(buffer.covered), int(np.count_nonzero(buffer.covered))
     coarsely, disc = settings.interpolation, settings.disc
     if coarsely is None or coarsely.grid >= max(frame.height, frame.width):
-        skip("gather.interpolate", "every pixel runs the sum")
+        skip("gather.coarse", "every pixel runs the sum")
         total = gather_irradiance(receivers._replace(covered=shown), frame.rsms, disc)
         clear(total, buffer.covered, shown)
         return Gathered(total, covered, covered)
-    coarse = coarse_pixels(frame.height, frame.width, coarsely.grid)
-    first = np.zeros_like(buffer.covered)
+    light = gather_coarsely(receivers, shown, frame.rsms, disc, coarsely, frame.visible_extent)
+    return Gathered(*light, covered)
+
+
+def _coarse_steps(*arguments: Any) -> tuple[Array, int]:
+    from refgi.splat.gather.steps import coarse_steps
+
+    return coarse_steps(*arguments)
+
+
+@stage("gather.coarse", steps=_coarse_steps)
+def gather_coarsely(
+    receivers: Receivers, shown: Array, rsms: "Sequence[Rsm]", disc: DiscSettings, coarsely: Interpolation,
+    extent: "Extent",
+) -> tuple[Array, int]:
+    """Sum at coarse pixels and at those that are not like them; interpolate between the coarse ones elsewhere.
+
+    Parameters
+    ----------
+    receivers : Receivers
+        All pixels.
+    shown : (h, w) ndarray of bool
+        Those that are computed.
+    rsms : sequence of Rsm
+        Reflective shadow maps, one a light.
+    disc : DiscSettings
+        Disc and samples.
+    coarsely : Interpolation
+        The grid of coarse pixels.
+    extent : Extent
+        Box of the visible surfaces, m.
+
+    Returns
+    -------
+    irradiance : (3, h, w) ndarray
+        Irradiance, W/m^2, linear RGB.
+    evaluated : int
+        Pixels that ran the sum.
+    """
+    coarse = coarse_pixels(shown.shape[0], shown.shape[1], coarsely.grid)
+    first = np.zeros_like(shown)
     first[np.ix_(*coarse)] = True
-    coarse_light = gather_irradiance(receivers._replace(covered=shown & first), frame.rsms, disc)
-    limits = SimilarityLimits(coarsely.least_cosine, coarsely.reach * frame.visible_extent.diagonal)
+    coarse_light = gather_irradiance(receivers._replace(covered=shown & first), rsms, disc)
+    limits = SimilarityLimits(coarsely.least_cosine, coarsely.reach * extent.diagonal)
     result, interpolated = interpolate(receivers, coarse_light, coarse, limits)
     rest = receivers._replace(covered=shown & ~interpolated)
-    total = result + gather_irradiance(rest, frame.rsms, disc)
-    clear(total, buffer.covered, shown)
-    evaluated = np.count_nonzero(shown & first) + np.count_nonzero(rest.covered & ~first)
-    return Gathered(total, int(evaluated), covered)
+    total = result + gather_irradiance(rest, rsms, disc)
+    clear(total, receivers.covered, shown)
+    return total, int(np.count_nonzero(shown & first) + np.count_nonzero(rest.covered & ~first))
 
 
-@stage("gather.irradiance")
+def _steps(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSettings) -> Array:
+    from refgi.splat.gather.steps import gather_steps
+
+    return gather_steps(receivers, rsms, disc)
+
+
+@stage("gather.irradiance", steps=_steps)
 def gather_irradiance(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSettings) -> Array:
     """Sum the irradiance of the texels in each receiver's disc.
 
@@ -219,19 +251,7 @@ def _gather_one(points: Array, normals: Array, rsm: "Rsm", disc: DiscSettings, t
 def disc_texels(rsm: "Rsm", disc: DiscSettings, dtype: np.dtype[Any]) -> tuple[GatherMap, Array, Any]:
     """Return a map's texels, the pattern of a disc on it and the scale of its sum, as `gather_discs` takes them.
 
-    Parameters
-    ----------
-    rsm : Rsm
-        The map.
-    disc : DiscSettings
-        Disc and samples.
-    dtype : dtype
-        Of texels and scale.
-
-    Returns
-    -------
-    GatherMap, ndarray and float
-        The arguments.
+    Texels and scale are of `dtype`.
     """
     height, width = rsm.projection.height, rsm.projection.width  # of one map
     pattern = disc_pattern(disc.samples, disc.seed, "rsm_weight_squared" in disc.as_published)

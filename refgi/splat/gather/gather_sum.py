@@ -39,30 +39,21 @@ class GatherMap(NamedTuple):
 
 
 def disc_pattern(samples: int, seed: int, weight_squared: bool = False) -> Array:
-    """Return offsets in the unit disc and the weight of each: area integral = mean of weight * value.
+    """Return offsets in the unit disc (down, right) and the weight of each, (samples, 3) float64.
 
-    Parameters
-    ----------
-    samples : int
-        Number of points.
-    seed : int
-        0: the plain Halton set; else a shift of it drawn with this seed.
-    weight_squared : bool
-        Weigh by xi_1^2 as is often done (switch `rsm_weight_squared`), not by xi_1.
+    The integral over the area is the mean of weight times value. Seed 0: the plain Halton set; else a shift of it drawn
+    with this seed. `weight_squared` weighs by xi_1^2 as is often done (switch `rsm_weight_squared`), not by xi_1.
 
-    Returns
-    -------
-    (samples, 3) ndarray of float64
-        Offset down, offset right, weight.
-
-    Examples
-    --------
     >>> pattern = disc_pattern(10_000, 0)
     >>> round(float(pattern[:, 2].mean()), 2)  # the disc's area, pi
     3.14
     """
-    shift = draws(seed, GATHERING, 2).tolist() if seed else None
-    return disc_offsets(halton(samples, shift=shift, start=1), weight_squared)
+    return disc_offsets(disc_points(samples, seed), weight_squared)
+
+
+def disc_points(samples: int, seed: int) -> Array:
+    """Return the points (xi_1, xi_2) of the unit square, (samples, 2), that `disc_pattern` is made of."""
+    return halton(samples, shift=draws(seed, GATHERING, 2).tolist() if seed else None, start=1)
 
 
 def disc_offsets(points: Array, weight_squared: bool = False) -> Array:

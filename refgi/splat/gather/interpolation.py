@@ -7,7 +7,6 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers
-from refgi.stages import stage
 
 Array = npt.NDArray[Any]
 
@@ -22,22 +21,8 @@ class SimilarityLimits(NamedTuple):
 
 
 def coarse_pixels(height: int, width: int, grid: int) -> tuple[Array, Array]:
-    """Return rows and columns of the coarse pixels: the middles of grid x grid cells.
+    """Return rows and columns, rising, of the coarse pixels: the middles of grid x grid cells, at most one a pixel.
 
-    Parameters
-    ----------
-    height, width : int
-        Size of the picture, pixels.
-    grid : int
-        Cells along a side; at most one a pixel.
-
-    Returns
-    -------
-    tuple of two 1-D ndarrays of int64
-        Rows and columns, rising.
-
-    Examples
-    --------
     >>> coarse_pixels(8, 4, 2)[0].tolist()
     [2, 6]
     """
@@ -46,33 +31,13 @@ def coarse_pixels(height: int, width: int, grid: int) -> tuple[Array, Array]:
     return rows, columns
 
 
-@stage("gather.interpolate")
 def interpolate(
     receivers: Receivers, coarse_light: Array, coarse: tuple[Array, Array], limits: SimilarityLimits
 ) -> tuple[Array, Array]:
-    """Interpolate light between coarse pixels where their surfaces are similar.
+    """Interpolate irradiance (3, h, w) between coarse pixels (rows, columns) where surfaces are similar.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        All pixels.
-    coarse_light : (3, h, w) ndarray
-        Irradiance, W/m^2, valid at the coarse pixels.
-    coarse : tuple of two 1-D ndarrays
-        Rows and columns of the coarse pixels.
-    limits : SimilarityLimits
-        How far their surfaces may differ.
-
-    Returns
-    -------
-    irradiance : (3, h, w) ndarray
-        Interpolated irradiance, W/m^2; 0 where it could not be.
-    interpolated : (h, w) ndarray of bool
-        Where it could be: three of four neighbours are similar, or the pixel is a coarse one itself.
-
-    Notes
-    -----
-    Weights are bilinear and made to sum to 1 over the similar neighbours.
+    Returns it, 0 where it could not be, and where it could be, (h, w) bool: three of four neighbours are similar, or
+    the pixel is a coarse one itself. Weights are bilinear and made to sum to 1 over the similar neighbours.
     """
     covered = np.asarray(receivers.covered)
     result = np.zeros_like(coarse_light)

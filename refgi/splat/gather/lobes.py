@@ -23,17 +23,8 @@ Array = npt.NDArray[Any]
 def gather_lobes(frame: "Frame", settings: GatherSettings) -> Array:
     """Return the radiance towards the eye that receivers' lobes make of the texels in their discs.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its buffers.
-    settings : GatherSettings
-        Disc and samples; every glossy pixel runs the sum, and none is interpolated.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        W/m^2/sr, linear RGB, without visibility; 0 where there is no lobe.
+    (3, h, w), W/m^2/sr, linear RGB, without visibility; 0 where there is no lobe. Every glossy pixel runs the sum, and
+    none is interpolated.
     """
     points = frame.glossy_points
     return spread_over_picture(points, gather_glossy(points, frame.rsms, settings.disc), (frame.height, frame.width))

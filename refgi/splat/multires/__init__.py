@@ -27,7 +27,6 @@ __all__ = [
     "Criteria",
     "MultiresSettings",
     "multires",
-    "multires_lobes",
     "shared_subsplats",
 ]
 

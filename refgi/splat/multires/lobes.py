@@ -36,18 +36,9 @@ Array = npt.NDArray[Any]
 def multires_lobes(frame: "Frame", settings: MultiresSettings) -> Array:
     """Return the radiance towards the eye that receivers' lobes make of the pixel lights of `multires`.
 
-    Parameters
-    ----------
-    frame : Frame
-        Scene, camera and buffers.
-    settings : MultiresSettings
-        As for `multires`. `detail` and `representative` are of irradiance alone; with subsplats "error" every glossy
-        pixel sums all lights, which meets any target, and so it does not cluster them.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        W/m^2/sr, linear RGB, with the visibility that the settings ask for; 0 where there is no lobe.
+    (3, h, w), W/m^2/sr, linear RGB, with the visibility that the settings ask for; 0 where there is no lobe. `detail`
+    and `representative` are of irradiance alone; with subsplats "error" every glossy pixel sums all lights, which meets
+    any target, and so it does not cluster them.
     """
     lights = choose_lights(frame, settings.lights)
     footprint = light_areas(frame, lights, settings)
@@ -98,22 +89,7 @@ def _of_one_exponent(
 
 
 def glossy_subsplats(buffer: "GBuffer", points: GlossyPoints, settings: ByGeometry) -> Subsplats:
-    """Refine cells of glossy pixels by geometry, once for all lights (Sec. 3.2 and 3.3).
-
-    Parameters
-    ----------
-    buffer : GBuffer
-        The camera's G-buffer.
-    points : GlossyPoints
-        The pixels that cells are made of.
-    settings : ByGeometry
-        Criteria, thresholds, coarsest and finest level.
-
-    Returns
-    -------
-    Subsplats
-        The leaves.
-    """
+    """Refine cells of glossy pixels by geometry, once for all lights (Sec. 3.2 and 3.3), and return the leaves."""
     covered, criteria = covered_by(points, buffer.covered.shape), settings.criteria
     top = top_level(buffer.height, buffer.width, settings.coarsest)
     return refine(discontinuities(buffer, criteria, top, settings.finest), covered, criteria.diagonal,

@@ -31,6 +31,7 @@ from refgi.splat.multires.subsplats.evaluate import (
     shadowed_at,
 )
 from refgi.splat.multires.subsplats.upsample import upsample
+from refgi.stages import stage
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -91,7 +92,7 @@ def _irradiance(
             irradiance = np.divide(irradiance, albedo, out=np.zeros_like(irradiance), where=albedo > 0)
     if settings.detail == 0:
         return irradiance
-    eye = frame.scene.camera.eye
+    eye = buffer.projection.origin
     return surface_detail(irradiance, buffer.position, buffer.normal, buffer.covered, eye, settings.detail)  # Eq. (3)
 
 
@@ -153,22 +154,7 @@ def _evaluated(
 
 
 def light_areas(frame: "Frame", lights: "PixelLights", settings: MultiresSettings) -> Array | None:
-    """Return the surface that each light stands for, where the clamp needs it: exact, or as the authors' demo has it.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its buffers.
-    lights : PixelLights
-        The lights.
-    settings : MultiresSettings
-        What they were chosen by, and the clamp.
-
-    Returns
-    -------
-    (N,) ndarray or None
-        Area, m^2.
-    """
+    """Return each light's surface, (N,) m^2, exact or as in the authors' demo; None where no clamp needs it."""
     if "ams_disc" not in settings.as_published:
         return footprints(frame, settings.lights, settings.effective_pairs)
     source = settings.lights.source
@@ -178,26 +164,31 @@ def light_areas(frame: "Frame", lights: "PixelLights", settings: MultiresSetting
 
 
 def doubled(frame: "Frame") -> "GBuffer":
-    """Return the camera's G-buffer at twice the width and height.
-
-    Parameters
-    ----------
-    frame : Frame
-        Scene and camera.
-
-    Returns
-    -------
-    GBuffer
-        Four pixels for each of the frame's.
-    """
+    """Return the camera's G-buffer at twice the width and height: four pixels for each of the frame's."""
     from refgi.rsm import gbuffer
 
     scene = frame.scene
     return gbuffer(scene.geometry, frame.materials, scene.camera, 2 * frame.width, 2 * frame.height, frame.dtype)
 
 
+@stage("multires.halved", kept=False)
 def halved(irradiance: Array, fine: Array, covered: Array) -> Array:
-    """Return means over those of four finer pixels that show a surface, at pixels that do."""
+    """Shrink a picture of twice the width and height to means over what shows a surface (AMS Sec. 4).
+
+    Parameters
+    ----------
+    irradiance : (3, 2 h, 2 w) ndarray
+        Indirect irradiance of the larger picture, W/m^2.
+    fine : (2 h, 2 w) ndarray of bool
+        Its pixels that show a surface.
+    covered : (h, w) ndarray of bool
+        Pixels of the picture itself that show a surface.
+
+    Returns
+    -------
+    (3, h, w) ndarray
+        Indirect irradiance, W/m^2; where none of four shows a surface but the pixel does, the mean of pixels around it.
+    """
     height, width = covered.shape
     four = (3, height, 2, width, 2)
     covered_count = fine.reshape(four[1:]).sum(axis=(1, 3))
@@ -212,19 +203,9 @@ def halved(irradiance: Array, fine: Array, covered: Array) -> Array:
 
 
 def extra_bytes(settings: MultiresSettings, extent: Extent) -> int:
-    """Estimate the memory that shadows and lightcuts add to a picture.
+    """Estimate the bytes that shadows and lightcuts add to a picture.
 
-    Parameters
-    ----------
-    settings : MultiresSettings
-        Whether there are shadows or lightcuts, and of what.
-    extent : Extent
-        Of the picture.
-
-    Returns
-    -------
-    int
-        Bytes, rather too many than too few: as if every pixel were a subsplat.
+    Rather too many than too few: as if every pixel were a subsplat.
     """
     count = most_lights(settings.lights, extent.maps, extent.texels)
     by_error = (isinstance(settings.subsplats, ByError) and settings.visibility is None

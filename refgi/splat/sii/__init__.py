@@ -39,7 +39,6 @@ __all__ = [
     "TangentBound",
     "cut_irradiance",
     "sii",
-    "sii_lobes",
     "splat",
 ]
 

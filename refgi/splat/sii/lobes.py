@@ -26,23 +26,10 @@ Array = npt.NDArray[Any]
 def sii_lobes(frame: "Frame", settings: SiiSettings) -> Array:
     """Return the radiance towards the eye that receivers' lobes make of the pixel lights of `sii`.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its buffers.
-    settings : SiiSettings
-        As for `sii`.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        W/m^2/sr, linear RGB, without visibility; 0 where there is no lobe.
-
-    Notes
-    -----
-    Every glossy pixel sums all lights, one by one, whatever `half_resolution` and `lightcuts` say of irradiance. A cut
-    leaves out the same pairs as from the irradiance: its threshold is of the irradiance that a light causes at most,
-    and knows nothing of the receiver's lobe.
+    (3, h, w), W/m^2/sr, linear RGB, without visibility; 0 where there is no lobe. Every glossy pixel sums all lights,
+    one by one, whatever `half_resolution` and `lightcuts` say of irradiance. A cut leaves out the same pairs as from
+    the irradiance: its threshold is of the irradiance that a light causes at most, and knows nothing of the receiver's
+    lobe.
     """
     settings = with_clamp(settings)
     lights = choose_lights(frame, settings.lights)

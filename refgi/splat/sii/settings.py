@@ -137,20 +137,7 @@ class SiiSettings(Settings):
 
 
 def extra_bytes(settings: SiiSettings, extent: Extent) -> int:
-    """Estimate the memory that lightcuts add to a picture.
-
-    Parameters
-    ----------
-    settings : SiiSettings
-        Whether there are any, and of how many lights.
-    extent : Extent
-        Of the picture and the maps.
-
-    Returns
-    -------
-    int
-        Bytes, rather too many than too few.
-    """
+    """Estimate the bytes that lightcuts add to a picture, rather too many than too few."""
     if settings.lightcuts is None:
         return 0
     return tree_bytes(most_lights(settings.lights, extent.maps, extent.texels), extent.float_bytes, most_threads())

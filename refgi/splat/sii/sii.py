@@ -106,7 +106,16 @@ def splat(
     return _splat(receivers, lights, settings, footprint, projection)
 
 
-@stage("sii.splat")
+def _splat_steps(
+    receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None,
+    projection: "Projection | None",  # noqa: ARG001 bounds change no bit
+) -> Array:
+    from refgi.splat.sii.reach.steps import splat_steps
+
+    return splat_steps(receivers, lights, settings, footprint)
+
+
+@stage("sii.splat", steps=_splat_steps)
 def _splat(
     receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None,
     projection: "Projection | None",
@@ -131,7 +140,7 @@ def _splat(
     (3, h, w) ndarray
         Irradiance, W/m^2, linear RGB, without albedo/pi and visibility.
     """
-    return _sum_in_range(receivers, lights, settings, footprint, projection, outside=False)
+    return sum_in_range(receivers, lights, settings, footprint, projection)
 
 
 @stage("sii.cut_irradiance")
@@ -159,13 +168,14 @@ def cut_irradiance(
     """
     if settings.reach.cut is None:
         return np.zeros_like(np.asarray(receivers.position))
-    return _sum_in_range(receivers, lights, settings, footprint, None, outside=True)
+    return sum_in_range(receivers, lights, settings, footprint, outside=True)
 
 
-def _sum_in_range(
+def sum_in_range(
     receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None,
-    projection: "Projection | None", *, outside: bool,
+    projection: "Projection | None" = None, *, outside: bool = False,
 ) -> Array:
+    """Return the irradiance (3, h, w), W/m^2, of the pairs within range, or of those `outside`."""
     packed = checked(receivers, lights, settings.pairs, footprint)
     settings = with_reference_length(receivers, lights, settings)
     lists = LightLists(packed, settings, outside, receivers.covered.shape[1], projection)

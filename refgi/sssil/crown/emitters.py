@@ -37,23 +37,10 @@ class Emitters(NamedTuple):
 
 
 def pack(level: Level, phases: int, farthest: int, most_lanes: int) -> Emitters:
-    """Pack the texels of a level for sums over samples.
+    """Pack the texels of a level, in its dtype, for sums over samples.
 
-    Parameters
-    ----------
-    level : Level
-        The texels.
-    phases : int
-        P, a power of two, into which columns are split.
-    farthest : int
-        Largest distance of a sample, columns.
-    most_lanes : int
-        Most lanes that may be summed at once, a multiple of BLOCK.
-
-    Returns
-    -------
-    Emitters
-        In the dtype of the level.
+    Columns are split into `phases` P, a power of two; `farthest` is the largest distance of a sample, columns;
+    `most_lanes` how many may be summed at once, a multiple of BLOCK.
     """
     rows, columns = level.shape
     lanes = -(-columns // phases)
@@ -81,15 +68,7 @@ def dark_ends(emitters: Emitters) -> tuple[int, int]:
 def length_scale(depth: Array) -> float:
     """Return the power of two that scales the geometric middle of the depths' range to about 1.
 
-    Parameters
-    ----------
-    depth : (h, w) ndarray
-        Depths of a level, m; inf where there is no surface.
-
-    Returns
-    -------
-    float
-        Scale of lengths; 1 where no surface is visible.
+    Depths (h, w) are in m, inf where there is no surface; 1 where none is visible.
     """
     some = depth[(depth > 0) & (depth < np.inf)]
     if not some.size:

@@ -30,11 +30,14 @@ BAND = 4  # rows that a thread takes at once
 GROUP = 256  # samples that are summed before they are added to the total
 
 
-@stage("sssil.gather")
-def gather(
-    level: Level, index: int, settings: HssilSettings, senders: Level | None = None,
-    samples: tuple[Array, Array] | None = None,
-) -> Array:
+def _steps(*arguments: Any, **named: Any) -> Array:
+    from refgi.sssil.crown.steps import gather_steps
+
+    return gather_steps(*arguments, **named)
+
+
+@stage("sssil.gather", steps=_steps)
+def gather(level: Level, index: int, settings: HssilSettings, senders: Level | None = None) -> Array:
     """Sum the light of the samples around each texel of a level (Eq. 1).
 
     Parameters
@@ -47,8 +50,6 @@ def gather(
         Sampling and form factor.
     senders : Level, optional
         The same level with other surface points, as senders.
-    samples : tuple of ndarray, optional
-        Offsets and weights as `shared_offsets` returns them, in place of those that the settings draw.
 
     Returns
     -------
@@ -58,25 +59,38 @@ def gather(
     rows, columns = level.shape
     sampling, senders = settings.sampling, level if senders is None else senders
     radius = chosen_radius((rows << index, columns << index), sampling)
-    real = level.position.dtype.type
-    form, share = form_of(settings.senders.form_factor), settings.senders.disc_share
-    factor = real(math.pi * level_factor(index, settings))
-    farthest, result = math.ceil(2 * radius), plane(level.radiance.shape, level.radiance.dtype)
-    if samples is None and sampling.pattern == "pixel":
+    factor, share = math.pi * level_factor(index, settings), settings.senders.disc_share
+    if sampling.pattern == "pixel":
         inner, crown = sampling.counts(index)
         points, weight = sample_points(inner, crown), sample_weight(radius, inner, crown)
         key = level_key(sampling.seed, level.number)
         tally("pairs", lambda: rows * columns * (inner + crown))
-        emitters = pack(senders, 1, farthest, WIDE)
+        emitters = pack(senders, 1, math.ceil(2 * radius), WIDE)
+        result = plane(level.radiance.shape, level.radiance.dtype)
         _gather_per_pixel(emitters, level.position, level.normal, points, inner, radius, sampling.density == "uniform",
-                          key, weight, form, share, factor, result)
+                          key, weight, form_of(settings.senders.form_factor), share,
+                          level.position.dtype.type(factor), result)
         return result
-    shared = shared_offsets(sampling, index, level.number, rows, radius, columns) if samples is None else samples
-    offsets, weight = _reaching(*shared, rows, columns)
+    offsets, weight = _reaching(*shared_offsets(sampling, index, level.number, rows, radius, columns), rows, columns)
     tally("pairs", lambda: rows * columns * offsets.shape[2])
+    return sum_of_samples(level, senders, offsets, weight, math.ceil(2 * radius), settings.senders.form_factor, share,
+                          factor, paired=sampling.pattern in ("fixed", "all"))
+
+
+def sum_of_samples(
+    level: Level, senders: Level, offsets: Array, weight: Array, farthest: int, form: str, share: float, factor: float,
+    *, paired: bool = False,
+) -> Array:
+    """Return `factor` / pi times the irradiance of a level's texels by samples that texels of a tile have each.
+
+    `offsets` (m, P, n, 2) and `weight` are as `shared_offsets` returns them, P a power of two, and reach `farthest`
+    texels; `form` and `share`: form factor and the share of its disc. `paired`: mirror images follow each other.
+    """
+    result = plane(level.radiance.shape, level.radiance.dtype)
     emitters = pack(senders, offsets.shape[1], farthest, WIDE)
-    paired, trims = sampling.pattern in ("fixed", "all"), left_out("sssil.senders", lambda: dark_ends(emitters))
-    _gather_shared(emitters, level.position, level.normal, offsets, weight, paired, trims, form, share, factor, result)
+    trims = left_out("sssil.senders", lambda: dark_ends(emitters))
+    _gather_shared(emitters, level.position, level.normal, offsets, weight, paired, trims, form_of(form), share,
+                   level.position.dtype.type(factor), result)
     return result
 
 
@@ -89,19 +103,9 @@ def _reaching(offsets: Array, weight: Array, rows: int, columns: int) -> tuple[A
 
 
 def level_factor(index: int, settings: HssilSettings) -> float:
-    """Return the factor of a level's sum: 1 but for forms used as printed.
+    """Return the factor of a level's sum: 1 but for forms used as printed; index 0 is the first level.
 
-    Parameters
-    ----------
-    index : int
-        Position of the level, 0 for the first.
-    settings : HssilSettings
-        `as_published` and the form factor.
-
-    Returns
-    -------
-    float
-        1 / pi where Eq. 4 lacks its pi, times 4^k where areas are scaled by the level's 4^k a second time.
+    1 / pi where Eq. 4 lacks its pi, times 4^k where areas are scaled by the level's 4^k a second time.
     """
     factor = 1.0
     if "hss_disc_pi" in settings.as_published and settings.senders.form_factor != "point":

@@ -58,20 +58,7 @@ class Draws(NamedTuple):
 
 
 def glossy_receivers(points: GlossyPoints, projection: Projection) -> GlossyReceivers:
-    """Return glossy pixels of a camera's picture as receivers of crowns.
-
-    Parameters
-    ----------
-    points : GlossyPoints
-        The n pixels, of this picture.
-    projection : Projection
-        The camera's map.
-
-    Returns
-    -------
-    GlossyReceivers
-        With the azimuth of their lobes.
-    """
+    """Return n glossy pixels of a camera's picture as receivers of crowns, with the azimuth of their lobes."""
     row, column = np.divmod(points.pixel, projection.width)
     position, normal, mirrored = (np.asarray(part, np.float64)
                                   for part in (points.position, points.normal, points.mirrored))

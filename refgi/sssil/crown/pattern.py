@@ -46,36 +46,12 @@ PHASES = 2  # of the pattern "row": even columns share samples, and odd ones
 def row_offsets(
     sampling: SamplingSettings, index: int, number: int, rows: int, radius: float | None = None, column: int = 0
 ) -> tuple[Array, Array]:
-    """Return the samples of the receivers of a column.
+    """Return the samples of the receivers of a column: offsets (m, n, 2) int32 and weights (m or 1, n) float64.
 
-    Parameters
-    ----------
-    sampling : SamplingSettings
-        Numbers of samples, density, pattern (any but "pixel") and seed.
-    index : int
-        0 for the first level, whose inner disc is sampled as well.
-    number : int
-        Number of the level in the pyramid.
-    rows : int
-        Rows of the level.
-    radius : float, optional
-        Inner radius of the crown, texels; that of the settings by default.
-    column : int
-        The column.
-
-    Returns
-    -------
-    offsets : (m, n, 2) ndarray of int32
-        Texels (ox, oy) from the receiver in row y, at [y mod m]: m is `rows` with "row", the tile's side with
-        "interleaved", else 1. With "fixed" and "all" a sample is followed by its mirror image (-ox, oy); those with
-        ox = 0 come last.
-    weight : (m or 1, n) ndarray of float64
-        Texels of the level that each sample stands for.
-
-    Raises
-    ------
-    InputError
-        If every pixel has a pattern of its own, or no radius is known.
+    Arguments as in `shared_offsets`. Texels (ox, oy) from the receiver in row y, at [y mod m]: m is `rows` with "row",
+    the tile's side with "interleaved", else 1. With "fixed" and "all" a sample is followed by its mirror image (-ox,
+    oy); those with ox = 0 come last. A weight is the texels of the level that a sample stands for. `InputError` if
+    every pixel has a pattern of its own, or no radius is known.
     """
     expect(sampling.pattern != "pixel", "pattern", "one that receivers share", sampling.pattern)
     offsets, weight = shared_offsets(sampling, index, number, rows, radius)
@@ -86,30 +62,14 @@ def shared_offsets(
     sampling: SamplingSettings, index: int, number: int, rows: int, radius: float | None = None,
     columns: int | None = None,
 ) -> tuple[Array, Array]:
-    """Return the samples that receivers share, by row and column of their tile.
+    """Return the samples that receivers share, by row and column of their tile, for any pattern but "pixel".
 
-    Parameters
-    ----------
-    sampling : SamplingSettings
-        Numbers of samples, density, pattern (any but "pixel") and seed.
-    index : int
-        0 for the first level, whose inner disc is sampled as well.
-    number : int
-        Number of the level in the pyramid.
-    rows : int
-        Rows of the level.
-    radius : float, optional
-        Inner radius of the crown, texels; that of the settings by default.
-    columns : int, optional
-        Columns of the level: "all" then leaves out what is farther away than any texel of so small a picture.
-
-    Returns
-    -------
-    offsets : (m, P, n, 2) ndarray of int32
-        Texels (ox, oy) from the receiver at (x, y), at [y mod m, x mod P]: (tile, tile, n, 2) with "interleaved",
-        (rows, PHASES, n, 2) with "row", (1, 1, n, 2) with "fixed" and "all".
-    weight : (m, P, n) or (1, 1, n) ndarray of float64
-        Texels of the level that each sample stands for.
+    `index` is 0 for the first level, whose inner disc is sampled as well, `number` the level's in the pyramid, `rows`
+    and `columns` its size: with columns, "all" leaves out what is farther away than any texel of so small a picture.
+    `radius` is the crown's inner one, texels, else that of the settings.
+    Offsets (m, P, n, 2) int32 are texels (ox, oy) from the receiver at (x, y), at [y mod m, x mod P]: (tile, tile, n,
+    2) with "interleaved", (rows, PHASES, n, 2) with "row", (1, 1, n, 2) with "fixed" and "all". Weights (m, P, n) or
+    (1, 1, n) float64 are the texels of the level that each sample stands for.
     """
     radius = known_radius(sampling, radius)
     inner, crown = sampling.counts(index)
@@ -127,27 +87,11 @@ def shared_offsets(
 
 
 def tile_offsets(points: Array, inner: int, shifts: Array, radius: float, density: Density) -> tuple[Array, Array]:
-    """Return the samples of the texels of a tile.
+    """Return the samples of the texels of a tile, offsets and weights as those of `shared_offsets`.
 
-    Parameters
-    ----------
-    points : (n, 3) ndarray
-        The common points, of `sample_points`; the first `inner` lie in the disc.
-    inner : int
-        How many lie in the disc.
-    shifts : (m, P, 2) ndarray
-        What each texel of the tile adds to u and v, modulo 1.
-    radius : float
-        Inner radius of the crown, texels.
-    density : {"uniform", "inverse_distance"}
-        Samples per texel, by the distance from the receiver.
-
-    Returns
-    -------
-    offsets : (m, P, n, 2) ndarray of int32
-        Texels (ox, oy) from the receiver at (x, y), at [y mod m, x mod P].
-    weight : (m, P, n) or (1, 1, n) ndarray of float64
-        Texels of the level that each sample stands for.
+    `points` (n, 3) are of `sample_points`, the first `inner` lie in the disc; `shifts` (m, P, 2) is what each texel of
+    the tile adds to u and v, modulo 1; `radius` the crown's inner one, texels; `density` samples per texel, by the
+    distance.
     """
     offsets, uniform = np.empty((*shifts.shape[:2], len(points), 2), np.int32), density == "uniform"
     relative = np.empty((1, 1, 1) if uniform else offsets.shape[:3])
@@ -158,27 +102,9 @@ def tile_offsets(points: Array, inner: int, shifts: Array, radius: float, densit
 def samples_at(
     sampling: SamplingSettings, index: int, number: int, row: int, column: int, radius: float | None = None
 ) -> tuple[Array, Array]:
-    """Return the samples of one receiver and their weights, whatever the pattern.
+    """Return the samples of one receiver and their weights, whatever the pattern: (n, 2) int32 and (n,) float64.
 
-    Parameters
-    ----------
-    sampling : SamplingSettings
-        Numbers of samples, density, pattern and seed.
-    index : int
-        0 for the first level, whose inner disc is sampled as well.
-    number : int
-        Number of the level in the pyramid.
-    row, column : int
-        The receiver.
-    radius : float, optional
-        Inner radius of the crown, texels; that of the settings by default.
-
-    Returns
-    -------
-    offsets : (n, 2) ndarray of int32
-        Texels (ox, oy) from the receiver.
-    weight : (n,) ndarray of float64
-        Texels of the level that each stands for.
+    Arguments as in `shared_offsets`. Texels (ox, oy) from the receiver, and texels of the level that each stands for.
     """
     if sampling.pattern != "pixel":
         offsets, weight = row_offsets(sampling, index, number, row + 1, radius, column)

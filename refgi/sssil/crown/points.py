@@ -25,15 +25,7 @@ TO_UNIT = 2.0**-32
 def sample_points(inner: int, crown: int) -> Array:
     """Return the points of the unit square that all patterns shift: those of the inner disc, then those of the crown.
 
-    Parameters
-    ----------
-    inner, crown : int
-        Numbers of points in the disc and in the crown.
-
-    Returns
-    -------
-    (inner + crown, 3) ndarray of float64
-        u in [0, 1), cos 2 pi v and sin 2 pi v.
+    (inner + crown, 3) float64: u in [0, 1), cos 2 pi v and sin 2 pi v.
     """
     count = np.concatenate([np.arange(inner), np.arange(crown)])
     u, v = (0.5 + count * FIRST_STEP) % 1.0, (0.5 + count * SECOND_STEP) % 1.0
@@ -41,44 +33,16 @@ def sample_points(inner: int, crown: int) -> Array:
 
 
 def sample_weight(radius: float, inner: int, crown: int) -> Array:
-    """Return how many texels each sample stands for where density is uniform.
+    """Return how many texels each sample stands for where density is uniform, (inner + crown,) float64.
 
-    Parameters
-    ----------
-    radius : float
-        Inner radius of the crown, texels.
-    inner, crown : int
-        Numbers of samples in the disc and the crown.
-
-    Returns
-    -------
-    (inner + crown,) ndarray of float64
-        pi r^2 / inner in the disc, 3 pi r^2 / crown in the crown: the areas shared out.
+    pi r^2 / inner in the disc, 3 pi r^2 / crown in the crown of inner radius r (texels): the areas shared out.
     """
     disc = math.pi * radius**2
     return np.repeat([disc / max(inner, 1), 3.0 * disc / crown], [inner, crown])
 
 
 def known_radius(sampling: SamplingSettings, radius: float | None) -> float:
-    """Return the inner radius of the crowns.
-
-    Parameters
-    ----------
-    sampling : SamplingSettings
-        Their radius.
-    radius : float or None
-        Replaces that of the settings.
-
-    Returns
-    -------
-    float
-        Texels.
-
-    Raises
-    ------
-    InputError
-        If neither is set.
-    """
+    """Return the inner radius of the crowns, texels: `radius`, else the settings'; `InputError` if neither is set."""
     found = sampling.radius if radius is None else radius
     expect(found is not None, "radius", "texels, or the size of the first level to choose it by", found)
     return float(found)  # type: ignore[arg-type]

@@ -23,38 +23,14 @@ RECEIVERS = 256  # rows of receivers, or receivers, whose samples are counted
 def chosen_radius(shape: tuple[int, int], sampling: SamplingSettings) -> float:
     """Return the inner radius of the crowns: that of the settings, else the smallest that covers the picture.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        Rows and columns of the first level.
-    sampling : SamplingSettings
-        Radius and number of levels.
-
-    Returns
-    -------
-    float
-        Texels, 1 or more.
+    Texels of the first level, whose rows and columns are `shape`; 1 or more.
     """
     return covering_radius(shape, sampling.levels) if sampling.radius is None else float(sampling.radius)
 
 
 def covering_radius(shape: tuple[int, int], levels: int) -> float:
-    """Return the smallest inner radius with which the crowns cover the picture: its diagonal / 2^K.
+    """Return the smallest inner radius with which K crowns cover the picture: its diagonal / 2^K, 1 texel or more.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        Rows and columns of the first level.
-    levels : int
-        K.
-
-    Returns
-    -------
-    float
-        Texels, 1 or more.
-
-    Examples
-    --------
     >>> covering_radius((300, 400), 4)
     31.25
     """
@@ -62,38 +38,12 @@ def covering_radius(shape: tuple[int, int], levels: int) -> float:
 
 
 def reach(sampling: SamplingSettings, radius: float) -> float:
-    """Return the outer radius of the last crown: r 2^K.
-
-    Parameters
-    ----------
-    sampling : SamplingSettings
-        Number of levels K.
-    radius : float
-        r, texels.
-
-    Returns
-    -------
-    float
-        Texels of the first level.
-    """
+    """Return the outer radius of the last crown: r 2^K, texels of the first level."""
     return radius * float(1 << sampling.levels)
 
 
 def warn_short_reach(shape: tuple[int, int], sampling: SamplingSettings) -> None:
-    """Warn when light from one corner of the picture does not reach the other.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Rows and columns of the first level.
-    sampling : SamplingSettings
-        Radius and number of levels.
-
-    Warns
-    -----
-    RefgiWarning
-        With the reach, the diagonal, and the radius that covers it.
-    """
+    """Warn, with the radius that covers it, when light from one corner of the picture does not reach the other."""
     diagonal = math.hypot(*shape)
     far = reach(sampling, chosen_radius(shape, sampling))
     if far < diagonal:
@@ -105,24 +55,10 @@ def warn_short_reach(shape: tuple[int, int], sampling: SamplingSettings) -> None
 def coverage(sampling: SamplingSettings, shape: tuple[int, int], receivers: int = RECEIVERS) -> Array:
     """Count how many texels' worth of samples fall on each texel around a receiver, over all levels.
 
-    Parameters
-    ----------
-    sampling : SamplingSettings
-        Pattern, radius and levels.
-    shape : tuple of int
-        Rows and columns of the first level.
-    receivers : int
-        How many rows of receivers are averaged, or receivers with samples of their own.
-
-    Returns
-    -------
-    (2 h - 1, 2 w - 1) ndarray of float64
-        Mean weight of offset (row - h + 1, column - w + 1), texels of the first level: 1 where an offset is covered
-        once.
-
-    Notes
-    -----
-    A receiver is equally likely to lie anywhere in its texel of level k, so that a crown's rims are blurred by 2^k.
+    (2 h - 1, 2 w - 1) float64: mean weight of offset (row - h + 1, column - w + 1), texels of the first level, of
+    `shape`; 1 where an offset is covered once. `receivers` says how many rows of them are averaged, or receivers with
+    samples of their own. A receiver is equally likely to lie anywhere in its texel of level k, so that a crown's rims
+    are blurred by 2^k.
     """
     radius = chosen_radius(shape, sampling)
     rows, columns = (np.arange(1 - size, size) for size in shape)
@@ -139,23 +75,8 @@ def texel_weights(
 ) -> Array:
     """Count how many texels' worth of samples fall on each texel of one level around a receiver.
 
-    Parameters
-    ----------
-    sampling : SamplingSettings
-        Pattern and radius.
-    index : int
-        0 for the first level, whose inner disc is sampled as well.
-    number : int
-        Number of the level in the pyramid.
-    receivers : int
-        How many rows of receivers are averaged, or receivers with samples of their own.
-    radius : float, optional
-        Inner radius of the crown, texels; that of the settings by default.
-
-    Returns
-    -------
-    (2 n + 1, 2 n + 1) ndarray of float64
-        Mean weight of offset (row - n, column - n), texels of the level; samples on the receiver itself count.
+    (2 n + 1, 2 n + 1) float64: mean weight of offset (row - n, column - n), texels of the level; samples on the
+    receiver itself count. `receivers` as in `coverage`, the others as in `pattern.shared_offsets`.
     """
     if sampling.pattern == "pixel":
         found = [samples_at(sampling, index, number, 0, column, radius) for column in range(receivers)]

@@ -55,22 +55,7 @@ def pyramid(frame: "Frame", settings: HssilSettings) -> list[Level]:
 
 
 def sender_pyramid(frame: "Frame", receivers: list[Level], settings: HssilSettings) -> list[Level]:
-    """Return the levels as senders: those of the receivers unless senders are drawn.
-
-    Parameters
-    ----------
-    frame : Frame
-        Scene, camera and lights.
-    receivers : list of Level
-        What `pyramid` returned.
-    settings : HssilSettings
-        Downsampling and seed.
-
-    Returns
-    -------
-    list of Level
-        As many, of the same resolutions.
-    """
+    """Return the levels as senders, as many and as large: the receivers' (`pyramid`) unless senders are drawn."""
     if settings.senders.downsample != "resampled":
         skip("sssil.senders", "receivers are the senders")
         return receivers
@@ -81,19 +66,9 @@ def sender_pyramid(frame: "Frame", receivers: list[Level], settings: HssilSettin
 
 
 def useful_levels(shape: tuple[int, int], sampling: SamplingSettings) -> int:
-    """Return how many levels have texels that lie within each other's crown.
+    """Return how many levels have texels that lie within each other's crown, for a picture of so many rows and columns.
 
-    Parameters
-    ----------
-    shape : tuple of 2 ints
-        Height and width of the picture.
-    sampling : SamplingSettings
-        Radius, first level and number of levels.
-
-    Returns
-    -------
-    int
-        At least 1: the first level has a disc.
+    At least 1: the first level has a disc.
     """
     if sampling.radius is None:  # chosen so that all reach
         return sampling.levels
@@ -105,24 +80,17 @@ def useful_levels(shape: tuple[int, int], sampling: SamplingSettings) -> int:
 
 
 def level_shape(shape: tuple[int, int], number: int) -> tuple[int, int]:
-    """Return rows and columns of a level.
-
-    Parameters
-    ----------
-    shape : tuple of 2 ints
-        Height and width of the picture.
-    number : int
-        Level k: texels of 2^k x 2^k pixels.
-
-    Returns
-    -------
-    tuple of 2 ints
-        As many as cover the picture.
-    """
+    """Return rows and columns of level k: as many texels of 2^k x 2^k pixels as cover the picture."""
     return -(-shape[0] >> number), -(-shape[1] >> number)
 
 
-@stage("sssil.pyramid")
+def _steps(*arguments: Any, **named: Any) -> Any:
+    from refgi.sssil.pyramid.steps import levels_steps
+
+    return levels_steps(*arguments, **named)
+
+
+@stage("sssil.pyramid", steps=_steps)
 def levels(
     depth: Array, normal: Array, albedo: Array, direct: Array, projection: Projection, first: int, count: int,
     downsample: str = "closest", as_published: frozenset[str] = frozenset(),
@@ -167,30 +135,13 @@ def levels(
     """
     shape = (projection.height, projection.width)
     picture, view = _picture(shape, depth, normal, albedo, direct), view_of(projection, as_published)
-    levels_made = [_empty_level(number, shape, depth.dtype) for number in range(first, first + count)]
+    levels_made = [empty_level(number, shape, depth.dtype) for number in range(first, first + count)]
     fill_first_level(picture, view, levels_made[0])
     for fine, coarse in itertools.pairwise(levels_made):
         fill_coarser_level(fine, *shape, coarse)
     if downsample != "closest":
         _average(picture, view, downsample == "average", levels_made)
     return tuple(levels_made)
-
-
-def next_level(
-    fine: Level, shape: tuple[int, int], downsample: str = "closest", weight: Array | None = None
-) -> Level:
-    """Return the level of each four texels of a finer one, as `levels` makes it.
-
-    `shape`: height and width of the picture. `weight` (h, w): pixels with a surface of the finer texels, where light
-    alone is averaged.
-    """
-    coarse = _empty_level(fine.number + 1, shape, fine.depth.dtype)
-    fill_coarser_level(fine, *shape, coarse)
-    if downsample == "average":
-        average_texels(fine, fine.area, True, coarse, coarse.area)
-    elif weight is not None:
-        average_texels(fine, weight, False, coarse, plane(coarse.shape, coarse.area.dtype))
-    return coarse
 
 
 @stage("sssil.senders")
@@ -236,7 +187,7 @@ def drawn_senders(
     """
     shape = (projection.height, projection.width)
     picture, view = _picture(shape, depth, normal, albedo, direct), view_of(projection, as_published)
-    drawn = [_empty_level(level.number, shape, depth.dtype)._replace(depth=level.depth) for level in closest]
+    drawn = [empty_level(level.number, shape, depth.dtype)._replace(depth=level.depth) for level in closest]
     if closest[0].number == 0:
         drawn[0] = closest[0]  # pixels stand for themselves
     else:
@@ -264,7 +215,8 @@ def _average(picture: Picture, view: View, by_surface: bool, levels_made: list[L
         average_texels(levels_made[finer], weights[finer], by_surface, levels_made[coarser], weights[coarser])
 
 
-def _empty_level(number: int, shape: tuple[int, int], dtype: npt.DTypeLike) -> Level:
+def empty_level(number: int, shape: tuple[int, int], dtype: npt.DTypeLike) -> Level:
+    """Return a level of a picture of `shape` rows and columns, to be filled."""
     h, w = level_shape(shape, number)
     three = (3, h, w)
     return Level(number, plane(three, dtype), plane((h, w), dtype), plane(three, dtype), plane(three, dtype),

@@ -71,29 +71,11 @@ class View(NamedTuple):
 
 
 def view_of(projection: Projection, as_published: frozenset[str] = frozenset()) -> View:
-    """Return the view rays of a camera.
+    """Return the view rays of a camera, one perspective map, and the area of a pixel.
 
-    Parameters
-    ----------
-    projection : Projection
-        One perspective map.
-    as_published : frozenset of str
-        "hss_tan_f": fields of view as Eq. 3 prints them.
-
-    Returns
-    -------
-    View
-        Its rays and the area of a pixel.
-
-    Raises
-    ------
-    InputError
-        If "hss_tan_f" meets a field of view of 90 degrees or more, whose tangent is not positive.
-
-    Notes
-    -----
-    Eq. 2 has 4 tan(f_h / 2) tan(f_v / 2) / (W H); Eq. 3 prints 4 tan f_h tan f_v / (W H), 9 times as much at 60
-    degrees.
+    `as_published` with "hss_tan_f": fields of view as Eq. 3 prints them, 4 tan f_h tan f_v / (W H), 9 times as much at
+    60 degrees as Eq. 2's 4 tan(f_h / 2) tan(f_v / 2) / (W H). `InputError` if it meets a field of view of 90 degrees or
+    more, whose tangent is not positive.
     """
     right, down, ahead = projection.frame[0]
     horizontal, vertical = (float(half) for half in projection.half)

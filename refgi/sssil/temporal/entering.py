@@ -26,30 +26,11 @@ def fetch_entering(
 ) -> Array:
     """Fetch the light at the edge of the earlier picture for pixels whose points lay outside it.
 
-    Parameters
-    ----------
-    values : (3 or 4, h, w) ndarray
-        The first three planes are the light of the earlier picture, W/m^2.
-    source : SourceView
-        The earlier picture.
-    position : (3, h', w') ndarray
-        Where each pixel's point was then, m.
-    covered : (h', w') ndarray of bool
-        Pixels with a surface point.
-    weight : (h', w') ndarray
-        0 where no light was found by reprojection.
-    origin : tuple of 3 floats
-        Origin of `position`, m.
-    speed : float
-        Speed at which the share falls to 1 / e, pixels a frame.
-    reprojected : (3 or 4, h', w') ndarray
-        Its first three planes are filled where a point entered.
-
-    Returns
-    -------
-    (h', w') ndarray
-        exp(-v / speed) of pixels that entered, whose point moved across the picture by v pixels; 0 of others, and of
-        those where the edge shows no surface.
+    The first three planes of `values` (3 or 4, h, w) are the earlier light, W/m^2; those of `reprojected` (3 or 4, h',
+    w') are filled where a point entered. `position` (3, h', w'): where each point was then, m from `origin`; `weight`
+    (h', w'): 0 where reprojection found no light; `speed`: at which the share falls to 1 / e, pixels a frame.
+    Returns exp(-v / speed), (h', w'), of pixels that entered, whose point moved across the picture by v pixels; 0 of
+    others, and of those where the edge shows no surface.
     """
     share = plane(covered.shape, reprojected.dtype)
     eye, frame, scale = pixel_transform(source, reprojected.dtype, origin)

@@ -54,22 +54,11 @@ class Filtered(NamedTuple):
 
 
 def history_of(frame: "Frame", geometry: Geometry, light: Array) -> History:
-    """Return the state that the next frame needs of this one.
+    """Return the state that the next frame needs of this one: depths, normals, light, frames; eight numbers a pixel.
 
-    Parameters
-    ----------
-    frame : Frame
-        The frame.
-    geometry : Geometry
-        Its scene's triangles as the scene holds them: the very object of the next scene if nothing moves.
-    light : (3 or 4, h, w) ndarray
-        Light for the next frame, F or I by the form of the filter, W/m^2, and in a fourth plane the number of frames in
-        which each pixel's surface was found; as many as a asks for where absent.
-
-    Returns
-    -------
-    History
-        Depths, normals, light and number of frames: eight numbers a pixel.
+    `geometry` is the scene's as the scene holds it: the very object of the next scene if nothing moves. `light` (3 or
+    4, h, w) is F or I by the form of the filter, W/m^2, and in a fourth plane the number of frames in which each
+    pixel's surface was found; as many as a asks for where absent.
     """
     buffer = frame.gbuffer
     depth, normal = buffer.resolve("depth", "normal")
@@ -89,7 +78,13 @@ def with_frames(irradiance: Array, frames: Array | None) -> Array:
     return irradiance if frames is None else np.concatenate([irradiance, frames[None]])
 
 
-@stage("sssil.temporal", kept=False)
+def _steps(*arguments: Any, **named: Any) -> dict[str, Array]:
+    from refgi.sssil.temporal.steps import temporal_steps
+
+    return temporal_steps(*arguments, **named)
+
+
+@stage("sssil.temporal", kept=False, steps=_steps)
 def temporal_filter(
     irradiance: Array, frame: "Frame", geometry: Geometry, history: History, settings: TemporalSettings
 ) -> Filtered:
@@ -132,7 +127,7 @@ def temporal_filter(
         skip("sssil.motion", "the same geometry")
     else:
         expect_same_triangles(geometry, history.geometry)
-        before = _relative_to(history.geometry, frame.origin)
+        before = relative_to(history.geometry, frame.origin)
         position, normal, speed = previous_points(buffer, frame.scene.geometry, before)
     earlier = history.light if settings.counts_frames else history.light[:3]
     reprojected, weight = reproject(earlier, history.view, position, normal, buffer.covered,
@@ -152,27 +147,12 @@ def blend(
     irradiance: Array, reprojected: Array, weight: Array, settings: TemporalSettings, speed: Array | None = None,
     entering: Array | None = None,
 ) -> int:
-    """Turn light of the frame before into F_i = a W(F_{i-1}) + (1 - a) I_i.
+    """Turn light of the frame before into F_i = a W(F_{i-1}) + (1 - a) I_i; return how many surfaces that frame shows.
 
-    Parameters
-    ----------
-    irradiance : (3, h, w) ndarray
-        I_i, W/m^2.
-    reprojected : (3 or 4, h, w) ndarray
-        W(F_{i-1}), W/m^2, and frames in which the surface was found; becomes F_i and the frames with this one.
-    weight : (h, w) ndarray
-        Share of the texels that show the same surface, 0 where none does; becomes a.
-    settings : TemporalSettings
-        Share of the frame before, and the speed at which it falls.
-    speed : (h, w) ndarray, optional
-        Of the surfaces, pixels a frame.
-    entering : (h, w) ndarray, optional
-        Share of a of the pixels that entered the picture.
-
-    Returns
-    -------
-    int
-        Pixels whose surface the frame before shows.
+    `irradiance` is I_i, W/m^2. `reprojected` (3 or 4, h, w) is W(F_{i-1}) and the frames in which the surface was
+    found; it becomes F_i and the frames with this one. `weight` (h, w), the share of the texels that show the same
+    surface, 0 where none does, becomes a. `speed` (h, w) is the surfaces', pixels a frame; `entering` (h, w) the share
+    of a of the pixels that entered the picture.
     """
     real = irradiance.dtype.type
     reused = np.empty(len(weight), np.int64)  # pixels of each row
@@ -182,13 +162,7 @@ def blend(
 
 
 def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
-    """Raise `InputError` unless two geometries are one at two times: the same triangles of the same vertices.
-
-    Parameters
-    ----------
-    geometry, before : Geometry
-        Those of this frame and of the frame before.
-    """
+    """Raise `InputError` unless two geometries are one at two times: the same triangles of the same vertices."""
     expect(geometry.vertices.shape == before.vertices.shape, "scenes", f"the {len(before.vertices):,} vertices of the "
            "frame before in each", f"{len(geometry.vertices):,}")
     expect(geometry.faces is before.faces or np.array_equal(geometry.faces, before.faces), "scenes",
@@ -197,7 +171,7 @@ def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
            "vertex normals in all or in none", "some with and some without")
 
 
-def _relative_to(geometry: Geometry, origin: tuple[float, float, float]) -> Geometry:
+def relative_to(geometry: Geometry, origin: tuple[float, float, float]) -> Geometry:
     """Return the geometry relative to a frame's origin."""
     if not any(origin):
         return geometry

@@ -14,6 +14,7 @@ from refgi.jit import kernel, prange
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.surfaces import cross
 from refgi.rsm.pool import plane
+from refgi.rsm.raster.projection import Projection
 from refgi.scene.model import Geometry
 from refgi.stages import stage
 
@@ -23,23 +24,45 @@ Array = npt.NDArray[Any]
 class PreviousPoints(NamedTuple):
     """The surface points of a picture one frame earlier."""
 
-    position: Array  # (3, h, w) m
-    normal: Array  # (3, h, w) unit vectors
-    speed: Array  # (h, w) how far each moved across the picture of today's camera, pixels
+    position: Array  # (3, h, w) where it was, m
+    normal: Array  # (3, h, w) its unit normal then
+    speed: Array  # (h, w) how far it moved as this frame's camera sees it, pixels
+
+
+def previous_points(buffer: GBuffer, geometry: Geometry, before: Geometry) -> PreviousPoints:
+    """Move the surface points of a G-buffer back to where their triangles, `before` the same, were a frame earlier."""
+    position, normal = buffer.resolve("position", "normal")
+    return motion(position, normal, buffer.triangle_id, geometry.faces, geometry.vertices, before.vertices,
+                  buffer.projection, geometry.vertex_normals, before.vertex_normals)
 
 
 @stage("sssil.motion", kept=False)
-def previous_points(buffer: GBuffer, geometry: Geometry, before: Geometry) -> PreviousPoints:
-    """Move surface points back to where their triangles were one frame earlier.
+def motion(
+    position: Array, normal: Array, triangle_id: Array, faces: Array, vertices: Array, before: Array,
+    projection: Projection, vertex_normals: Array | None = None, normals_before: Array | None = None,
+) -> PreviousPoints:
+    """Move surface points back to where they were a frame earlier: the same mean of their corners (HSS Sec. 4).
 
     Parameters
     ----------
-    buffer : GBuffer
-        The camera's G-buffer of this frame.
-    geometry : Geometry
-        Its triangles.
-    before : Geometry
-        The same triangles a frame earlier, in the same coordinates.
+    position : (3, h, w) ndarray
+        Surface points of the picture, m.
+    normal : (3, h, w) ndarray
+        Their unit normals.
+    triangle_id : (h, w) ndarray of int32
+        Their triangles, -1 for none.
+    faces : (triangle, corner) ndarray of int32
+        Vertices of the triangles.
+    vertices : (vertex, 3) ndarray
+        Where the corners are, m.
+    before : (vertex, 3) ndarray
+        Where the corners were a frame earlier, m.
+    projection : Projection
+        This frame's camera.
+    vertex_normals : (vertex, 3) ndarray, optional
+        Normals of smooth triangles.
+    normals_before : (vertex, 3) ndarray, optional
+        The same a frame earlier.
 
     Returns
     -------
@@ -51,19 +74,14 @@ def previous_points(buffer: GBuffer, geometry: Geometry, before: Geometry) -> Pr
     Barycentric coordinates are found from the position in float64; what is added to the position is the same mean of
     the corners' displacements. The speed is inf where this frame's camera would have had the point behind it.
     """
-    position, normal = buffer.resolve("position", "normal")
     result = PreviousPoints(plane(position.shape, position.dtype), plane(normal.shape, normal.dtype),
-                  plane(normal.shape[1:], normal.dtype))
-    none = np.zeros((0, 3))
-    vertex_normals = none if geometry.vertex_normals is None else geometry.vertex_normals
-    normals_before = none if before.vertex_normals is None else before.vertex_normals
-    moving = np.empty(len(geometry.faces), np.bool_)
-    _find_moving(geometry.faces, geometry.vertices, before.vertices, vertex_normals, normals_before, moving)
-    projection = buffer.projection
-    size = np.array([projection.width, projection.height])
-    _move_back(buffer.triangle_id, moving, geometry.faces, geometry.vertices, before.vertices, vertex_normals,
-               normals_before, projection.origin[0], projection.frame[0], size / (2 * projection.half), position,
-               normal, *result)
+                            plane(normal.shape[1:], normal.dtype))
+    moving, size = np.empty(len(faces), np.bool_), np.array([projection.width, projection.height])
+    now, then, up, up_before = (np.zeros((0, 3)) if one is None else np.ascontiguousarray(one, np.float64)
+                                for one in (vertices, before, vertex_normals, normals_before))
+    _find_moving(faces, now, then, up, up_before, moving)
+    _move_back(triangle_id, moving, faces, now, then, up, up_before, projection.origin[0], projection.frame[0],
+               size / (2 * projection.half), position, normal, *result)
     return result
 
 

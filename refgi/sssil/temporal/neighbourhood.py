@@ -18,18 +18,8 @@ Array = npt.NDArray[Any]
 def clamp_to_neighbourhood(new: Array, covered: Array, deviations: float, radius: int, earlier: Array) -> None:
     """Clamp earlier light to so many standard deviations about the mean of the new light around each pixel.
 
-    Parameters
-    ----------
-    new : (3, h, w) ndarray
-        The frame's own light, W/m^2.
-    covered : (h, w) ndarray of bool
-        Pixels with a surface: others are no part of a neighbourhood.
-    deviations : float
-        Half the width of the bounds, standard deviations.
-    radius : int
-        A neighbourhood is a square of 2 radius + 1 pixels, less what is outside the picture.
-    earlier : (3 or 4, h, w) ndarray
-        Its first three planes are clamped.
+    Light is in W/m^2; the first three planes of `earlier` (3 or 4, h, w) are clamped. A neighbourhood is a square of 2
+    radius + 1 pixels, less what is outside the picture and pixels that are not covered.
     """
     _clamp(new, covered, new.dtype.type(deviations), radius, earlier)
 

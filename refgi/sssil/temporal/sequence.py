@@ -84,19 +84,7 @@ class Sequence:
     def over(self, scenes: Iterable[Scene], first: int = 0, history: History | None = None) -> Iterator[SequenceFrame]:
         """Render scenes that follow on others.
 
-        Parameters
-        ----------
-        scenes : iterable of Scene
-            The frames that follow.
-        first : int
-            Number of the first of them, which counts for the seed.
-        history : History, optional
-            What the frame before left.
-
-        Yields
-        ------
-        Step
-            Each frame.
+        `first` is the number of the first of them, which counts for the seed; `history` what the frame before left.
         """
         session = FrameSession()
         for number, scene in enumerate(scenes, first):
@@ -141,20 +129,7 @@ def _hssil_lobes(frame: Frame, settings: Any) -> Array | None:
 
 
 def seeded(settings: Any, number: int) -> Any:
-    """Return settings with the random numbers of a frame.
-
-    Parameters
-    ----------
-    settings : Settings
-        A method's settings.
-    number : int
-        Which frame: 0 leaves them as they are.
-
-    Returns
-    -------
-    Settings
-        The same object where the method draws no random numbers.
-    """
+    """Return settings with the random numbers of a frame, 0: as they are; the same object where none are drawn."""
     seeds = {key: seed for key, seed in flat(settings).items() if key.rpartition(".")[2] == "seed"}
     if number == 0 or not seeds:
         return settings

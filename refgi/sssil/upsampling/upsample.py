@@ -99,11 +99,11 @@ class Guide(NamedTuple):
     normal: Array  # (3, h, w) unit vectors
 
 
-@stage("sssil.upsample", kept=False)
+@stage("sssil.upsample", kept=False, each="level")
 def upsample(
     coarse: Array, coarse_guide: Guide, guide: Guide, settings: HssilSettings, added: Array | None = None
 ) -> Array:
-    """Upsample irradiance to a finer level and add that level's own (joint bilateral upsampling, Sec. 3.2).
+    """Upsample irradiance to a finer level, joint bilateral, and add that level's own (HSS Sec. 3.2, E-HSS-12).
 
     Parameters
     ----------
@@ -136,7 +136,8 @@ def upsample(
     linear, and delta = z (1/z' - 1/z_plane) compares the texel's depth with that of the plane through the receiver at
     the texel's place, so that slanted planes keep the whole tent. That place is where the plane has the nearest of the
     texel's pixels, unless depths are averaged. Equal light stays equal to the bit where the own
-    texel is of the receiver's surface. Where no texel has any weight, the nearest in depth is taken.
+    texel is of the receiver's surface. Where no texel has any weight, the nearest in depth is taken, of several the
+    closest, by rows first.
     """
     dtype = coarse.dtype
     values, depth, normal, coarse_depth, coarse_normal = (

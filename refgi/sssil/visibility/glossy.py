@@ -42,25 +42,9 @@ class SliceSamples(NamedTuple):
 def slice_samples(
     to: GlossyReceivers, level: Level, index: int, settings: HssilSettings, diagonal: float
 ) -> SliceSamples:
-    """Return what slices are marched with.
+    """Return what slices are marched with: n receivers and the texels of a level, senders and occluders, packed.
 
-    Parameters
-    ----------
-    to : GlossyReceivers
-        n receivers.
-    level : Level
-        Senders and occluders.
-    index : int
-        0 for the first level.
-    settings : HssilSettings
-        Sampling, with its radius, and the bitmask.
-    diagonal : float
-        Of the scene, m.
-
-    Returns
-    -------
-    SliceSamples
-        Receivers and texels packed.
+    `index` is 0 for the first level; `diagonal` the scene's, m.
     """
     sampling, bitmask = settings.sampling, settings.visibility
     assert isinstance(bitmask, Bitmask)

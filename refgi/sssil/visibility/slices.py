@@ -41,23 +41,10 @@ class SliceCounts(NamedTuple):
 
 
 def slice_counts(sampling: SamplingSettings, bitmask: Bitmask, index: int, radius: float) -> SliceCounts:
-    """Return how densely the slices of a level are sampled.
+    """Return how densely the slices of a level are sampled, with half as many occluders as the crown has samples.
 
-    Parameters
-    ----------
-    sampling : SamplingSettings
-        Samples of crown and disc, distributed over slices; at least one a slice.
-    bitmask : Bitmask
-        Number of slices.
-    index : int
-        0 for the first level, whose inner disc is sampled as well.
-    radius : float
-        Inner radius of the crown, texels.
-
-    Returns
-    -------
-    SliceCounts
-        With half as many occluders as the crown has samples.
+    Samples of crown and, at index 0, disc are distributed over slices, at least one a slice; `radius` is the crown's
+    inner one, texels.
     """
     slices = bitmask.count(sampling.samples)
     inner, outer = sampling.counts(index)
@@ -67,27 +54,12 @@ def slice_counts(sampling: SamplingSettings, bitmask: Bitmask, index: int, radiu
 
 
 def slice_offsets(sampling: SamplingSettings, steps: SliceCounts, number: int, rows: int) -> tuple[Array, Array]:
-    """Return the samples that receivers share, slice by slice.
+    """Return the samples that receivers share, slice by slice; `steps` are of `slice_counts`.
 
-    Parameters
-    ----------
-    sampling : SamplingSettings
-        Pattern and seed; by "interleaved" each texel of a tile has samples of its own, by others each row.
-    steps : Steps
-        Of `steps_of`.
-    number : int
-        Number of the level in the pyramid.
-    rows : int
-        Rows of the level.
-
-    Returns
-    -------
-    offsets : (m, P, slices, n, 2) ndarray of int32
-        Texels (ox, oy) from the receiver at (x, y), at [y mod m, x mod P], nearest first: (tile, tile, ...) with
-        "interleaved", (1, 1, ...) with "fixed", where each slice with an even index is followed by its mirror image,
-        an odd last one is vertical, else (rows, 1, ...).
-    weight : (m, P, slices, n) ndarray of float64
-        Texels of the level that each sample stands for; 0 for a blocker.
+    Offsets (m, P, slices, n, 2) int32 are texels (ox, oy) from the receiver at (x, y), at [y mod m, x mod P], nearest
+    first: (tile, tile, ...) with "interleaved", (1, 1, ...) with "fixed", where each slice with an even index is
+    followed by its mirror image, an odd last one is vertical, else (rows, 1, ...). Weights (m, P, slices, n) float64
+    are the texels of the level that each sample stands for; 0 for a blocker.
     """
     fixed, tiled, key = sampling.pattern == "fixed", sampling.pattern == "interleaved", level_key(sampling.seed, number)
     tile = (sampling.tile, sampling.tile) if tiled else (1 if fixed else rows, 1)

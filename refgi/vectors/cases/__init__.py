@@ -7,7 +7,6 @@ from refgi.errors import InputError
 from refgi.vectors.spec import Case
 
 # each with QUICK and FULL: functions without arguments that make a case, by its id
-# each with QUICK and FULL: functions without arguments that make a case, by its id
 MODULES = ("pairs", "sii", "sii_range", "multires", "gather", "vpl", "val", "hssil", "truth")
 
 

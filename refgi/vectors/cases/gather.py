@@ -1,20 +1,22 @@
-"""Gathering from reflective shadow maps, from the buffers to the picture."""
+"""Gathering from reflective shadow maps, from the scene to the picture."""
 
 import math
 
 import numpy as np
 
-from refgi.rsm.buffers.light_projection import light_projection
+from refgi.frame import Frame
+from refgi.pairs.irradiance import Receivers
+from refgi.rsm import Rsm
 from refgi.sampling import halton
 from refgi.scene import SpotLight
 from refgi.settings import of
 from refgi.splat.gather.gather import GatherSettings
-from refgi.vectors.cases.plan import Plan, Plans, cases_of
+from refgi.splat.gather.steps import gather_steps
+from refgi.vectors.cases.plan import Plan, Plans, cases_of, recorded_plan
 from refgi.vectors.cases.scenes import AWAY, BULB, DOWN, SPOT, SUN, room
 from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Array, Case, Spec
-from refgi.vectors.stages.buffers import VECTOR, add_gbuffer, add_rsm, give_scene
-from refgi.vectors.stages.gather import add_gather, add_interpolation
+from refgi.vectors.recorded import record
+from refgi.vectors.spec import Array, Case
 
 SQUARE = SpotLight((0.25, 1.5, 0.125), (0.0, -1.0, 0.0), 0.4, math.pi / 4, (3.0, 1.0, 2.0))  # a map of half extent 1
 
@@ -25,26 +27,28 @@ def settings_of(plan: Plan) -> GatherSettings:
 
 
 def gathering(id: str, plan: Plan) -> Case:
-    """Return `gather` as planned: buffers, pattern, places, texels, sums, interpolation."""
-    recipe, settings = Recipe(id, "gather", plan.what), settings_of(plan)
-    give_scene(recipe, plan.scene)
-    add_gbuffer(recipe, plan.scene, *plan.size)
-    for index in range(len(plan.scene.lights)):
-        add_rsm(recipe, plan.scene, index, plan.maps)
-    add_gather(recipe, plan.scene, plan.maps, settings.disc, halton(settings.disc.samples, start=1))
-    if settings.interpolation is not None:
-        add_interpolation(recipe, settings.interpolation)
-    return recipe.case()
+    """Return `gather` as planned."""
+    return recorded_plan(id, plan, "gather", settings_of(plan))
 
 
 def at_borders() -> Case:
     """Return gathering at points that are given: on a map's border, outside, behind the lamp, at it, on a texel."""
-    scene, maps, name = room(SQUARE, matte=True), 13, "gather-border"
-    recipe = Recipe(name, "gather", "points on the border of a map, beyond it, behind the lamp, at it, on a texel's "
-                    "surface; a sample in the middle of the disc")
-    give_scene(recipe, scene)
-    add_rsm(recipe, scene, 0, maps)
-    view = light_projection(scene.lights[0], scene.geometry, maps)
+    scene, disc = room(SQUARE, matte=True), of(GatherSettings, radius=0.4).disc
+    recipe = Recipe("gather-border", "gather", "points on the border of a map, beyond it, behind the lamp, at it, on a "
+                    "texel's surface; a sample in the middle of the disc")
+    recipe.scene, xi = scene, np.concatenate([[[0.0, 0.0], [0.0, 0.5]], halton(22, start=1)])
+
+    def irradiance() -> Array:
+        rsms = Frame(scene, dtype=np.float64, rsm_resolution=13).rsms
+        return gather_steps(border_points(rsms[0]), rsms, disc, xi)
+
+    record(recipe, irradiance)
+    return recipe.case()
+
+
+def border_points(rsm: Rsm) -> Receivers:
+    """Return points on the border of a map, outside, behind the lamp, at it, on a texel."""
+    view = rsm.projection
     places = [(a, b, z) for z in (1.0, 0.5) for a in (-1.0, -0.5, 0.0, 1.0)
               for b in (-1.0, 0.0, 0.75, 1.0)]  # on the map
     places += [(1.5, 0.25, 1.0), (-3.0, 1.5, 0.5), (0.0, -2.0, 1.0), (8.0, 8.0, 0.25)]  # beyond it
@@ -52,23 +56,11 @@ def at_borders() -> Case:
     local += [(0.5, 0.25, -0.25), (-0.25, 0.5, -0.5), (0.0, 0.0, -0.25), (0.5, 0.0, 0.0),
               (0.0, 0.0, 0.0)]  # behind, at it
     position = view.origin[0] + np.asarray(local) @ view.frame[0]
-    texels = recipe.expected()["rsm0.position"][:, 3:9:5, 2:11:4].reshape(3, -1)
-    position = np.concatenate([position.T, texels], axis=1)
+    position = np.concatenate([position.T, rsm.position[:, 3:9:5, 2:11:4].reshape(3, -1)], axis=1)
     normal = np.tile([[0.0], [1.0], [0.0]], position.shape[1])
     normal[:, len(places) : len(local)] *= -1
     normal[:, 1 : len(places) : 3] = [[0.8], [0.0], [0.6]]
-    _give_points(recipe, position, normal)
-    points = np.concatenate([[[0.0, 0.0], [0.0, 0.5]], halton(22, start=1)])
-    add_gather(recipe, scene, maps, of(GatherSettings, radius=0.4).disc, points, decided=True)
-    return recipe.case()
-
-
-def _give_points(recipe: Recipe, position: Array, normal: Array) -> None:
-    axes = "xyz, row, column"
-    recipe.give("gbuffer.position", position[:, None], Spec(axes, "m", "points to light", "world"))
-    recipe.give("gbuffer.normal", normal[:, None], Spec(axes, VECTOR, "their normals", "world"))
-    recipe.give("gbuffer.triangle_id", np.zeros((1, position.shape[1]), np.int32),
-                Spec("row, column", "1", "0: all are surfaces", tier="T0"))
+    return Receivers(position[:, None], normal[:, None], np.ones((1, position.shape[1]), np.bool_))
 
 
 QUICK_PLANS: Plans = {

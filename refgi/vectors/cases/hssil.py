@@ -2,23 +2,28 @@
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from refgi.diagnostics import diagnosing
+from refgi.frame import Frame, Shadows
+from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Scene, SpotLight
 from refgi.settings import of, replaced
 from refgi.sssil.settings import PRESETS, HssilSettings, TemporalSettings
-from refgi.sssil.temporal.sequence import Sequence
+from refgi.sssil.temporal.filter import History, history_of, with_frames
+from refgi.sssil.temporal.sequence import Sequence, SequenceFrame
+from refgi.vectors.cases.plan import Plan, recorded_plan
 from refgi.vectors.cases.scenes import BULB, DOWN, POLE, RAMP, SPOT, VIEW, coloured, room, stored_scene
-from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Case
-from refgi.vectors.stages.buffers import add_gbuffer, give_scene
-from refgi.vectors.stages.direct import Shadows, add_direct
-from refgi.vectors.stages.hssil import add_hssil
-from refgi.vectors.stages.temporal import add_temporal
+from refgi.vectors.recipe import Recipe, reading
+from refgi.vectors.recorded import record
+from refgi.vectors.spec import Arrays, Bug, Case, Run, expected_of, kind_of
 
+LEVELS = "HSS Sec. 3.2: sums of disjoint crowns"
+WARP = "HSS Sec. 3.3: depth and normal decide whether it is the same surface (E-HSS-11)"
+MAPS = 16  # texels along the side of a lamp's map
 AWAY = SpotLight((0.5, 1.5, 0.625), (0.3, 1.0, 0.2), 0.3, 0.6, (4.0, 2.6, 1.3))  # shines into the void
 NARROW = math.radians(38)  # the room fills the picture: points enter at its edges
 BOX = slice(16, 20)  # vertices of the lid in the room
@@ -37,7 +42,10 @@ SETTINGS = {
     "hssil-all": replaced(CLOSEST, {"radius": 2.0, "levels": 3, "pattern": "all"}),
     "hssil-ramp": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "seed": 4}),
     "hssil-colours": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "seed": 8}),
+    "hssil-resampled": of(HssilSettings, samples=8, radius=2.0, levels=3, seed=9),
+    "hssil-share": of(HssilSettings, samples=60, radius=2.0, levels=2, seed=10, downsample="closest"),
 }
+# scene, columns and rows of the picture, shadows of direct light
 VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
     "hssil-default": (room(SPOT, BULB), (40, 28), "map"),
     "hssil-paper": (room(SPOT, matte=True), (40, 28), "map"),
@@ -47,8 +55,10 @@ VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
     "hssil-average": (room(SPOT, BULB), (27, 19), "exact"),
     "hssil-radiance": (room(SPOT, BULB, matte=True, smooth=True), (30, 21), "exact"),
     "hssil-all": (room(BULB, matte=True), (18, 14), "exact"),
-    "hssil-ramp": (room(RAMP, SPOT, matte=True), (16, 12), "exact"),
+    "hssil-ramp": (room(RAMP, SPOT, matte=True), (17, 13), "exact"),
     "hssil-colours": (coloured(room(SPOT, BULB, matte=True)), (20, 15), "exact"),
+    "hssil-resampled": (room(SPOT, BULB, matte=True), (20, 15), "exact"),
+    "hssil-share": (room(SPOT, matte=True), (14, 11), "exact"),
 }
 TEMPORAL = {
     "hssil-temporal": of(TemporalSettings),
@@ -60,36 +70,89 @@ STEPS = {"hssil-temporal": (0.1, 0.15, -0.2), "hssil-entering": (-0.2, 0.1, 0.2)
 FRAMES, TEMPORAL_SIZE = 4, (32, 24)
 
 
-def screen_space(id: str, what: str, scene: Scene, size: tuple[int, int], shadows: Shadows) -> Case:
-    """Return hssil on a scene: `size` (columns, rows) of the picture."""
-    recipe = Recipe(id, "hssil", what)
-    give_scene(recipe, scene)
-    add_gbuffer(recipe, scene, *size)
-    add_direct(recipe, scene, size, shadows)
-    add_hssil(recipe, scene, size, SETTINGS[id])
-    return recipe.case()
+def screen_space(id: str, what: str) -> Case:
+    """Return hssil on a scene."""
+    scene, size, shadows = VIEWS[id]
+    return with_other_light(recorded_plan(id, Plan(what, scene, size, MAPS, shadows=shadows), "hssil", SETTINGS[id]))
+
+
+def with_other_light(case: Case) -> Case:
+    """Return a case with likely bugs of sums of levels that take another light of the case than they should."""
+    stages, made_by = list(case.stages), {name: step for step in case.stages for name in step.writes}
+    for place, step in enumerate(case.stages):
+        added = step.reads[-1] if kind_of(step.name) == "sssil.upsample" else ""
+        if not added.startswith(("sssil.blur", "sssil.gather")):
+            continue
+        coarse, wrong = step.reads[0], {}
+        raw, below = (made_by[one].reads[0] if one.startswith("sssil.blur") else one for one in (added, coarse))
+        if raw != added:
+            before = "that of the gather, before the blur"
+            wrong[f"unblurred light of the level is added: {before}"] = {added: raw}
+            if below != coarse:
+                wrong |= {f"unblurred light of the coarser level: {before}": {coarse: below},
+                          f"unblurred light of both levels: {before}": {coarse: below, added: raw}}
+        if coarse.startswith("sssil.upsample"):
+            wrong["only the next coarser level's own light is added, not the sum of all coarser ones"] = {
+                coarse: made_by[coarse].reads[-1]}
+        bugs = tuple(Bug(cause, _taking(case, step.run, others), LEVELS) for cause, others in wrong.items())
+        stages[place] = dataclasses.replace(step, bugs=(*step.bugs, *bugs))
+    return dataclasses.replace(case, stages=tuple(stages))
+
+
+def _taking(case: Case, run: Run, others: Mapping[str, str]) -> Run:
+    """Return a stage that reads other arrays of the case in place of some."""
+    def wrong(arrays: Arrays, real: Any) -> Arrays:
+        known = expected_of(case)
+        return run({**arrays, **{name: known[other].astype(real) for name, other in others.items()}}, real)
+
+    return wrong
 
 
 def coherent(id: str, what: str) -> Case:
-    """Return the temporal filter of the last of some frames; light and count of the frames before are given."""
-    scenes = frames_of(id)
+    """Return the last of some frames with its temporal filter; light and count of the frames before are given.
+
+    So is what the frame before saw, where its triangles were elsewhere.
+    """
+    scenes, recipe = frames_of(id), Recipe(id, "hssil", what)
+    recipe.scene = scenes[-1]
     with diagnosing(False):  # few samples are what the case is made of
-        filtered = list(sequence(id, scenes[:-1]))
-        new = next(iter(sequence(id, scenes[-1:], None).over(scenes[-1:], FRAMES - 1)))
-    recipe = Recipe(id, "hssil", what)
-    give_scene(recipe, scenes[-1])
-    add_gbuffer(recipe, scenes[-1], *TEMPORAL_SIZE)
-    before = filtered[-1]
-    counts = np.ones(before.irradiance.shape[1:]) if before.frames is None else before.frames
-    add_temporal(recipe, scenes[-1], scenes[-2], TEMPORAL_SIZE, TEMPORAL[id],
-                 (before.irradiance, counts, new.irradiance))
-    return recipe.case()
+        *_, before = sequence(id, scenes[:-1])
+        history = _history(before, scenes[-2])
+
+        def last() -> Any:
+            left = history if id == "hssil-moving" else _history(before._replace(frame=_frame(scenes[-2])), scenes[-2])
+            return next(iter(sequence(id, scenes[-1:]).over(scenes[-1:], FRAMES - 1, left)))
+
+        record(recipe, last)
+    add_other_camera(recipe, scenes[-1])
+    recipe.facts["temporal"] = {key: value for key, value in dataclasses.asdict(TEMPORAL[id]).items()
+                                if value is not None}
+    return with_other_light(recipe.case())
+
+
+def add_other_camera(recipe: Recipe, scene: Scene) -> None:
+    """Add the likely bug of a look-up in the frame before that it is made with this frame's camera, of `scene`."""
+    now = camera_projection(scene.camera, *TEMPORAL_SIZE)
+    place, step = next((k, one) for k, one in enumerate(recipe.stages) if one.name == "sssil.reprojection")
+    cameras = {name.replace(".", "__"): getattr(now, field) for name in step.reads
+               if "projection" in name and (field := name.rpartition(".")[2]) in ("origin", "frame", "half")}
+    bug = Bug("this frame's camera in place of that of the frame before", reading(step.run, **{
+        name: lambda a, one=one: np.asarray(one, a.dtype) for name, one in cameras.items()}), WARP)
+    recipe.stages[place] = dataclasses.replace(step, bugs=(bug, *step.bugs))
+
+
+def _history(before: SequenceFrame, scene: Scene) -> History:
+    return history_of(before.frame, scene.geometry, with_frames(before.irradiance, before.frames))
+
+
+def _frame(scene: Scene) -> Frame:
+    return Frame(scene, width=TEMPORAL_SIZE[0], height=TEMPORAL_SIZE[1], dtype=np.float64)
 
 
 def frames_of(id: str) -> list[Scene]:
     """Return scenes whose camera moves on, or whose lid rises in place."""
     still, step = room(SPOT, BULB, matte=True), np.array(STEPS[id])
-    scenes = []
+    scenes: list[Scene] = []
     for k in range(FRAMES):
         eye, target = (tuple((np.array(point) + k * share * step).tolist()) for point, share in
                        ((VIEW.eye, 1.0), (VIEW.target, 0.3)))
@@ -98,19 +161,22 @@ def frames_of(id: str) -> list[Scene]:
             vertices[BOX] += k * np.array([-0.06, 0.03, 0.04])
         geometry = dataclasses.replace(still.geometry, vertices=vertices) if id == "hssil-moving" else still.geometry
         camera = dataclasses.replace(VIEW, eye=eye, target=target, vfov=NARROW)
-        scenes.append(stored_scene(dataclasses.replace(still, camera=camera, geometry=geometry)))
+        scene = stored_scene(dataclasses.replace(still, camera=camera, geometry=geometry))
+        if scenes and id != "hssil-moving":  # the very object: nothing moves
+            scene = dataclasses.replace(scene, geometry=scenes[0].geometry)
+        scenes.append(scene)
     return scenes
 
 
-def sequence(id: str, scenes: list[Scene], *temporal: Any) -> Sequence:
+def sequence(id: str, scenes: list[Scene]) -> Sequence:
     """Return the frames of the production method in double precision."""
     settings = replaced(CLOSEST, {"samples": 8, "radius": 3.0, "levels": 3, "seed": 7})
     width, height = TEMPORAL_SIZE
-    return Sequence(scenes, settings, *(temporal or (TEMPORAL[id],)), width=width, height=height, dtype=np.float64)
+    return Sequence(scenes, settings, TEMPORAL[id], width=width, height=height, dtype=np.float64, rsm_resolution=MAPS)
 
 
 def _quick(id: str, what: str) -> Any:
-    return lambda: screen_space(id, what, *VIEWS[id])
+    return lambda: screen_space(id, what)
 
 
 QUICK = {
@@ -134,5 +200,8 @@ FULL: dict[str, Any] = {
                              "set of samples, no blur"),
     "hssil-all": _quick("hssil-all", "every texel of disc and crown is a sample, no blur"),
     "hssil-colours": _quick("hssil-colours", "vertex colours multiply the albedo, and so the light that senders send"),
+    "hssil-resampled": _quick("hssil-resampled", "the method's defaults: senders drawn in proportion to flux, discs "
+                              "that cover a quarter of what a sample stands for"),
+    "hssil-share": _quick("hssil-share", "samples that stand for less than a texel, whose discs cover all of it"),
     "hssil-moving": lambda: coherent("hssil-moving", "a surface that moves by itself before a camera that moves too"),
 }

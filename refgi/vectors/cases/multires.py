@@ -1,19 +1,16 @@
-"""Adaptive multiresolution splatting, from the buffers to the picture."""
+"""Adaptive multiresolution splatting, from the scene to the picture."""
 
 import math
 from typing import Any
 
 from refgi.scene import Camera, Scene, merge
 from refgi.settings import of
-from refgi.splat.multires.settings import ByIrradiance, MultiresSettings
-from refgi.vectors.cases.plan import Plan, Plans, cases_of
+from refgi.splat.multires.settings import ByIrradiance, Criteria, MultiresSettings
+from refgi.vectors.cases.plan import Plan, Plans, cases_of, recorded_plan
 from refgi.vectors.cases.scenes import AWAY, DOWN, FLOOR, SPOT, SUN, WALL, quad, room, stored_scene
-from refgi.vectors.cases.sii import add_lit, drawn
-from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
-from refgi.vectors.stages.multires import add_multires
-from refgi.vectors.stages.pairs import add_footprints
 
+CLOSE = Camera((1.0, 1.05, 0.95), (-0.4, 0.35, -0.5), (0.1, 1.0, 0.0), math.radians(65))  # fills the picture
 AT_WALL = Camera((0.2, 1.4, 0.8), (0.1, 1.4, -1.0), (0.0, 1.0, 0.0), math.radians(30))  # the back wall alone
 
 
@@ -24,15 +21,8 @@ def settings_of(plan: Plan) -> MultiresSettings:
 
 
 def multiresolution(id: str, plan: Plan) -> Case:
-    """Return `multires` as planned: buffers, lights, refinement, light, picture."""
-    recipe, settings, lamps = Recipe(id, "multires", plan.what), settings_of(plan), len(plan.scene.lights)
-    columns, rows = (side * (2 if settings.supersampled else 1) for side in plan.size)
-    add_lit(recipe, plan.scene, (columns, rows), plan.maps,
-            drawn(plan.scene, plan.maps, plan.lights * lamps, "grid"), pattern="grid")
-    if settings.effective_pairs.needs_footprints:
-        add_footprints(recipe, lamps)
-    add_multires(recipe, settings, plan.scene, (columns, rows))
-    return recipe.case()
+    """Return `multires` as planned."""
+    return recorded_plan(id, plan, "multires", settings_of(plan))
 
 
 def pole(*lights: Any) -> Scene:
@@ -84,8 +74,14 @@ FULL_PLANS: Plans = {
     "multires-lights": lambda: Plan("lists of each light's own, split where its irradiance changes", room(SPOT, DOWN),
                                     (29, 22), 12, 4, {"subsplats": ByIrradiance(coarsest=5, threshold=0.15),
                                                       "clamp": "none"}),
+    "multires-start": lambda: Plan(
+        "lists that begin with what geometry refines; T a share of the largest sum of all lights, over their number",
+        room(SPOT), (23, 18), 15, 9, {"subsplats": ByIrradiance(
+            coarsest=5, threshold=0.3, form="brightest", criteria=of(Criteria, depth_threshold=0.3)), "clamp": "none"}),
     "multires-rays": lambda: Plan("a shadow ray from each subsplat to each light", room(SPOT, DOWN), (37, 27), 13, 16,
                                   {"visibility": "rays", "clamp": "none"}),
+    "multires-soft": lambda: Plan("soft shadows of clusters at subsplats", room(SPOT, camera=CLOSE), (29, 22), 12, 16, {
+        "visibility": "val", "clusters": 3, "maps_resolution": 13, "clamp": "none"}),
     "multires-double": lambda: Plan("rendered at twice the width and height, as the paper's pictures", pole(SUN, SPOT),
                                     (21, 15), 16, 25, {"supersampled": True}),
 }

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from refgi.pairs.steps import pairs
 from refgi.vectors.recipe import Recipe
+from refgi.vectors.recorded import record
 from refgi.vectors.spec import Array, Case
-from refgi.vectors.stages.pairs import add_pairs
 
 COUNT = 160
 
@@ -43,7 +44,7 @@ def _pairs(id: str, what: str, *, glossy: bool) -> Case:
     facing[:, 64:70], normal[:, 64:70] = -facing[:, 64:70], -normal[:, 64:70]  # both
     flux[:, 70:74] = 0.0
     flux[:, subnormal] = 1e-40
-    lights = {"lights.position": place, "lights.normal": _unit(normal), "lights.flux": flux}
+    lobes: tuple[Array, ...] = ()
     if glossy:
         lobe = 10.0 ** random.uniform(-4, 2, (3, COUNT))
         axis, above = _unit(0.5 * random.normal(size=(3, COUNT)) + toward), _unit(normal)
@@ -53,9 +54,9 @@ def _pairs(id: str, what: str, *, glossy: bool) -> Case:
         lobe[:, 110:120] = 0.0  # purely diffuse
         exponent = np.where(np.arange(COUNT) % 8 == 0, 0.0, 10.0 ** random.uniform(0, 3, COUNT))
         exponent[140:] = np.minimum(exponent[140:], 8.0)  # some axes lie below their surface
-        lights |= {"lights.lobe_flux": lobe, "lights.lobe_axis": axis, "lights.lobe_exponent": exponent}
+        lobes = lobe, axis, exponent
     recipe = Recipe(id, "pairs", what)
-    add_pairs(recipe, lights, receiver, _unit(facing))
+    record(recipe, lambda: pairs(receiver[:, None], _unit(facing)[:, None], place, _unit(normal), flux, *lobes))
     return recipe.case()
 
 

@@ -16,6 +16,7 @@ SUN = DirectionalLight((-0.5, -0.9, -0.3), (0.5, 0.3, 0.9))
 DOWN = SpotLight((0.1, 1.7, 0.2), (0.0, -1.0, 0.0), 0.3, 0.7, (3.0, 1.0, 2.0))  # along the frame's usual up
 VIEW = Camera((1.7, 1.4, 1.5), (-0.4, 0.35, -0.5), (0.1, 1.0, 0.0), math.radians(70))  # rolled
 RAMP = SpotLight((-0.1, 1.6, 0.3), (0.2, -1.0, -0.5), 0.1, 0.8, (1.5, 3.0, 2.0), "squared_ramp")  # glTF's falloff
+BEHIND = SpotLight((-0.9, 1.1, -0.7), (0.9, -0.35, 0.8), 0.5, 0.9, (4.0, 0.0, 1.3))  # no green, half void
 AWAY = SpotLight((1.5, 1.5, 0.5), (1.0, 0.2, 0.1), 0.2, 0.5, (4.0, 2.0, 1.0))  # into the void
 POLE = Camera((0.2, 2.5, 0.1), (0.2, 0.0, 0.1), (0.0, 0.0, -1.0), math.radians(50))  # straight down
 
@@ -79,6 +80,18 @@ def stacked(*lights: Any, camera: Camera = VIEW) -> Scene:
         ((-0.35, 0.7, 0.3), (0.7, 0.06, 0.05), (0.02, 0.04, -0.65), FLOOR),
         ((-0.25, 0.42, 0.1), (0.4, -0.05, 0.04), (0.05, 0.03, -0.35), SIDE))], smooth=False)
     return stored_scene(Scene("kit stack", geometry, materials, camera, lights))
+
+
+def sheet(*lights: Any) -> Scene:
+    """Return a slanted plate and a slanted sheet on it between camera and lamp: no normal along an axis, void around.
+
+    The sheet is seen from one side and lit from the other; what lies at its foot receives at grazing angles.
+    """
+    geometry, materials = merge([quad(*sides) for sides in (
+        ((-0.8, 0.05, 0.9), (1.7, 0.25, -0.1), (-0.1, 0.2, -1.6), FLOOR),
+        ((-0.2, 0.24, 0.25), (0.55, 0.1, -0.4), (0.05, 0.55, 0.12), WALL))], smooth=False)
+    near = dataclasses.replace(VIEW, vfov=math.radians(36))
+    return stored_scene(Scene("kit sheet", geometry, materials, near, lights))
 
 
 def far_away(scene: Scene, offset: float) -> Scene:

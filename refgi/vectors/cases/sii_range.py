@@ -1,35 +1,30 @@
 """The range of pixel lights: Splatting Indirect Illumination with its cut, from the buffers to the sum."""
 
-from refgi.settings import of
-from refgi.splat.sii.settings import RelativeCut, SiiSettings
-from refgi.vectors.cases.plan import Plan, Plans, cases_of
+from functools import partial
+
+import numpy as np
+
+from refgi.splat.sii.reach.steps import ellipsoids
+from refgi.splat.sii.settings import SiiSettings
+from refgi.vectors.cases import sii
+from refgi.vectors.cases.plan import Plan, Plans, cases_of, recorded_plan
 from refgi.vectors.cases.scenes import AWAY, DOWN, SPOT, SUN, room
-from refgi.vectors.cases.sii import add_lit, drawn
-from refgi.vectors.cases.vpl import default_shifts
 from refgi.vectors.recipe import Recipe
+from refgi.vectors.recorded import record
 from refgi.vectors.spec import Case
-from refgi.vectors.stages.pairs import add_footprints
-from refgi.vectors.stages.sii_range import add_range
-from refgi.vectors.stages.sii_range_sum import add_ellipsoids
+
+EXPONENTS = (0.25, 1.0, 2.0, 3.0, 10.0, 40.0, 100.0, 1000.0)
 
 
 def settings_of(plan: Plan) -> SiiSettings:
-    """Return the settings of a plan, whose lights are Halton points; no clamp unless it says otherwise."""
-    return of(SiiSettings, **{"lights": plan.lights * len(plan.scene.lights), "clamp": "none", "cut": "relative",
-                              **plan.choices})
+    """Return the settings of a plan with the paper's cut, unless it says otherwise."""
+    return sii.settings_of(plan._replace(choices={"cut": "relative", **plan.choices}))
 
 
-def ranged(id: str, plan: Plan) -> Case:
-    """Return `sii` with a cut as planned: buffers, lights, ranges, sum."""
-    recipe, lamps, settings = Recipe(id, "sii", plan.what), len(plan.scene.lights), settings_of(plan)
-    add_lit(recipe, plan.scene, plan.size, plan.maps, drawn(plan.scene, plan.maps, plan.lights * lamps),
-            shifts=default_shifts(lamps))
-    if settings.pairs.needs_footprints:
-        add_footprints(recipe, lamps)
-    cut = settings.reach.cut
-    assert isinstance(cut, RelativeCut)
-    add_range(recipe, plan.lights * lamps, cut.share, cut.reference_length, settings.pairs)
-    add_ellipsoids(recipe)
+def bounds(id: str) -> Case:
+    """Return the bounds of regions by their exponents."""
+    recipe = Recipe(id, "sii", "ellipsoids around the region of lights and lobes of several exponents")
+    record(recipe, lambda: ellipsoids(np.array(EXPONENTS)))
     return recipe.case()
 
 
@@ -49,4 +44,10 @@ FULL_PLANS: Plans = {
 }
 
 
+def ranged(id: str, plan: Plan) -> Case:
+    """Return `sii` with a cut as planned."""
+    return recorded_plan(id, plan, "sii", settings_of(plan))
+
+
 QUICK, FULL = cases_of(QUICK_PLANS, ranged), cases_of(FULL_PLANS, ranged)
+QUICK["sii-range-bounds"] = partial(bounds, "sii-range-bounds")

@@ -5,12 +5,9 @@ from typing import Any
 from refgi.scene import Scene
 from refgi.settings import of
 from refgi.truth.settings import TruthSettings
+from refgi.vectors.cases.plan import Plan, recorded_plan
 from refgi.vectors.cases.scenes import BULB, SPOT, SUN, room
-from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
-from refgi.vectors.stages.buffers import add_gbuffer, give_scene
-from refgi.vectors.stages.direct import add_direct
-from refgi.vectors.stages.truth import add_truth
 
 SIZE = (20, 14)  # columns, rows
 PLAIN = {"estimator": "hemisphere", "directions": 64, "samples": 2048, "seed": 1}  # as a port would first write it
@@ -24,14 +21,9 @@ VIEWS: dict[str, tuple[Scene, TruthSettings]] = {
 
 
 def traced(id: str, what: str) -> Case:
-    """Return direct light and path-traced light of a scene."""
+    """Return path-traced light of a scene."""
     scene, settings = VIEWS[id]
-    recipe = Recipe(id, "truth", what)
-    give_scene(recipe, scene)
-    add_gbuffer(recipe, scene, *SIZE)
-    add_direct(recipe, scene, SIZE, "exact")
-    add_truth(recipe, scene, settings)
-    return recipe.case()
+    return recorded_plan(id, Plan(what, scene, SIZE, 1, shadows="exact"), "truth", settings)
 
 
 QUICK = {

@@ -1,30 +1,20 @@
 """Pixel lights with visibility, from the buffers to the sum."""
 
-from refgi.draws import PIXEL_LIGHTS, draws
 from refgi.settings import of
 from refgi.truth.vpl import VplSettings
-from refgi.vectors.cases.plan import Plan, Plans, cases_of
+from refgi.vectors.cases.plan import Plan, Plans, cases_of, recorded_plan
 from refgi.vectors.cases.scenes import AWAY, DOWN, SPOT, SUN, room
-from refgi.vectors.cases.sii import add_lit, drawn
-from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Case
-from refgi.vectors.stages.vpl import add_vpl
 
 
 def shadowed(id: str, plan: Plan) -> Case:
     """Return `vpl` as planned: buffers, lights, visibility by rays or maps, sum."""
-    recipe = Recipe(id, "vpl", plan.what)
-    lamps = len(plan.scene.lights)
-    add_lit(recipe, plan.scene, plan.size, plan.maps, drawn(plan.scene, plan.maps, plan.lights * lamps),
-            shifts=default_shifts(lamps))
-    add_vpl(recipe, plan.scene, of(VplSettings, **plan.choices))
-    return recipe.case()
+    return recorded_plan(id, plan, "vpl", settings_of(plan))
 
 
-def default_shifts(lamps: int) -> tuple[tuple[float, float], ...]:
-    """Return the shifts of the Halton points of each map that the methods take by default: none for the first map."""
-    drawn = [draws(0, PIXEL_LIGHTS, 2, index).tolist() for index in range(1, lamps)]
-    return ((0.0, 0.0), *((u, v) for u, v in drawn))
+def settings_of(plan: Plan) -> VplSettings:
+    """Return the settings of a case: so many lights of each map."""
+    return of(VplSettings, **{"lights": plan.lights * len(plan.scene.lights), **plan.choices})
 
 
 QUICK_PLANS: Plans = {

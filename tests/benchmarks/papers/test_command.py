@@ -65,6 +65,7 @@ def test_a_figure_that_fails_leaves_the_rest_and_exits_with_1(run, tmp_path):
     assert list(record["failures"]) == ["fig2"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_two_figures")
 @pytest.mark.parametrize(("arguments", "word"), [
     (["rsm"], "rsm"), (["sii", "--only", "fig9"], "fig9"), (["sii", "--only", ","], "none"),
@@ -94,6 +95,7 @@ def test_files_of_other_programs_are_spared(run, tmp_path):
     assert not (tmp_path / "a").exists()
 
 
+@pytest.mark.slow
 def test_the_readmes_example_runs_as_printed(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     line, = re.findall(r"^python -m benchmarks paper (.*)$", (ROOT / "README.md").read_text("utf-8"), re.MULTILINE)

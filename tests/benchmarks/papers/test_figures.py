@@ -18,7 +18,10 @@ KEYS = {"sii": ["fig4", "fig6", "fig7", "fig8", "fig11", "fig12", "table1", "tab
         "hssil": ["fig2", "fig4", "fig5", "fig6", "fig7", "fig8", "fig9", "temporal", "visibility", "error"]}
 
 
-@pytest.fixture(params=[pytest.param(name, marks=[pytest.mark.slow] if name != "sii" else []) for name in PAPERS])
+pytestmark = pytest.mark.slow  # whole papers are made
+
+
+@pytest.fixture(params=PAPERS)
 def name(request):
     return request.param
 

@@ -31,7 +31,7 @@ from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.settings import PRESETS, TemporalSettings
-from tests.benchmarks.papers.conftest import SMALL
+from tests.benchmarks.papers.conftest import table
 from tests.sssil.crown.counting import COUNTED, reads_of_levels
 
 pytestmark = pytest.mark.slow  # the whole paper is made
@@ -50,16 +50,6 @@ SHAPE = 0.02  # how far the coverage of a whole crown may be from one: circles c
 @pytest.fixture
 def figures(reproduced):
     return reproduced("hssil")[1]
-
-
-@pytest.fixture(scope="module")
-def bench():
-    return Workbench(SMALL)
-
-
-def table(figure, number=0):
-    """Return the rows of a table by their first cell."""
-    return {row[0]: dict(zip(figure.tables[number].columns, row, strict=True)) for row in figure.tables[number].rows}
 
 
 def test_the_papers_numbers_are_the_printed_ones(figures):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.papers.multires.subjects import BUILDERS
+from tests.benchmarks.papers.conftest import table
 
 pytestmark = pytest.mark.slow  # the whole paper is made
 
@@ -13,11 +14,6 @@ pytestmark = pytest.mark.slow  # the whole paper is made
 @pytest.fixture
 def figures(reproduced):
     return reproduced("multires")[1]
-
-
-def table(figure, number=0):
-    """Return the rows of a table by their first cell."""
-    return {row[0]: dict(zip(figure.tables[number].columns, row, strict=True)) for row in figure.tables[number].rows}
 
 
 def printed(figure, number=0):

@@ -14,6 +14,8 @@ from refgi.scene import load_scene
 from refgi.settings import of
 from tests.benchmarks.papers.conftest import SMALL
 
+pytestmark = pytest.mark.slow  # the whole paper is made
+
 AT_THE_RIM = 1e-4  # of the pairs: kernels decide in float32
 
 

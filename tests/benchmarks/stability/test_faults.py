@@ -50,6 +50,7 @@ def _fake(monkeypatch):
     monkeypatch.setitem(VICTIMS, "fake", Victim(["work"], patch=COMMAND))
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_and_leaves_nothing(tmp_path):
     faults, means = disk_faults("fake", (16, 4096), tmp_path / "sound")
     assert faults == []
@@ -59,6 +60,7 @@ def test_a_full_disk_is_told_and_leaves_nothing(tmp_path):
     assert any("exit 1" in fault for fault in faults)
 
 
+@pytest.mark.slow
 def test_little_memory_is_told(tmp_path):
     assert memory_faults("fake", (8, 1024), tmp_path / "sound") == []
     faults = memory_faults("fake", (8, 1024), tmp_path / "traceback", TRACEBACK)
@@ -66,11 +68,13 @@ def test_little_memory_is_told(tmp_path):
     assert faults[0].startswith("8 MiB: exit 1")
 
 
+@pytest.mark.slow
 def test_two_writers_of_one_temporary_name_are_found(tmp_path):
     assert writers_faults("fake", tmp_path / "sound") == []
     assert writers_faults("fake", tmp_path / "shared", SHARED) != []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("code", "said", "clear"), [
     (0, "done", True), (2, "refgi: out/a.exr: cannot be written", True), (2, "", False), (2, "no", False),
     (1, "refgi: out: unexpected", False), (-11, "", False), (2, "refgi: elsewhere", False),
@@ -91,6 +95,7 @@ def test_a_read_only_folder_cannot_be_written(tmp_path):
 NO_DIGEST = "import refgi.jit.kernelfile as k; k.verified = lambda content: memoryview(content)[:-k.DIGEST]"
 
 
+@pytest.mark.slow
 def test_a_damaged_kernel_that_is_not_noticed_is_a_breach(monkeypatch):
     monkeypatch.setitem(cache_faults.DAMAGES, True, 60)
     (row,) = cache_faults.damaged(True, lambda _: None)
@@ -99,6 +104,7 @@ def test_a_damaged_kernel_that_is_not_noticed_is_a_breach(monkeypatch):
     assert not row.passed  # taken for a kernel, or the end of the process
 
 
+@pytest.mark.slow
 def test_cold_starts_that_do_not_share_are_found():
     (row,) = cache_faults.cold_starts(True, lambda _: None)
     assert row.passed, row.detail

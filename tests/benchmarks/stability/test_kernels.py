@@ -6,12 +6,14 @@ import mpmath
 import numpy as np
 import pytest
 
-from benchmarks.stability import again, crown_ladders, elementary_range, kernels
+from benchmarks.stability import again, elementary_range, hssil, kernels
 from benchmarks.stability import ladder as ladders
 from benchmarks.stability.inputs import BLOCK, any_size, around, block_of, directions, sizes
 from benchmarks.stability.kernels import tasks
 from benchmarks.stability.ladder import conditions, errors, inputs_of, measure, rows
 from benchmarks.stability.maths import DIGITS, EXTENDED, spacing, trusted
+
+pytestmark = pytest.mark.slow  # tests/benchmarks/test_smoke.py runs a task of each part
 
 KNOWN = kernels.ladders()
 CASES = 2048  # enough for each fault below; 1e5 in the short form
@@ -233,15 +235,15 @@ def test_all_of_float32_catches_a_fault_in_one_pattern(name):
 
 
 def test_a_unit_that_is_no_power_of_two_shows(monkeypatch):
-    assert all(row.passed for row in crown_ladders.unit_rows(short=True))
-    first = crown_ladders.FORMS[0]
-    monkeypatch.setattr(crown_ladders, "FORMS", (lambda x: first(x * x.dtype.type(1.1)),))
-    monkeypatch.setattr(crown_ladders, "length_scale", lambda depth: 1 / depth.min())
-    found = list(crown_ladders.unit_rows(short=True))
+    assert all(row.passed for row in hssil.unit_rows(short=True))
+    first = hssil.FORMS[0]
+    monkeypatch.setattr(hssil, "FORMS", (lambda x: first(x * x.dtype.type(1.1)),))
+    monkeypatch.setattr(hssil, "length_scale", lambda depth: 1 / depth.min())
+    found = list(hssil.unit_rows(short=True))
     assert found[0].passed  # any factor before a power of 2
     assert not found[1].passed
-    monkeypatch.setattr(crown_ladders, "FORMS", (lambda x: first(x + x.dtype.type(1e-5)),))
-    assert not next(iter(crown_ladders.unit_rows(short=True))).passed
+    monkeypatch.setattr(hssil, "FORMS", (lambda x: first(x + x.dtype.type(1e-5)),))
+    assert not next(iter(hssil.unit_rows(short=True))).passed
 
 
 def test_tasks_are_of_one_name_each_and_rows_tell_how_to_see_them():

@@ -95,6 +95,7 @@ def _fake(monkeypatch):
     monkeypatch.setattr("benchmarks.stability.victims.digest", lambda file: file.read_text())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("patch", "wrong"), [("", set()), (TORN, {"torn"}), (LOSES, {"lost"}), (LEAVES, {"left"}),
                                               (OTHER, {"other"})], ids=["sound", "torn", "loses", "leaves", "other"])
 def test_what_kills_do_is_counted(patch, wrong):
@@ -106,6 +107,7 @@ def test_what_kills_do_is_counted(patch, wrong):
     assert patch or found.began > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_command_that_heeds_a_signal_and_those_that_do_not(number):
     with prepared("fake") as victim:

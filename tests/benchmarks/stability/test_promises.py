@@ -8,18 +8,19 @@ import pytest
 
 from benchmarks.stability import (
     again,
-    floor_promises,
+    buffers,
     kernels,
-    lobe_promises,
+    lobes,
     map_promises,
     promise,
     rays,
-    shadow_promises,
+    shadows,
     sum_promises,
-    unit_promises,
 )
 from benchmarks.stability.promise import Case, case_of, row_of
 from refgi.rays import Tracer
+
+pytestmark = pytest.mark.slow  # tests/benchmarks/test_smoke.py runs a task of each part
 
 KNOWN = kernels.promises() | rays.promises()
 FEW = {"sum.many": 1, "lobe.norm_bias": 2, "map.wide": 3, "buffers.unit": 4, "shadows.far": 3, "shadows.off_face": 3}
@@ -101,12 +102,12 @@ def test_sums_of_rounded_or_too_strong_lights_show(monkeypatch):
 
 
 def test_norms_that_are_off_to_one_side_show(monkeypatch):
-    plain = lobe_promises.filled
+    plain = lobes.filled
 
     def leaning(fill):
         return lambda x: plain(fill)(x) * (1 + 2.0**-52 * x[1])
 
-    monkeypatch.setattr(lobe_promises, "filled", leaning)
+    monkeypatch.setattr(lobes, "filled", leaning)
     assert not held("lobe.norm_bias")
 
 
@@ -114,14 +115,14 @@ def test_steps_that_know_a_length_show(monkeypatch):
     def faces(geometry, _, normal):
         return normal * (geometry.diagonal > 1e-6)
 
-    monkeypatch.setattr(unit_promises, "facing_normals", faces)
+    monkeypatch.setattr(buffers, "facing_normals", faces)
     assert not held("buffers.unit")
     assert "face normals" in row_of(KNOWN["buffers.unit"]._replace(brief=4), "kernels", short=True).detail
 
 
 @pytest.mark.parametrize("of", ["depth", "distance", "position"])
 def test_a_floor_that_is_off_or_has_holes_shows(of, monkeypatch):
-    plain = floor_promises.Frame
+    plain = buffers.Frame
 
     def off(share):
         def make(scene, **options):
@@ -133,9 +134,9 @@ def test_a_floor_that_is_off_or_has_holes_shows(of, monkeypatch):
 
         return make
 
-    monkeypatch.setattr(floor_promises, "Frame", off(1e-6))
+    monkeypatch.setattr(buffers, "Frame", off(1e-6))
     assert not held("floor.float32", 4)
-    monkeypatch.setattr(floor_promises, "Frame", off(1e-9))
+    monkeypatch.setattr(buffers, "Frame", off(1e-9))
     assert held("floor.float32", 4)
     assert not held("floor.float64", 4)
     assert not held("floor.holes", 4)
@@ -170,29 +171,29 @@ def test_a_triangle_that_is_cut_short_shows(monkeypatch):
 
 
 def test_shadows_where_there_are_none_show(monkeypatch):
-    plain = shadow_promises.receivers
+    plain = shadows.receivers
 
     def as_they_are(*arguments):
         to = plain(*arguments)
         return to._replace(origin=to.position)
 
-    monkeypatch.setattr(shadow_promises, "receivers", as_they_are)
+    monkeypatch.setattr(shadows, "receivers", as_they_are)
     assert not held("shadows.off_face")
-    monkeypatch.setattr(shadow_promises, "receivers", plain)
-    sums = shadow_promises.shadowed_sum
-    monkeypatch.setattr(shadow_promises, "shadowed_sum", lambda *a, **k: sums(*a, **k) * k.get("visibility", 2))
+    monkeypatch.setattr(shadows, "receivers", plain)
+    sums = shadows.shadowed_sum
+    monkeypatch.setattr(shadows, "shadowed_sum", lambda *a, **k: sums(*a, **k) * k.get("visibility", 2))
     with pytest.raises(AssertionError):
         held("shadows.far")
 
 
 def test_segments_that_end_upon_their_sender_show(monkeypatch):
-    plain = shadow_promises.shadowed_sum
+    plain = shadows.shadowed_sum
 
     def without_offset(tracer, to, lights, **options):
         return plain(tracer, to, lights._replace(position=lights.position - lights.normal * 1e-6 * np.abs(
             to.position).max()), **options)
 
-    monkeypatch.setattr(shadow_promises, "shadowed_sum", without_offset)
+    monkeypatch.setattr(shadows, "shadowed_sum", without_offset)
     assert not held("shadows.far")
 
 

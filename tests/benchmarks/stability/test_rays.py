@@ -7,6 +7,8 @@ from benchmarks.stability import again, rays
 from benchmarks.stability.meshes import MESHES, WITHIN, aimed_rays, places_upon, random_rays
 from refgi.rays import watertight
 
+pytestmark = pytest.mark.slow  # tests/benchmarks/test_smoke.py runs a task of each part
+
 COUNT = 2000
 
 

@@ -6,8 +6,10 @@ import pytest
 
 from benchmarks.stability import pictures, runner, sameness
 from benchmarks.stability.hostile import Hostile, hostile, shrunk
-from benchmarks.stability.tasks import Task
+from benchmarks.stability.promise import Task
 from refgi.stress.rows import Row, over_scenes
+
+pytestmark = pytest.mark.slow  # tests/benchmarks/test_smoke.py runs a task of each part
 
 PAGE = Path(runner.ROOT) / "docs" / "precision.md"
 

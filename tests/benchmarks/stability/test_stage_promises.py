@@ -10,12 +10,12 @@ import pytest
 from benchmarks.stability import (
     again,
     area_promises,
-    ground_promises,
-    height_ladders,
+    hssil,
     level_promises,
     place_promises,
     sampled_promises,
     sent_promises,
+    shadows,
     written_promises,
 )
 from benchmarks.stability.ladder import measure
@@ -24,11 +24,13 @@ from benchmarks.stability.promise import row_of
 from refgi.rays import ray_offset
 from refgi.scene import motion, repair
 
-PART = {ground_promises: "rays", written_promises: "files"}
-MODULES = (place_promises, sampled_promises, sent_promises, level_promises, area_promises, ground_promises,
+pytestmark = pytest.mark.slow  # tests/benchmarks/test_smoke.py runs a task of each part
+
+PART = {shadows: "rays", written_promises: "files"}
+MODULES = (place_promises, sampled_promises, sent_promises, level_promises, area_promises, shadows,
            written_promises)
 PROMISES = {one.name: (one, PART.get(module, "kernels")) for module in MODULES for one in module.PROMISES}
-LADDERS = {one.name: one for module in (sent_promises, height_ladders, level_promises, area_promises)
+LADDERS = {one.name: one for module in (sent_promises, hssil, level_promises, area_promises)
            for one in module.LADDERS}
 FEW = 12  # cases
 

@@ -8,7 +8,7 @@ import pytest
 from refgi.cluster.clustering.kmeans import Clustering, cluster, in_use, mean_angle
 from refgi.cluster.clustering.metric import angle
 from refgi.errors import InputError
-from refgi.literal.val_areas import kmeans, kmeans_assign, kmeans_start
+from refgi.literal.val_areas import kmeans_assign, kmeans_rounds, kmeans_start
 from refgi.stages import observe
 
 MODES = ("raw", "normalised", "squared")
@@ -50,7 +50,7 @@ def test_the_rounds_are_those_of_the_literal_text(mode, evidence):
         given = position, unit_vectors(normal)
         start = kmeans_start(*given, count)
         for rounds in (50, ours.rounds):
-            center, axis, of = kmeans(*given, box(1.7), *start, mode, *WEIGHTS, rounds)
+            center, axis, of = kmeans_rounds(*given, box(1.7), *start, mode, *WEIGHTS, rounds)
             np.testing.assert_array_equal(ours.of, of)
             np.testing.assert_allclose(ours.center, center, rtol=0, atol=ROUNDING)
             np.testing.assert_allclose(ours.normal, axis, rtol=0, atol=ROUNDING)

@@ -8,10 +8,12 @@ from refgi.cluster.settings import BoxBlur, GeometryBlur
 from refgi.jit import threads
 from refgi.literal import val_filters as literal
 from refgi.pairs.irradiance import Receivers
+from refgi.rsm.buffers.extent import Extent
 
 ROUNDING = 1e-12  # of means of some dozen float64 values, relative to the largest
 ROUNDING_SINGLE = 2e-6  # the same of float32: 64 differences, half a unit of rounding each
 DIAGONAL = 10.0  # m: an extent of 1 m as published
+BOX = Extent(np.zeros(3), np.array([DIAGONAL, 0, 0]))
 BETWEEN = 0.103  # of the diagonal: no two pixels of `rough` are this far apart, so that rounding does not decide
 
 
@@ -46,15 +48,15 @@ def test_equals_the_literal_text(height, width, side, evidence):
     rng = np.random.default_rng(height)
     to, light = rough(rng, height, width), rng.random((3, height, width))
     plain, full = (blurred(light, *to, side, BETWEEN * DIAGONAL, 0.8, every) for every in (False, True))
-    error, farther = (np.abs(blur(light, to, side, GeometryBlur(BETWEEN, 0.8, every), DIAGONAL) - expected).max()
+    error, farther = (np.abs(blur(light, to, side, GeometryBlur(BETWEEN, 0.8, every), BOX) - expected).max()
                       for every, expected in ((False, plain), (True, full)))
     evidence(f"{width} x {height}, n = {side}: {error:.1e} off the literal text, {farther:.1e} with every subset")
     assert max(error, farther) < ROUNDING
     assert (np.abs(full - plain).max() > 0.05) == (side > 1 and height > side)
     # any normal: what has no surface has none, and is to be left out for that
     around = blurred(light, *to, side, BETWEEN * DIAGONAL, -np.inf, every_subset=True)
-    assert np.abs(blur(light, to, side, GeometryBlur(BETWEEN, -1.0), DIAGONAL) - around).max() < ROUNDING
-    box = blur(light, to, side, BoxBlur(), DIAGONAL)
+    assert np.abs(blur(light, to, side, GeometryBlur(BETWEEN, -1.0), BOX) - around).max() < ROUNDING
+    box = blur(light, to, side, BoxBlur(), BOX)
     assert np.abs(box - blurred(light, *to, side, np.inf, -2.0)).max() < ROUNDING
 
 
@@ -72,9 +74,9 @@ def test_a_step_along_one_axis_parts_two_surfaces(axis, sign, across, evidence):
     normal[axis - 1] = 1
     to, light = Receivers(position, normal, np.ones((16, 24), bool)), rng.random((3, 16, 24))
     expected, every = blurred(light, *to, 8, 1.0, 0.8), blurred(light, *to, 8, 1.0, 0.8, every_subset=True)
-    error = max(np.abs(blur(light, to, 8, GeometryBlur(every_subset=some), DIAGONAL) - picture).max()
+    error = max(np.abs(blur(light, to, 8, GeometryBlur(every_subset=some), BOX) - picture).max()
                 for some, picture in ((False, expected), (True, every)))
-    mixed = np.abs(blur(light, to, 8, BoxBlur(), DIAGONAL) - expected).max()
+    mixed = np.abs(blur(light, to, 8, BoxBlur(), BOX) - expected).max()
     evidence(f"axis {axis}, {sign:+d}: {error:.0e} off the literal text, where a mean of all is {mixed:.2f} off")
     assert error < ROUNDING
     assert mixed > 0.05
@@ -86,7 +88,7 @@ def test_a_constant_stays_to_the_bit(real, evidence):
     rng = np.random.default_rng(3)
     for to in (plane(33, 70, real), rough(rng, 33, 70, real)):
         light = np.broadcast_to(np.array([0.1, 1 / 3, 7e5], real).reshape(3, 1, 1), to.position.shape)
-        result = blur(light, to, 8, GeometryBlur(), DIAGONAL)
+        result = blur(light, to, 8, GeometryBlur(), BOX)
         assert np.array_equal(result, np.where(to.covered, light, 0))
     evidence("constant field: 0 bits of difference")
 
@@ -99,8 +101,8 @@ def test_nothing_leaks_across_an_edge(evidence):
     deep = flat._replace(position=flat.position - 1.5 * np.array([0, 0, 1], np.float32).reshape(3, 1, 1) * right)
     turned = flat._replace(normal=np.where(right, np.array([1, 0, 0], np.float32).reshape(3, 1, 1), flat.normal))
     for to in (deep, turned):
-        assert np.array_equal(blur(light, to, 8, GeometryBlur(), DIAGONAL), light)
-    assert not np.array_equal(blur(light, flat, 8, GeometryBlur(), DIAGONAL), light)
+        assert np.array_equal(blur(light, to, 8, GeometryBlur(), BOX), light)
+    assert not np.array_equal(blur(light, flat, 8, GeometryBlur(), BOX), light)
     evidence("a step of 1e7 across an edge in depth, in normal: 0 bits leak")
 
 
@@ -112,7 +114,8 @@ def test_without_comparisons_where_bounds_decide(real):
     below = to._replace(normal=to.normal.copy())
     below.normal[:, 60:] = np.array([1, 0, 0]).reshape(3, 1, 1)
     for side in (8, 5):
-        alike, compared = (blur(light, some, side, GeometryBlur(), 100.0) for some in (to, below))
+        large = BOX._replace(high=10 * BOX.high)
+        alike, compared = (blur(light, some, side, GeometryBlur(), large) for some in (to, below))
         assert np.array_equal(alike[:, :56], compared[:, :56])
         assert not np.array_equal(alike[:, 57:], compared[:, 57:])
 
@@ -123,8 +126,8 @@ def test_single_precision_and_threads():
     to, light = rough(rng, 50, 150), rng.random((3, 50, 150)).astype(np.float32)
     near = Receivers(to.position.astype(np.float32), to.normal.astype(np.float32), to.covered)
     with threads(1):
-        one = blur(light, near, 8, GeometryBlur(BETWEEN), DIAGONAL)
-    assert np.array_equal(one, blur(light, near, 8, GeometryBlur(BETWEEN), DIAGONAL))
+        one = blur(light, near, 8, GeometryBlur(BETWEEN), BOX)
+    assert np.array_equal(one, blur(light, near, 8, GeometryBlur(BETWEEN), BOX))
     position, extent = near.position.astype(np.float64), BETWEEN * DIAGONAL
     exact = blurred(light, position, near.normal, near.covered, 8, extent, 0.8, every_subset=True)
     off = np.abs(one - exact).max(axis=0)
@@ -144,8 +147,8 @@ def test_beside_an_edge_every_subset_counts_once(edge, evidence):
     light = np.where(ahead, subset, 100.0 + subset) * np.ones((3, 1, 1))
     mean = np.where(ahead, 31.5, 131.5)
     settings = GeometryBlur(extent=0.25)  # 2.5 m: farther along the surface, not across the step
-    left_out = np.abs(blur(light, to, 8, GeometryBlur(0.25, every_subset=False), DIAGONAL) - mean).max()
-    error = np.abs(blur(light, to, 8, settings, DIAGONAL) - mean).max()
+    left_out = np.abs(blur(light, to, 8, GeometryBlur(0.25, every_subset=False), BOX) - mean).max()
+    error = np.abs(blur(light, to, 8, settings, BOX) - mean).max()
     evidence(f"{edge} edge: off by {error:.0e} of subsets 0 to 63, by {left_out:.1f} without those that windows miss")
     assert error < ROUNDING * 200
     assert left_out > 1

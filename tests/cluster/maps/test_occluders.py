@@ -183,5 +183,6 @@ def test_light_ends_where_the_camera_looks_and_where_it_begins():
     corners = scene.geometry.vertices[np.unique(scene.geometry.faces[seen])]
     ends = ends_of(frame, lights)
     np.testing.assert_array_equal(ends.points, np.concatenate([corners, lights.position.T.astype(float)]))
-    assert ends.extent is frame.extent
+    assert ends.visible is frame.visible_extent
+    assert all(map(np.array_equal, ends.extent, frame.extent))
     assert ends.illuminated is frame.illuminated_extent

@@ -15,6 +15,7 @@ from refgi.cluster.reference.rays import rectangle_points
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
+from refgi.literal.val import Maps, shadows
 from refgi.literal.val_back_projection import CELLS
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
@@ -22,7 +23,6 @@ from refgi.settings import of, replaced
 from tests.cluster.reference.edge import SETTINGS as EDGE
 from tests.cluster.reference.edge import receivers, square_light
 from tests.cluster.reference.edge import scene as edge_scene
-from tests.literal.shadows import Seen, projected
 from tests.naive import truth
 
 # nothing near six large clusters, so that rays to a rectangle and one view from its centre meet the same surfaces
@@ -84,11 +84,12 @@ def test_the_map_projected_back_hides_the_points_that_the_literal_text_hides(box
     for m in np.flatnonzero(maps.map_of >= 0):
         k, ahead = maps.map_of[m], np.flatnonzero(height_above(areas, m, points) > 0)
         some = np.random.default_rng(m).choice(ahead, RECEIVERS)
-        seen = Seen(maps.center[k], maps.frame[k], maps.depth[k], maps.scene_far[k])
-        area = SimpleNamespace(axes=areas.axes[m], side=areas.side[:, m], offset=areas.offset[:, m],
-                               center=areas.center[:, m])
+        seen = Maps(*(one[k : k + 1] for one in (maps.depth, maps.center, maps.frame, maps.scene_far)))
+        area = SimpleNamespace(axes=areas.axes[[m]], side=areas.side[:, [m]], offset=areas.offset[:, [m]],
+                               center=areas.center[:, [m]], normal=maps.frame[k, 2][:, None], delta=areas.delta[[m]])
         found += list(given(m, points[:, some], facing[:, some]))
-        off += list(found[-RECEIVERS:] - projected(seen, area, points[:, some], facing[:, some]))
+        pixels = points[:, None, some], np.zeros((1, RECEIVERS), int), facing[:, None, some]
+        off += list(found[-RECEIVERS:] - shadows("back_projection", *pixels, area, seen)[0][0, 0])
     partly = np.count_nonzero((np.array(found) > 0) & (np.array(found) < 1))
     evidence(f"map of {size}^2: {len(off)} receivers, {partly} of them in a penumbra: V at most "
              f"{np.abs(off).max() * CELLS**2:.1f} of {CELLS**2} points off the literal text")

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from refgi import stages
+from refgi.frame import compose
 from refgi.rsm import gbuffer, leaving_radiance
 from refgi.scene import Camera, Material, material_table
 from tests.rsm.shapes import geometry, soup
@@ -26,3 +28,9 @@ def test_radiance_equals_its_definition(dtype, emission):
         radiance = leaving_radiance(direct, more, seen, materials)
         np.testing.assert_array_equal(radiance, arriving * seen.albedo / dtype(np.pi) + emitted)
         assert radiance.dtype == dtype
+        with stages.observe(record=True, steps=True) as log:
+            compose(direct, more, seen, materials)
+        made = log.runs[0].steps
+        np.testing.assert_array_equal(made, radiance)
+        assert [run.name for run in log.runs if run.name.startswith("rsm.")] == [
+            *(["rsm.emission"] if any(emission) else []), "rsm.leaving_radiance"]

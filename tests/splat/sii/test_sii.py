@@ -70,6 +70,7 @@ def test_irradiance_does_not_depend_on_the_number_of_lights(plates, evidence):
     evidence("mean of 200 random sets against all texels: " + ", ".join(found))
 
 
+@pytest.mark.slow("{'pattern': 'random'}")
 @pytest.mark.feature("SII-13")
 @pytest.mark.parametrize("how", [{"pattern": "random"}, {"pattern": "random", "warp": "A", "warp_levels": 2}], ids=str)
 def test_no_lamps_light_depends_on_the_number_of_lights(how, evidence):

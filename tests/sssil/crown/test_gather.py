@@ -44,10 +44,11 @@ def summed(level, sampling, index, form, share):
         level.position, level.normal, level.radiance, level.area))
     if (form, share) == ("disc", 1.0):
         return literal.gather(position, normal, radiance, area, offsets, weight)
+    if form == "disc":
+        return literal.gather_shared(position, normal, position, normal, radiance, area, offsets, weight, share)
     i, j, texels = literal.samples_at(level.shape, offsets, weight)
     pairs = position[..., None], normal[..., None], position[:, i, j], normal[:, i, j]
-    factor = (literal.shared_disc_form_factor(*pairs, area[i, j], texels, share) if form == "disc" else
-              literal.point_form_factor(*pairs, area[i, j] * texels))
+    factor = literal.point_form_factor(*pairs, area[i, j] * texels)
     return (factor * radiance[:, i, j]).sum(axis=-1)
 
 

@@ -41,6 +41,7 @@ def texel_sum(form):
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.feature("HSS-04")
 def test_few_samples_are_unbiased(evidence):
     """Analytic and statistical: a constant plane, 16 samples in a crown and 5 within, and Eq. 4 dark."""
@@ -58,6 +59,7 @@ def test_few_samples_are_unbiased(evidence):
     evidence(f"{SAMPLES} samples over every texel: {', '.join(found)}")
 
 
+@pytest.mark.slow("1.0")
 @pytest.mark.feature("HSS-04")
 @pytest.mark.parametrize("share", [0.25, 1.0])
 def test_a_disc_of_a_share_is_as_dark_as_that(share, evidence):

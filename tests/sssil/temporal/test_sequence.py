@@ -51,6 +51,7 @@ def test_a_method_without_seed_is_asked_as_it_is(room):
     assert len(list(Sequence([room] * 2, plain, method=light, **QUICK))) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.feature("HSS-13")
 def test_only_what_the_next_frame_needs_is_kept(room, evidence):
     x, y, z = room.camera.eye

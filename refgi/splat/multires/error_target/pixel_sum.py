@@ -80,13 +80,7 @@ def shadowed_by_rays(tracer: "Tracer", geometry: "Geometry", buffer: "GBuffer", 
 
 
 class Peaks:
-    """What pairs give beyond a bound, in place of all they give; counts them.
-
-    Parameters
-    ----------
-    most : float
-        The bound of a pair's strongest channel, W/m^2.
-    """
+    """What pairs give beyond `most`, a bound of their strongest channel (W/m^2), not all they give; counts them."""
 
     def __init__(self, most: float) -> None:
         self._most, self.pairs = most, 0

@@ -30,12 +30,8 @@ SQUARE = 32  # cells along a square within which listed pixels keep together
 class ExactIrradiance:
     """Irradiance of pixels in full, each evaluated at most once.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        The picture's points.
-    sum_at : callable
-        Takes covered pixels, n flat indices, and returns their irradiance, (3, n), W/m^2, in the type of the points.
+    `sum_at` takes covered pixels, n flat indices, and returns their irradiance, (3, n), W/m^2, in the type of the
+    points.
     """
 
     def __init__(self, receivers: Receivers, sum_at: Callable[[Array], Array]) -> None:
@@ -64,14 +60,7 @@ class ExactIrradiance:
 class Trials:
     """Refinement of a picture by one threshold after the other.
 
-    Parameters
-    ----------
-    exact : ExactIrradiance
-        Irradiance evaluated so far.
-    near : NearLight
-        The part of near pairs that no interpolation carries.
-    levels : tuple of SurfaceLevel
-        Surfaces, from level 0; two or more.
+    `near` is the part of near pairs that no interpolation carries; `levels` are two or more, from level 0.
     """
 
     def __init__(self, exact: ExactIrradiance, near: NearLight, levels: tuple[SurfaceLevel, ...]) -> None:

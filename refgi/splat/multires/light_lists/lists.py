@@ -92,9 +92,9 @@ def _refine(
             _store_sums(tile, size, irradiance, first, lane_max)
         end, largest = stop, lane_max.max()
         if last > 0:
-            end = _keep_split(cells, cell, child, irradiance, start, last, threshold[0] + threshold[1] * largest)
+            end = keep_split(cells, cell, child, irradiance, start, last, threshold[0] + threshold[1] * largest)
         start, last = last, end
-        stop = _append_children(cells.first, cell, start, last)
+        stop = append_children(cells.first, cell, start, last)
     lists.entries[b], lists.largest[b] = last, largest
 
 
@@ -137,7 +137,7 @@ def _store_sums(tile: Array, size: int, irradiance: Array, first: int, lane_max:
 
 
 @kernel
-def _append_children(first: Array, cell: Array, start: int, last: int) -> int:
+def append_children(first: Array, cell: Array, start: int, last: int) -> int:
     """Append the children of the entries start to last - 1; return where they end."""
     stop = last
     for n in range(start, last):
@@ -148,7 +148,7 @@ def _append_children(first: Array, cell: Array, start: int, last: int) -> int:
 
 
 @kernel
-def _keep_split(
+def keep_split(
     cells: ReceiverTree, cell: Array, child: Array, irradiance: Array, start: int, last: int, threshold: Any
 ) -> int:
     """Drop the appended children of the entries that need no split; return where the list ends."""

@@ -42,7 +42,13 @@ BATCH_BYTES = 1 << 28  # bytes for the lists of a batch of lights, unless one li
 SMALL_PICTURE = 1 << 18  # pixels up to which threads would wait for each other longer than they upsample one light
 
 
-@stage("multires.per_light")
+def _steps(*arguments: Any, **named: Any) -> Array:
+    from refgi.splat.multires.light_lists.steps import per_light_steps
+
+    return per_light_steps(*arguments, **named)
+
+
+@stage("multires.per_light", steps=_steps)
 def per_light(
     buffer: "GBuffer", lights: "PixelLights", settings: "ByIrradiance", pairs: "PairSettings",
     footprint: Array | None = None, start: Subsplats | None = None, *, filter_all: bool = False,
@@ -239,7 +245,8 @@ def _each_light(
     receivers = Receivers(points[:, None], normals[:, None], np.ones((1, points.shape[1]), np.bool_))
     packed = checked(receivers, lights, pairs, footprint)
     lobe_clamp, widening = (None, None) if packed.lobes is None else packed.lobes[1:]
-    lights_apart, threshold = single_lights(packed), _threshold(cells, lights, settings, at_roots)
+    lights_apart = single_lights(packed)
+    threshold = threshold_of(points.dtype.type, settings.threshold, settings.form, lights.position.shape[1], at_roots)
     count = len(packed.shines)
     batch = _batch_lists(count, points)
     chosen, values = np.empty(points.shape[1], np.int32), np.empty_like(points)
@@ -262,22 +269,21 @@ def _batch_lists(lights: int, points: Array) -> SubsplatLists:
     return empty_lists(count, points.shape[1], points.dtype)
 
 
-def _threshold(
-    cells: ReceiverTree, lights: "PixelLights", settings: "ByIrradiance", at_roots: Callable[[], Array]
+def threshold_of(
+    real: Any, threshold: float, form: str, count: int, at_roots: Callable[[], Array]
 ) -> tuple[Any, Any]:
-    """Return (a, b) of T = a + b times the largest irradiance of a light's samples.
+    """Return (a, b) of T = a + b times the largest irradiance of a light's samples, of `count` lights.
 
     `at_roots` returns the sum of all lights at the coarsest cells, (3, n).
     """
-    real = cells.points.dtype.type
-    value, zero = real(settings.threshold), real(0.0)
+    value, zero = real(threshold), real(0.0)
     if value == 0:  # splits every cell, those whose quadrants are all equal too
         return real(-1.0), zero
-    if settings.form == "relative":
+    if form == "relative":
         return zero, value
-    if settings.form == "absolute":
+    if form == "absolute":
         return value, zero
-    return value * at_roots().max(initial=zero) / real(max(1, lights.position.shape[1])), zero
+    return value * at_roots().max(initial=zero) / real(max(1, count)), zero
 
 
 @kernel(parallel=True)

@@ -39,7 +39,7 @@ CHUNK = 4096  # cells that a thread takes at once
 
 @stage("multires.depth_ranges")
 def depth_ranges(depth: Array, covered: Array, top: int, rim: int = 0) -> Mipmap:
-    """Return the least and largest depth within each cell (Sec. 3.2.1).
+    """Return the least and largest depth within each cell (AMS Sec. 3.2.1).
 
     Parameters
     ----------
@@ -54,8 +54,10 @@ def depth_ranges(depth: Array, covered: Array, top: int, rim: int = 0) -> Mipmap
 
     Returns
     -------
-    Mip
-        Levels of (h_l, w_l), m.
+    low : tuple of (h_l, w_l) ndarray
+        Least depth in each cell, m; inf where empty.
+    high : tuple of (h_l, w_l) ndarray
+        Largest depth in each cell, m; -inf where empty.
     """
     mip = _ranges(np.ascontiguousarray(depth)[None], covered, top, rim)
     low, high = (tuple(level[0] for level in side) for side in (mip.low, mip.high))
@@ -63,8 +65,8 @@ def depth_ranges(depth: Array, covered: Array, top: int, rim: int = 0) -> Mipmap
 
 
 @stage("multires.normal_ranges")
-def normal_ranges(normal: Array, covered: Array, top: int, rim: int = 0) -> Mipmap:
-    """Return the least and largest of each component of the normals within each cell (Sec. 3.2.2).
+def normal_ranges(normal: Array, covered: Array, top: int, rim: int = 0, components: int = 3) -> Mipmap:
+    """Return the least and largest of each component of the normals within each cell (AMS Sec. 3.2.2).
 
     Parameters
     ----------
@@ -76,13 +78,17 @@ def normal_ranges(normal: Array, covered: Array, top: int, rim: int = 0) -> Mipm
         Coarsest level.
     rim : int
         Pixels around a cell that count too (Fig. 15 top).
+    components : int
+        How many count: x, y and z, or the first two.
 
     Returns
     -------
-    Mip
-        Levels of (3, h_l, w_l).
+    low : tuple of (xyz, h_l, w_l) ndarray
+        Least component of normals in each cell; inf where empty.
+    high : tuple of (xyz, h_l, w_l) ndarray
+        Largest component of normals in each cell; -inf where empty.
     """
-    return _ranges(np.ascontiguousarray(normal), covered, top, rim)
+    return _ranges(np.ascontiguousarray(normal[:components]), covered, top, rim)
 
 
 def _ranges(plane: Array, covered: Array, top: int, rim: int) -> Mipmap:
@@ -150,7 +156,13 @@ def _over_columns(least: Array, most: Array, rim: int, low: Array, high: Array) 
             high[j] = max(high[j], max(most[2 * j + k], most[2 * j + 2 * rim + 1 - k]))
 
 
-@stage("multires.criteria")
+def _steps(buffer: "GBuffer", criteria: "Criteria", top: int, finest: int = 0) -> tuple[Array, ...]:
+    from refgi.splat.multires.refinement.steps import discontinuity_steps
+
+    return discontinuity_steps(buffer, criteria, top, finest)
+
+
+@stage("multires.criteria", steps=_steps)
 def discontinuities(buffer: "GBuffer", criteria: "Criteria", top: int, finest: int = 0) -> tuple[Array, ...]:
     """Return which cells of each level hold a discontinuity.
 
@@ -227,8 +239,7 @@ def _by_level(settings: "DepthCriterion", sizes: Array, begin: int) -> Iterator[
 def _mark_by_normal(
     buffer: "GBuffer", settings: "NormalRange", rim: int, sizes: Array, discontinuous: Array, begin: int
 ) -> None:
-    components = buffer.normal if settings.components == "xyz" else buffer.normal[:2]
-    mip = normal_ranges(components, buffer.covered, len(sizes) - 1, rim)
+    mip = normal_ranges(buffer.normal, buffer.covered, len(sizes) - 1, rim, len(settings.components))
     mark_normal_ranges(mip.lows, mip.highs, settings, discontinuous, begin)
 
 

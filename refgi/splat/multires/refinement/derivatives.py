@@ -34,7 +34,7 @@ BESIDE, DISTANCE, BELOW = range(3)
 
 @stage("multires.depth_slopes")
 def depth_slopes(depth: Array, covered: Array, top: int, relative: bool = True) -> Mipmap:
-    """Return the steepest change of depth within each cell, sqrt((dz/dx)^2 + (dz/dy)^2), over z (Sec. 3.2.1).
+    """Return the steepest change of depth within each cell, sqrt((dz/dx)^2 + (dz/dy)^2), over z (AMS Sec. 3.2.1).
 
     Parameters
     ----------
@@ -49,8 +49,8 @@ def depth_slopes(depth: Array, covered: Array, top: int, relative: bool = True) 
 
     Returns
     -------
-    Mip
-        Levels of (h_l, w_l), 1/pixel, or m/pixel if not relative; a max mip.
+    high : tuple of (h_l, w_l) ndarray
+        The larger of both differences along each axis, 1/pixel, or m/pixel if not relative.
 
     Notes
     -----
@@ -64,7 +64,7 @@ def depth_slopes(depth: Array, covered: Array, top: int, relative: bool = True) 
 
 @stage("multires.curvatures")
 def curvatures(normal: Array, position: Array, covered: Array, top: int, rate: bool = False) -> Mipmap:
-    """Return the largest change of normal between neighbouring pixels within each cell (Eq. 1).
+    """Return the largest change of normal between neighbouring pixels within each cell (AMS Eq. 1; E-AMS-01).
 
     Parameters
     ----------
@@ -81,8 +81,8 @@ def curvatures(normal: Array, position: Array, covered: Array, top: int, rate: b
 
     Returns
     -------
-    Mip
-        Levels of (h_l, w_l), 0 to 2, or 1/m for a rate; a max mip.
+    high : tuple of (h_l, w_l) ndarray
+        Largest length of N1 - N2, 0 to 2; for a rate over that of x1 - x2, 1/m.
 
     Notes
     -----

@@ -45,8 +45,6 @@ class Subsplats(NamedTuple):
 def level_shape(height: int, width: int, level: int) -> tuple[int, int]:
     """Return rows and columns of a level, cells cut by the border included.
 
-    Examples
-    --------
     >>> level_shape(100, 65, 6)
     (2, 2)
     """
@@ -56,8 +54,6 @@ def level_shape(height: int, width: int, level: int) -> tuple[int, int]:
 def top_level(height: int, width: int, coarsest: int) -> int:
     """Return the coarsest level: the first whose longer side has at most `coarsest` cells (16 in the paper).
 
-    Examples
-    --------
     >>> top_level(1024, 1024, 16)
     6
     """
@@ -93,7 +89,7 @@ def representative(covered: Array, level: int, i: int, j: int) -> int:
 
 @stage("multires.representatives")
 def representatives(covered: Array, top: int) -> tuple[Array, ...]:
-    """Return the representative pixel of each cell of each level.
+    """Return the representative pixel of each cell of each level (E-AMS-11).
 
     Parameters
     ----------
@@ -105,7 +101,8 @@ def representatives(covered: Array, top: int) -> tuple[Array, ...]:
     Returns
     -------
     tuple of (h_l, w_l) ndarray of int32
-        Flat indices for levels 0 to `top`; -1 where a cell shows no surface.
+        Row * columns + column of the picture, of the pixel right and below of the cell's centre; where it shows no
+        surface the nearest that does, the first of several; -1 where the cell shows none. Levels 0 to `top`.
     """
     height, width = covered.shape
     places = tuple(np.empty(level_shape(height, width, level), np.int32) for level in range(top + 1))

@@ -34,12 +34,15 @@ class Mipmap(NamedTuple):
         """Coarsest level."""
         return len(self.high) - 1
 
+    def recorded(self) -> dict[str, dict[str, Array]]:
+        """Return both sides by level, without level 0, which is no cell's: what a log keeps."""
+        sides = {"low": self.low, "high": self.high}
+        return {side: {str(level): levels[level] for level in range(1, len(levels))} for side, levels in sides.items()}
+
 
 def layout(height: int, width: int, top: int, first: int = 0) -> Array:
     """Return first element, rows and columns of levels 0 to `top`, (top + 1, 3) int64; levels below `first` are empty.
 
-    Examples
-    --------
     >>> layout(4, 3, top=1).tolist()
     [[0, 4, 3], [12, 2, 2]]
     """

@@ -93,7 +93,13 @@ class _Columns(NamedTuple):
     leaf: Array  # (n,) bool, levels 0 to top
 
 
-@stage("multires.refine")
+def _steps(*arguments: Any, **named: Any) -> dict[str, Array]:
+    from refgi.splat.multires.refinement.steps import refine_steps
+
+    return refine_steps(*arguments, **named)
+
+
+@stage("multires.refine", steps=_steps)
 def refine(
     discontinuous: tuple[Array, ...], covered: Array, diagonal: Diagonal = "corner",
     traversal: Traversal = "single_pass",

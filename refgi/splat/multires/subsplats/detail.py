@@ -17,7 +17,7 @@ Array = npt.NDArray[Any]
 def surface_detail(
     irradiance: Array, position: Array, normal: Array, covered: Array, eye: npt.ArrayLike, a: float
 ) -> Array:
-    """Darken what faces away from the camera: E (a <V, N> + 1 - a) (Eq. 3).
+    """Darken what faces away from the camera: E (a <V, N> + 1 - a) (AMS Eq. 3).
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def surface_detail(
         World space, m; unit normal on the camera's side.
     covered : (h, w) ndarray of bool
         Whether there is a surface.
-    eye : (3,) array_like
+    eye : (3,) or (1, 3) array_like
         Where the camera is, m.
     a : float
         How much, 0 (nothing changes) to 1; the paper shows 0.5.
@@ -49,7 +49,8 @@ def surface_detail(
     """
     expect(0 <= a <= 1, "a", "a share from 0 to 1", a)
     result = np.empty_like(irradiance, order="C")
-    _modulate(irradiance, position, normal, covered, np.asarray(eye, position.dtype), float(a), result)
+    _modulate(irradiance, position, normal, covered, np.asarray(eye, position.dtype).reshape(3), float(a),
+              result)
     return result
 
 

@@ -36,7 +36,13 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 
-@stage("multires.representative_points")
+def _point_steps(*arguments: Any, **named: Any) -> tuple[Array, Array]:
+    from refgi.splat.multires.subsplats.steps import point_steps
+
+    return point_steps(*arguments, **named)
+
+
+@stage("multires.representative_points", steps=_point_steps)
 def representative_points(
     buffer: "GBuffer", subsplats: Subsplats, representative: Representative = "pixel"
 ) -> tuple[Array, Array]:
@@ -71,7 +77,13 @@ def points_of(
     return points, normals
 
 
-@stage("multires.evaluate")
+def _evaluate_steps(*arguments: Any, **named: Any) -> Array:
+    from refgi.splat.multires.subsplats.steps import evaluate_steps
+
+    return evaluate_steps(*arguments, **named)
+
+
+@stage("multires.evaluate", steps=_evaluate_steps)
 def evaluate(
     points: Array, normals: Array, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None,
     lightcuts: Lightcuts | None = None,
@@ -107,6 +119,14 @@ def evaluate(
     Eq. 2 prints the vector to the light from the wrong end, both BRDFs and a pi. Here a light holds the flux it
     reflects, and the receiver's albedo/pi is multiplied in after upsampling, pixel by pixel.
     """
+    return sum_at(points, normals, lights, settings, footprint, lightcuts)
+
+
+def sum_at(
+    points: Array, normals: Array, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None,
+    lightcuts: Lightcuts | None = None,
+) -> Array:
+    """Return the sum of `evaluate`."""
     count = points.shape[1]
     receivers = Receivers(points[:, None], normals[:, None], np.ones((1, count), np.bool_))
     packed = checked(receivers, lights, settings, footprint, lightcuts)
@@ -148,7 +168,13 @@ def _average_cell(
     normals[0, k], normals[1, k], normals[2, k] = p / length, q / length, r / length
 
 
-@stage("multires.evaluate_visible")
+def _visible_steps(*arguments: Any, **named: Any) -> Array:
+    from refgi.splat.multires.subsplats.ray_steps import visible_steps
+
+    return visible_steps(*arguments, **named)
+
+
+@stage("multires.evaluate_visible", steps=_visible_steps)
 def evaluate_visible(
     tracer: "Tracer", geometry: Geometry, buffer: "GBuffer", subsplats: Subsplats, lights: "PixelLights"
 ) -> Array:
@@ -201,7 +227,13 @@ def ray_receivers(tracer: "Tracer", geometry: Geometry, buffer: "GBuffer", pixel
                      tracer.grain)
 
 
-@stage("multires.evaluate_shadowed")
+def _shadowed_steps(*arguments: Any, **named: Any) -> Array:
+    from refgi.splat.multires.subsplats.shadow_steps import shadowed_steps
+
+    return shadowed_steps(*arguments, **named)
+
+
+@stage("multires.evaluate_shadowed", steps=_shadowed_steps)
 def evaluate_shadowed(
     frame: "Frame", buffer: "GBuffer", subsplats: Subsplats, lights: "PixelLights", settings: "ValSettings",
     footprint: Array | None = None,

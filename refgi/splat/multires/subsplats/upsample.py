@@ -79,7 +79,13 @@ def _sort(level: Array, row: Array, bases: Array, starts: Array, order: Array) -
         places[key] += 1
 
 
-@stage("multires.upsample")
+def _steps(*arguments: Any, **named: Any) -> Array:
+    from refgi.splat.multires.subsplats.steps import upsample_steps
+
+    return upsample_steps(*arguments, **named)
+
+
+@stage("multires.upsample", steps=_steps)
 def upsample(
     values: Array, subsplats: Subsplats, covered: Array, mode: Upsampling = "tent", *, filter_all: bool = False,
     corner_rule: bool = True,
@@ -122,15 +128,33 @@ def upsample(
     expect(mode in get_args(Upsampling), "mode", " or ".join(map(repr, get_args(Upsampling))), mode)
     expect(values.shape == (3, len(subsplats.level)), "values", f"shape (3, {len(subsplats.level)})", values.shape)
     expect(covered.shape == subsplats.shape, "covered", f"shape {subsplats.shape}", covered.shape)
-    values, covered = np.ascontiguousarray(values), np.ascontiguousarray(covered)
+    return picture_of(np.ascontiguousarray(values), subsplats, np.ascontiguousarray(covered), mode, filter_all,
+                      corner_rule)
+
+
+def picture_of(
+    values: Array, subsplats: Subsplats, covered: Array, mode: Upsampling, filter_all: bool, corner_rule: bool
+) -> Array:
+    """Return the picture of `upsample`."""
     if mode == "tent":
         return _tent(values, subsplats, covered, filter_all, corner_rule)
     if mode == "demo":
         return _demo(values, subsplats, covered, filter_all)
-    result = np.zeros((3, *covered.shape), values.dtype)
     if mode == "nearest":
-        _fill_nearest(values, subsplats.level, subsplats.row, subsplats.column, covered, result)
-        return result
+        return of_own_subsplat(values, subsplats.level, subsplats.row, subsplats.column, covered)
+    return interpolated_apart(values, subsplats, covered)
+
+
+def of_own_subsplat(values: Array, level: Array, row: Array, column: Array, covered: Array) -> Array:
+    """Return the picture (3, h, w) in which each pixel has the irradiance of its subsplat."""
+    result = np.zeros((3, *covered.shape), values.dtype)
+    _fill_nearest(values, level, row, column, covered, result)
+    return result
+
+
+def interpolated_apart(values: Array, subsplats: Subsplats, covered: Array) -> Array:
+    """Return the sum (3, h, w) of all layers, each interpolated as if it were black where it holds nothing."""
+    result = np.zeros((3, *covered.shape), values.dtype)
     for level in map(int, np.flatnonzero(subsplats.counts)):
         _add_level(_layer(values, subsplats, level), level, covered, result)
     return result

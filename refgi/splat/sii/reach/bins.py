@@ -33,24 +33,11 @@ PLACE, BACK, SHIFT, AXIS, ACROSS, FLATNESS, BALL, SQUARE, SOLID_ROWS = 0, 3, 6, 
 
 
 def pack_solids(solids: Solids, back: Array, *, hollow: bool = False, nearest: bool = False) -> Array:
-    """Pack the solids of lights for the lists.
+    """Pack the solids of lights for the lists, (SOLID_ROWS, N), in the dtype of the reversed normals `back`, (3, N).
 
-    Parameters
-    ----------
-    solids : Solids
-        The lights' bounds.
-    back : (3, N) ndarray
-        Reversed normals of the lights; their dtype is that of the result.
-    hollow : bool
-        Leave the ellipsoids aside: only what lies behind surfaces is left out.
-    nearest : bool
-        Bound B by the box's nearest point too; for diffuse lights.
-
-    Returns
-    -------
-    (SOLID_ROWS, N) ndarray
-        Position, reversed normal, centre less position, axis, 1 / h^2, 1 / w^2 - 1 / h^2, radius^2 of the half ball
-        (0: none), R_0^2 to bound B with (else infinite).
+    Rows: position, reversed normal, centre less position, axis, 1 / h^2, 1 / w^2 - 1 / h^2, radius^2 of the half ball
+    (0: none), R_0^2 to bound B with (else infinite). `hollow` leaves the ellipsoids aside: only what lies behind
+    surfaces is left out. `nearest` bounds B by the box's nearest point too; for diffuse lights.
     """
     radius, ellipsoid = np.sqrt(solids.square), solids.ellipsoid
     packed = np.zeros((SOLID_ROWS, len(radius)))

@@ -37,22 +37,9 @@ class Solids(NamedTuple):
 def appendix_ellipsoid(exponent: npt.ArrayLike) -> Ellipsoid:
     """Return the paper's ellipsoid: centred where F is largest, as high as F there and wide enough for [0, 1].
 
-    Parameters
-    ----------
-    exponent : (...) array_like
-        n >= 0.
+    It encloses the significant region for every exponent n >= 0 (E-SII-13). Eq. 8 reads n/(n+2) (n+2)/4 in print; the
+    second fraction is an exponent.
 
-    Returns
-    -------
-    Ellipsoid
-        It encloses the significant region for every n (E-SII-13).
-
-    Notes
-    -----
-    Eq. 8 reads n/(n+2) (n+2)/4 in print; the second fraction is an exponent.
-
-    Examples
-    --------
     >>> [round(float(value), 6) for value in appendix_ellipsoid(2.0)]  # the sphere of diameter R_0
     [0.5, 0.5, 0.5]
     """
@@ -68,22 +55,9 @@ def appendix_ellipsoid(exponent: npt.ArrayLike) -> Ellipsoid:
 def tangent_ellipsoid(exponent: npt.ArrayLike, tangent_point: float = TANGENT_POINT) -> Ellipsoid:
     """Return the ellipsoid through the light that touches the significant region at x_0; Eq. 8's for n < 2.
 
-    Parameters
-    ----------
-    exponent : (...) array_like
-        n >= 0.
-    tangent_point : float
-        x_0 in (0.4, 1], in R_0.
-
-    Returns
-    -------
-    Ellipsoid
-        It encloses the significant region for every n.
-
-    Notes
-    -----
-    With b = 2n / (n + 2), F^2 = x g(x) and g = x^(b-1) - x is concave for n >= 2: it lies below its tangent g(x_0) -
-    k (x - x_0), k = 1 - (b - 1) x_0^(b-2), and x times a falling line is an ellipse through the origin (E-SII-13).
+    It encloses the region for every exponent n >= 0; `tangent_point` x_0 lies in (0.4, 1], in R_0. With b = 2n / (n +
+    2), F^2 = x g(x) and g = x^(b-1) - x is concave for n >= 2: it lies below its tangent g(x_0) - k (x - x_0), k = 1 -
+    (b - 1) x_0^(b-2), and x times a falling line is an ellipse through the origin (E-SII-13).
     """
     n = np.asarray(exponent, np.float64)
     plain = appendix_ellipsoid(n)

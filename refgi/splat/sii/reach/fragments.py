@@ -48,20 +48,8 @@ class Fragments(NamedTuple):
 
 
 def gather_bits(pixels: int, samples: int) -> int:
-    """Return the bits that gathering reads for its samples, P S 112.
+    """Return the bits that gathering reads, P S 112 for P pixels that take S texels each.
 
-    Parameters
-    ----------
-    pixels, samples : int
-        Pixels that gather, and texels each takes.
-
-    Returns
-    -------
-    int
-        Bits.
-
-    Examples
-    --------
     >>> gather_bits(512 * 512, 308) // 8 // 2**20  # MB
     1078
     """
@@ -72,26 +60,10 @@ def fragments(
     receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None,
     projection: "Projection | None" = None,
 ) -> Fragments:
-    """Count the pairs of light and pixel that `splat` keeps, and those it evaluates.
+    """Count the pairs of light and pixel that `splat` keeps, and those it evaluates, of the arguments of `splat`.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        Points to light.
-    lights : PixelLights
-        Lights.
-    settings : SiiSettings
-        The parts `reach` and `pairs`.
-    footprint : (N,) ndarray, optional
-        As for `splat`.
-    projection : Projection, optional
-        As for `splat`.
-
-    Returns
-    -------
-    Fragments
-        Overdraw and fragments depend on the threshold alone, pairs evaluated on the bound as well. Lobes are counted
-        in float64: at the edge of their range a pair may count here and not in the sum, or the reverse.
+    Overdraw and fragments depend on the threshold alone, pairs evaluated on the bound as well. Lobes are counted in
+    float64: at the edge of their range a pair may count here and not in the sum, or the reverse.
     """
     packed = checked(receivers, lights, settings.pairs, footprint)
     overdraw, of_light, evaluated = np.zeros(receivers.covered.shape, np.int32), np.zeros(len(packed.shines), int), 0

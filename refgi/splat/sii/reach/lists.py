@@ -29,25 +29,8 @@ EVERY = slice(None)
 class LightLists:
     """The range of all lights of a picture, and lists of lights for any of its receivers.
 
-    Parameters
-    ----------
-    packed : Packed
-        The lights.
-    settings : SiiSettings
-        The parts `reach` and `pairs`.
-    outside : bool
-        Sum what the cut loses; every light is then listed everywhere.
-    width : int
-        Of the picture, in pixels.
-    projection : Projection or None
-        The camera's map.
-
-    Attributes
-    ----------
-    low : float
-        I_low, W/m^2.
-    diffuse, lobes : Range or None
-        Of the packed diffuse lights (with the black one) and lobes; None where there are none.
+    `outside` sums what the cut loses: every light is then listed everywhere. `low` is I_low, W/m^2; `diffuse` and
+    `lobes` the ranges of the packed diffuse lights (with the black one) and lobes, None where there are none.
     """
 
     def __init__(

@@ -87,7 +87,7 @@ def with_reference_length(receivers: Receivers, lights: "PixelLights", settings:
         cut, reference_length=length)))
 
 
-@stage("sii.reference_length")
+@stage("sii.picture_length")
 def reference_length(receivers: Receivers, lights: "PixelLights", pairs: PairSettings) -> float:
     """Return the length under which lights cut at 5 % count at 125 / 768 of the pixels on average.
 
@@ -105,6 +105,11 @@ def reference_length(receivers: Receivers, lights: "PixelLights", pairs: PairSet
     float
         Length, m; 1 where there is nothing to cut.
     """
+    return picture_length(receivers, lights, pairs)
+
+
+def picture_length(receivers: Receivers, lights: "PixelLights", pairs: PairSettings) -> float:
+    """Return what `reference_length` does, unobserved."""
     packed = pack(lights, pairs, np.zeros(lights.flux.shape[1]), np.float64)
     position = sample_for(receivers, lights, least=LEAST_SAMPLED).position.astype(np.float64)
     step = 1 + lights.flux.shape[1] * LEAST_SAMPLED // PAIRS

@@ -31,27 +31,10 @@ ROUNDING = 1e-4  # of the axes, that receivers may be off: where a face touches 
 
 
 def screen_quads(projection: "Projection", position: Array, radius: Array) -> Array:
-    """Return the rectangles of pixels that see into balls.
+    """Return the rectangles of pixels that see into balls: top, bottom, left, right, (4, N) float64.
 
-    Parameters
-    ----------
-    projection : Projection
-        One perspective map.
-    position : (3, N) ndarray
-        Centres, m.
-    radius : (N,) ndarray
-        Radii, m.
-
-    Returns
-    -------
-    (4, N) ndarray of float64
-        Top, bottom, left and right in texel coordinates (centres at + 1/2), infinite where the eye is inside the ball;
-        top > bottom for a ball behind the eye.
-
-    Raises
-    ------
-    InputError
-        If the map is no single perspective one.
+    Centres (3, N) and radii (N,), m. In texel coordinates (centres at + 1/2); infinite where the eye is inside the
+    ball, top > bottom for a ball behind the eye. `InputError` unless the map is a single perspective one.
     """
     from refgi.rsm.raster.projection import PERSPECTIVE
 
@@ -105,20 +88,10 @@ def tiles_of_pixels(mask: Array, places: Array) -> Array:
 
 @cache
 def sphere_mesh(faces: int) -> tuple[Array, Array]:
-    """Return a mesh whose vertices lie on the unit ball.
+    """Return a mesh of unit vectors (n, 3) on the unit ball and its triangles (faces, 3), int32.
 
-    Parameters
-    ----------
-    faces : int
-        8: the octahedron; 20: the icosahedron; 80, 320, 1280: that with each face cut in four, the new vertices moved
-        out to the ball.
-
-    Returns
-    -------
-    vertices : (n, 3) ndarray
-        Unit vectors.
-    triangles : (faces, 3) ndarray of int32
-        Vertices of each face.
+    8 faces: the octahedron; 20: the icosahedron; 80, 320, 1280: that with each face cut in four, the new vertices moved
+    out to the ball.
     """
     if faces == 8:
         vertices = np.concatenate([np.eye(3), -np.eye(3)])
@@ -130,22 +103,8 @@ def sphere_mesh(faces: int) -> tuple[Array, Array]:
 
 
 def inflation(vertices: Array, triangles: Array) -> float:
-    """Return the factor by which a mesh about the origin must grow to enclose the unit ball.
+    """Return the factor by which a mesh about the origin must grow to enclose the unit ball: 1 / its nearest plane.
 
-    Parameters
-    ----------
-    vertices : (n, 3) ndarray
-        Corners.
-    triangles : (m, 3) ndarray
-        Faces.
-
-    Returns
-    -------
-    float
-        One over the distance of the nearest face's plane.
-
-    Examples
-    --------
     >>> [round(inflation(*sphere_mesh(faces)), 4) for faces in (8, 20, 80, 320, 1280)]
     [1.7321, 1.2584, 1.0705, 1.0181, 1.0045]
     """

@@ -33,24 +33,10 @@ DIFFUSE, GLOSSY = 0, 1  # parts of a light, which have each their own xi
 
 
 def low_irradiance(lights: "PixelLights", settings: SiiSettings) -> float:
-    """Return I_low = x max I_0 / L_ref^2, or the absolute one.
+    """Return I_low = x max I_0 / L_ref^2, or the absolute one, W/m^2; 0 without lights or without a cut.
 
-    Parameters
-    ----------
-    lights : PixelLights
-        Lights; the peak of a lobe is its flux times its norm.
-    settings : SiiSettings
-        The parts `reach` and `pairs`.
-
-    Returns
-    -------
-    float
-        Irradiance, W/m^2; 0 without lights or without a cut.
-
-    Notes
-    -----
-    Settings without a reference length get one from `with_reference_length`.
-    With `per_light_ilow` this is the I_low of the brightest light.
+    The peak of a lobe is its flux times its norm. Settings without a reference length get one from
+    `with_reference_length`. With `per_light_ilow` this is the I_low of the brightest light.
     """
     packed = pack(lights, settings.pairs, np.zeros(lights.flux.shape[1]), np.float64)
     return threshold(np.concatenate(all_peaks(packed)), settings.reach)

@@ -20,9 +20,9 @@ from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.settings import Criteria
 from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
+from tests.literal.whole.multires import upsampled
 from tests.naive import eq2
 from tests.naive import per_light as naive
-from tests.naive.multires import upsampled
 from tests.pairs import sets
 from tests.splat.multires.choices import by_irradiance, unclamped
 
@@ -109,7 +109,7 @@ def by_hand(buffer, lights, settings, threshold, shared=None):
         cells = naive.subsplats(covered, irradiance_at, top, settings.subsplats.finest, threshold, shared)
         for level, _, _ in cells:
             counts[level] += 1
-        total += upsampled(covered, top, "tent", frozenset(), cells)
+        total += upsampled(covered, top, "tent", cells)
     return total, counts
 
 
@@ -244,7 +244,7 @@ def test_levels_of_two_lights_cannot_be_added_before_upsampling():
             place = int(tree.level[c]), int(tree.row[c]), int(tree.column[c])
             merged[place] = merged.get(place, 0.0) + np.full(3, value)
     np.testing.assert_allclose(together, sum(summed(buffer, alone(both, k), settings) for k in range(2)), rtol=TWIN)
-    added_before = upsampled(buffer.covered, 3, "tent", frozenset(), merged)[0].sum()
+    added_before = upsampled(buffer.covered, 3, "tent", merged)[0].sum()
     assert added_before < 0.95 * together[0].sum()
 
 

@@ -90,7 +90,7 @@ def test_a_picture_is_that_of_its_length_given_by_hand(change):
     with observe() as log:
         light = quietly(sii, at, settings)
     np.testing.assert_array_equal(light, quietly(sii, at, by_hand))
-    assert log.status("sii.reference_length") == ["ran"]
+    assert log.status("sii.picture_length") == ["ran"]
     longer = replaced(by_hand, {"reference_length": 1.02 * by_hand.reach.cut.reference_length})
     assert (light != quietly(sii, at, longer)).any()
 

@@ -1,0 +1,178 @@
+"""Ladders of sharp lobes: norms to exponents of 1e20, a term of the sum over lobes, drawn directions; norms on average.
+
+Formulas are those of docs/radiometry.md: the lobe c <r . w>^P with c = (P + 1) / (2 pi K). For P of a million and more
+K = 1 - erfc(sqrt(-(a - 1/4) ln(1 - c^2))) / 2, a = (P + 1) / 2; below it is an incomplete beta function.
+
+About the horizon the continued fraction of a norm loses digits: some P/3 ULP, as its terms are 1 less almost 1. That is
+rounding, to either side alike; a fraction which is cut too early, or a wrong term, is off to one side.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.stability.inputs import BLOCK, across, directions, sizes
+from benchmarks.stability.ladder import Ladder
+from benchmarks.stability.maths import DIGITS, digits, dot
+from benchmarks.stability.pair_ladders import LEAST, each_of, norm, norms
+from benchmarks.stability.promise import Case, Promise
+from refgi.jit import kernel
+from refgi.lobes import lobe_direction
+from refgi.pairs.lobe_culling import LIMIT, bound_lobes
+from refgi.pairs.lobe_sum import EXPONENT, RATIO, add_lobe
+from refgi.pairs.pair_sum import NX, SUM, Clamp, X
+
+Array = npt.NDArray[Any]
+ROWS = max(EXPONENT, RATIO) + 1
+SHARP, SHARPEST = 1e6, 1e20
+SMALLEST, STEP = 2.0**-126, 2.0**-149  # a lobe below this share of its peak is 0; of subnormal float32 numbers
+EDGE = 8 * 2.0**-24  # of the light's plane, within which rounding may decide
+
+
+@kernel
+def _terms(lights: Array, to: Array, limits: Array, clamp: Any, tile: Array, out: Array) -> None:
+    for i in range(lights.shape[1]):
+        for row in range(6):
+            tile[row, 0] = to[row, i]
+        tile[SUM, 0] = 0
+        add_lobe(tile, (np.uint64(0), np.uint64(1)), lights, i, limits[i], clamp, None, None)
+        out[0, i] = tile[SUM, 0]
+
+
+def draw_sharp(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    """Return cosines within the width of the lobe off the horizon, to where 1e-11 of it is left, and exponents."""
+    exponent = sizes(rng, SHARP, SHARPEST)
+    near = np.exp(rng.uniform(np.log(1e-6), np.log(6.6), BLOCK)) * rng.choice([-1.0, 1.0], BLOCK)
+    return np.stack([near / np.sqrt(exponent), exponent])
+
+
+def sharp_norm(m: Any, x: Any) -> Any:
+    s = m.sqrt(((x[1] + 1) / 2 - m.number(np.float64(0.25))) * -m.log1p(-x[0] * x[0]))
+    half = np.frompyfunc(digits.erfc, 1, 1)(s) / 2
+    fraction = np.where(x[0] >= 0, 1 - half, half)
+    return [np.where(fraction > LEAST, (x[1] + 1) / (2 * m.pi * fraction), 0 * x[0])]
+
+
+def draw_middle(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    """Return cosines about the horizon and exponents of some thousand to a million."""
+    exponent = sizes(rng, 1e3, 0.999e6)
+    cosine = rng.uniform(-5, 5, BLOCK) / np.sqrt(exponent)
+    return np.stack([cosine, exponent])
+
+
+def draw_terms(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    """Return d, reversed normal and axis of the light, normal of the receiver and P: mostly where the lobe is seen."""
+    w = directions(rng)
+    exponent = sizes(rng, 1e-3, 1e8)
+    gap = np.minimum(np.exp(rng.uniform(np.log(1e-3), np.log(50), BLOCK)) / exponent, rng.uniform(0, 1, BLOCK))
+    side = across(rng, w)
+    axis = w * (1 - gap) + side * np.sqrt(gap * (2 - gap))
+    normals = directions(rng), directions(rng)
+    normals = [n * np.sign((n * w).sum(axis=0)) for n in normals]
+    return np.concatenate([w * sizes(rng, 1e-6, 1e6), normals[0], axis, normals[1], exponent[None]])
+
+
+def terms(x: Array) -> Array:
+    n, real = x.shape[1], x.dtype.type
+    lights = np.concatenate([x[:9], x[12:], np.ones((3, n), real)])
+    to = np.concatenate([np.zeros((3, n), real), x[9:12]])
+    assert (X, NX) == (0, 3)
+    out, tile = np.empty((1, n), real), np.zeros((ROWS, 1), real)
+    limits = bound_lobes(np.ascontiguousarray(x[12]), -1.0)[LIMIT]
+    _terms(lights, to, limits, Clamp(real(0), np.zeros(n, real), real(np.inf)), tile, out)
+    return out
+
+
+def _shape(m: Any, x: Any) -> Any:
+    d = x[:3]
+    square = dot(d, d)
+    length = m.sqrt(square)
+    off = [r - w / length for r, w in zip(x[6:9], d, strict=True)]
+    h = dot(off, off) / 2
+    inside = np.where(h < 1, h, 0)
+    above = dot(d, x[3:6]) / length
+    power = np.where((h < 1) & (above > 0), m.exp(x[12] * m.log1p(-inside)), 0 * h)
+    return square, h, above, power, np.maximum(dot(d, x[9:12]) / length, 0)
+
+
+def term(m: Any, x: Any) -> Any:
+    square, _, _, power, cosine = _shape(m, x)
+    return [power * cosine / square]
+
+
+def term_bound(m: Any, x: Any, real: Any) -> Any:  # noqa: ARG001
+    """What `add_lobes` promises of a float32 term; beyond it what is lost among subnormal numbers."""
+    square, h, _, power, cosine = _shape(m, x)
+    h = np.minimum(h, 0.999)
+    value = power * cosine / square
+    rounding = value * (17 + 5 * -x[12] * m.log1p(-h) / m.log(m.number(np.float64(2))) + 6.5 * x[12] * (
+        m.sqrt(2 * h) + h) / (1 - h)) + 4 * power / square
+    return rounding * 2.0**-24 + 2 * SMALLEST / square + 4 * STEP
+
+
+def undecided(m: Any, x: Any, real: Any) -> Any:  # noqa: ARG001
+    """Whether rounding may decide on which side of the light's plane or of h = 1 a pair lies: then nothing counts."""
+    _, h, above, _, _ = _shape(m, x)
+    return np.where((abs(above) < EDGE) | (abs(h - 1) < 1e-3), np.inf, 0.0)
+
+
+def draw_samples(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    """Return points of the unit square, those near u = 0 and u = 1 among them, and exponents."""
+    u = rng.random(BLOCK)
+    kind = rng.integers(0, 4, BLOCK)
+    small = sizes(rng, 1e-300, 0.5)
+    u = np.select([kind == 0, kind == 1], [small, 1 - np.minimum(sizes(rng, 1e-16, 0.5), 0.5)], np.maximum(u, 1e-18))
+    exponent = np.where(rng.random(BLOCK) < 0.02, 0.0, sizes(rng, 1e-3, SHARPEST))
+    return np.stack([u, rng.random(BLOCK), exponent])
+
+
+def sample(m: Any, x: Any) -> Any:
+    gap = 1 - m.exp(m.log(x[0]) / (x[2] + 1))
+    across_axis, phi = m.sqrt(gap * (2 - gap)), 2 * m.pi * x[1]
+    return [across_axis * m.cos(phi), across_axis * m.sin(phi), 1 - gap]
+
+
+def sample_unit(m: Any, x: Any, real: Any) -> Any:  # noqa: ARG001
+    """One ULP of the length across the axis for what lies across it, of 1 for what lies along it."""
+    gap = 1 - m.exp(m.log(x[0]) / (x[2] + 1))
+    side = m.sqrt(gap * (2 - gap)) * 2.0**-52
+    return np.stack([side, side, 0 * gap + 2.0**-52])
+
+
+SAMPLES = 100
+SIGMAS = 6.0
+
+
+def bias(rng: np.random.Generator) -> Case:
+    """Return by how many of its standard errors the mean error of some norms of almost one exponent is off 0."""
+    middle = 10 ** rng.uniform(2, 4.5)
+    exponent = middle * rng.uniform(1, 1.5, SAMPLES)
+    widths = 1.7 + 0.2 * rng.random(SAMPLES)  # of the lobe off the horizon: there the fraction has the most terms
+    x = np.stack([-widths / np.sqrt(exponent), exponent])
+    got = norms(x)[0]
+    exact = norm(DIGITS, [DIGITS.number(row) for row in x])[0]
+    error = np.array([float(DIGITS.number(np.array([g]))[0] / e - 1) for g, e in zip(got, exact, strict=True)])
+    error /= 2.0**-52 * (1 + exponent / 3)
+    deviation = float(error.std(ddof=1)) / np.sqrt(SAMPLES)
+    return Case(abs(float(error.mean())) / deviation, f"exponents {middle:.0f} and more: mean {error.mean():.3g} "
+                                                      f"(1 + P / 3) ULP, standard error {deviation:.2g}")
+
+
+LADDERS = (
+    Ladder("lobe.norm_sharp", "P 1e6 .. 1e20, to 6.6 widths of the lobe off the horizon", draw_sharp, norms,
+           sharp_norm, 12.0, source="12 roundings of the exponent, erfc and the norm", extended=0, exact=4000),
+    Ladder("lobe.norm_middle", "P 1e3 .. 1e6, to 5 widths of the lobe off the horizon", draw_middle, norms,
+           norm, reals=("float32",), extended=0, exact=1000, brief_exact=40),
+    Ladder("lobe.term", "P 1e-3 .. 1e8, r 1e-6 .. 1e6 m, mostly where the lobe is seen", draw_terms, terms, term, 1.0,
+           source="the bound that add_lobes promises", conditioned=False, scale=term_bound, floor=undecided,
+           reals=("float32",), extended=2_000_000, brief=BLOCK),
+    Ladder("lobe.sample", "u 1e-300 .. 1 - 1e-16, P 0 .. 1e20", draw_samples, each_of(lobe_direction, 3, 3), sample,
+           12.0, source="4 roundings of 1 - z and its root, 2 of an angle of up to 2 pi, sine and cosine",
+           conditioned=False, scale=sample_unit, reals=("float64",), extended=0, lowest=-1.000001, brief_exact=1000),
+)
+PROMISES = (
+    Promise("lobe.norm_bias", "float64 norms, mean error", "lobe.norm", "P 100 .. 45,000, 1.7 to 1.9 widths of the "
+            "lobe below the horizon", bias, "standard errors", SIGMAS, "statistics",
+            "6 standard errors of 100 values: 200 such means pass it once in 100,000 runs", 200, 8),
+)

@@ -1,0 +1,251 @@
+"""Area lights one step after the other: the first rounds of k-means, the rest of them, rectangles (VAL Sec. 5.1, 6)."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.clustering.kmeans import Clustering, assigned, cluster, first_lights, moved
+from refgi.cluster.clustering.rectangle import rectangles
+from refgi.cluster.settings import AreaLightSettings, Axes, Distance, KMeansSettings
+from refgi.cluster.settings import Extent as Size
+from refgi.pairs.pixel_lights import PixelLights
+from refgi.rsm.buffers.extent import Extent
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+ROUNDS = 2  # of k-means that are shown one by one
+
+
+@stage("cluster.kmeans_start", kept=False)
+def kmeans_start(position: Array, normal: Array, count: int) -> tuple[Array, Array]:
+    """Begin cluster k at light floor(k N / M) (VAL Sec. 5.1; docs/methods/val).
+
+    Parameters
+    ----------
+    position : (3, light) ndarray
+        Places of the lights, m.
+    normal : (3, light) ndarray
+        Their unit normals.
+    count : int
+        Clusters, M.
+
+    Returns
+    -------
+    center : (3, cluster) ndarray
+        Centres at which clusters begin, m.
+    axis : (3, cluster) ndarray
+        Their unit normals.
+    """
+    first = first_lights(position.shape[1], count)
+    return position[:, first], normal[:, first]
+
+
+@stage("cluster.kmeans_assign", kept=False, each="round")
+def kmeans_assign(
+    position: Array, normal: Array, illuminated: Extent, center: Array, axis: Array, distance: Distance, w_x: float,
+    w_a: float,
+) -> tuple[Array, Array]:
+    """Find each light's nearest cluster, the lowest index of equally near ones (VAL Sec. 5.1, E-VAL-11).
+
+    Parameters
+    ----------
+    position : (3, light) ndarray
+        Places of the lights, m.
+    normal : (3, light) ndarray
+        Their unit normals.
+    illuminated : Extent
+        Box of what reflects direct light, in shares of whose diagonal distances are.
+    center : (3, cluster) ndarray
+        Centres, m.
+    axis : (3, cluster) ndarray
+        Their unit normals.
+    distance : {"normalised", "raw", "squared"}
+        d = w_x dx / diagonal + w_a angle / pi; in metres and radians; by squares.
+    w_x, w_a : float
+        Weights of distance and of angle.
+
+    Returns
+    -------
+    of : (light,) int ndarray
+        Nearest cluster.
+    distance : (light,) ndarray
+        Its distance d.
+    """
+    return assigned(position, normal, center, axis, distance, (w_x, w_a), _diagonal(illuminated))
+
+
+@stage("cluster.kmeans_means", kept=False, each="round")
+def kmeans_means(position: Array, normal: Array, of: Array, center: Array, axis: Array) -> tuple[Array, Array]:
+    """Move clusters to the means of their lights; without lights a cluster stays (VAL Sec. 5.1; docs/methods/val).
+
+    Parameters
+    ----------
+    position : (3, light) ndarray
+        Places of the lights, m.
+    normal : (3, light) ndarray
+        Their unit normals.
+    of : (light,) int ndarray
+        C(i): cluster of each light.
+    center : (3, cluster) ndarray
+        Centres before, m.
+    axis : (3, cluster) ndarray
+        Their unit normals.
+
+    Returns
+    -------
+    center : (3, cluster) ndarray
+        Means of the lights' places, m.
+    axis : (3, cluster) ndarray
+        Mean directions of their normals, unit vectors.
+    """
+    return moved(position, normal, of, center, axis)
+
+
+@stage("cluster.kmeans_rounds", kept=False)
+def kmeans_rounds(
+    position: Array, normal: Array, illuminated: Extent, center: Array, axis: Array, distance: Distance, w_x: float,
+    w_a: float, rounds: int,
+) -> tuple[Array, Array, Array]:
+    """Run further rounds until no light changes its cluster (VAL Sec. 5.1; docs/methods/val).
+
+    Parameters
+    ----------
+    position : (3, light) ndarray
+        Places of the lights, m.
+    normal : (3, light) ndarray
+        Their unit normals.
+    illuminated : Extent
+        Box of what reflects direct light.
+    center : (3, cluster) ndarray
+        Centres before, m.
+    axis : (3, cluster) ndarray
+        Their unit normals.
+    distance : {"normalised", "raw", "squared"}
+        As in the rounds before.
+    w_x, w_a : float
+        Weights of distance and of angle.
+    rounds : int
+        Most of them.
+
+    Returns
+    -------
+    center : (3, cluster) ndarray
+        Mean of each cluster's lights, m.
+    normal : (3, cluster) ndarray
+        Mean direction of their normals, unit vectors.
+    of : (light,) int ndarray
+        C(i): cluster of each light.
+    """
+    count, total = center.shape[1], position.shape[1]
+    start = Clustering(np.asarray(center, np.float64), np.asarray(axis, np.float64), np.zeros(count, np.int64),
+                       np.zeros(total, np.int32), 0, np.zeros(1))
+    made = cluster(position, normal, count, distance=distance, weights=(w_x, w_a),
+                          diagonal=_diagonal(illuminated), rounds=rounds, start=start)
+    return made.center, made.normal, made.of
+
+
+@stage("cluster.kmeans_each", kept=False)
+def kmeans_each(position: Array, normal: Array) -> tuple[Array, Array, Array]:
+    """Let each light be a cluster, coincident ones too, where as many are asked for as there are (VAL Sec. 5.1).
+
+    Parameters
+    ----------
+    position : (3, light) ndarray
+        Places of the lights, m.
+    normal : (3, light) ndarray
+        Their normals.
+
+    Returns
+    -------
+    center : (3, cluster) ndarray
+        Place of each cluster's light, m.
+    normal : (3, cluster) ndarray
+        Its unit normal.
+    of : (light,) int ndarray
+        C(i): cluster of each light.
+    """
+    made = cluster(position, normal, position.shape[1], diagonal=1.0)
+    return made.center, made.normal, made.of
+
+
+def kmeans_steps(
+    position: Array, normal: Array, count: int, settings: KMeansSettings, illuminated: Extent
+) -> dict[str, Array]:
+    """Return clusters, made by steps."""
+    if count >= position.shape[1]:
+        center, axis, of = kmeans_each(position, normal)
+    else:
+        metric = settings.distance, settings.position_weight, settings.normal_weight
+        center, axis = kmeans_start(position, normal, count)
+        shown = min(ROUNDS, settings.rounds - 1)
+        for _ in range(shown):
+            of, _ = kmeans_assign(position, normal, illuminated, center, axis, *metric)
+            center, axis = kmeans_means(position, normal, of, center, axis)
+        center, axis, of = kmeans_rounds(position, normal, illuminated, center, axis, *metric,
+                                         settings.rounds - shown)
+    return {"center": center, "normal": axis, "of": of}
+
+
+@stage("cluster.areas", kept=False)
+def areas(
+    position: Array, center: Array, normal: Array, of: Array, axes: Axes, extent: Size, unbiased: bool,
+    footprint: Array | None = None,
+) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
+    """Bound each cluster's lights by a rectangle in its plane (VAL Sec. 6, E-VAL-10).
+
+    Parameters
+    ----------
+    position : (3, light) ndarray
+        Places of the lights, m.
+    center : (3, cluster) ndarray
+        Centres, m.
+    normal : (3, cluster) ndarray
+        Their unit normals.
+    of : (light,) int ndarray
+        C(i): cluster of each light.
+    axes : {"fixed", "pca", "min_area"}
+        Axes of the rectangle: the map's, of the lights' spread, of least area.
+    extent : {"root", "longer", "shorter"}
+        Delta: root of the area, longer or shorter side.
+    unbiased : bool
+        Whether sides grow by (n + 1) / (n - 1), n lights.
+    footprint : (light,) ndarray, optional
+        Surface each light stands for, m^2, where a cluster of one light is a square of that area.
+
+    Returns
+    -------
+    frame : (cluster, right down forward, 3) ndarray
+        Axes of the map, unit vectors.
+    axes : (cluster, side, 3) ndarray
+        Axes of the rectangle, unit vectors, the first at most a quarter turn from right.
+    side : (side, cluster) ndarray
+        How long it is along its axes, m.
+    offset : (side, cluster) ndarray
+        Its middle from the centre, along its axes, m.
+    delta : (cluster,) ndarray
+        Delta, its size, m; 0: a point.
+    radius : (cluster,) ndarray
+        From the centre to its farthest light, m.
+    members : (cluster,) int ndarray
+        How many lights it has.
+    """
+    x, c, n = (np.asarray(one, np.float64) for one in (position, center, normal))
+    clusters = Clustering(c, n, np.bincount(of, minlength=c.shape[1]), of, 0, np.zeros(1))
+    made = rectangles(x, clusters, AreaLightSettings(
+        axes, extent, unbiased, single_light="point" if footprint is None else "footprint"), footprint)
+    return made.frame, made.axes, made.side, made.offset, made.delta, made.radius, made.members
+
+
+def area_steps(
+    lights: PixelLights, clusters: Clustering, settings: AreaLightSettings, footprint: Array | None = None
+) -> dict[str, Array]:
+    """Return the rectangles of clusters, made by a step."""
+    made = areas(lights.position, clusters.center, clusters.normal, clusters.of, settings.axes, settings.extent,
+                 settings.unbiased_area, footprint if settings.single_light == "footprint" else None)
+    return dict(zip(("frame", "axes", "side", "offset", "delta", "radius", "members"), made, strict=True))
+
+
+def _diagonal(box: Extent) -> float:
+    return Extent(np.asarray(box.low, np.float64), np.asarray(box.high, np.float64)).diagonal

@@ -1,0 +1,65 @@
+"""Boxes of a scene's extent from planes of its views."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.rsm.buffers.extent import SAMPLES, bounds_of, texel_grid
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+
+@stage("rsm.visible_extent", kept=False)
+def visible_extent(position: Array, covered: Array) -> tuple[Array, Array]:
+    """Bound what the camera sees (docs/methods/val).
+
+    Parameters
+    ----------
+    position : (3, h, w) ndarray
+        Surface points of pixels, m.
+    covered : (h, w) bool ndarray
+        Whether there is a surface.
+
+    Returns
+    -------
+    low : (3,) ndarray
+        Least coordinates of the pixels' surface points, m.
+    high : (3,) ndarray
+        Greatest ones, m.
+    """
+    low, high = bounds_of(position, covered)
+    return low, high
+
+
+@stage("rsm.illuminated_extent", kept=False)
+def illuminated_extent(
+    map_positions: tuple[Array, ...], map_fluxes: tuple[Array, ...], map_lobe_fluxes: tuple[Array | None, ...]
+) -> tuple[Array, Array]:
+    """Bound what reflects direct light, of all lamps, by a grid of 96 x 96 texels of each map (docs/methods/val).
+
+    Parameters
+    ----------
+    map_positions : tuple of (3, h, w) ndarray
+        Surface points of each lamp's map, m.
+    map_fluxes : tuple of (3, h, w) ndarray
+        Flux that diffuse surfaces reflect, W.
+    map_lobe_fluxes : tuple of (3, h, w) ndarray
+        Flux that lobes reflect, W; none where no material has one.
+
+    Returns
+    -------
+    low : (3,) ndarray
+        Least coordinates of texels with flux, m.
+    high : (3,) ndarray
+        Greatest ones, m.
+    """
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for position, flux, lobe_flux in zip(map_positions, map_fluxes, map_lobe_fluxes, strict=True):
+        reflects = np.asarray(flux.any(axis=0) if lobe_flux is None else flux.any(axis=0) | lobe_flux.any(axis=0))
+        texel = texel_grid(reflects, SAMPLES)
+        shown = position.reshape(3, -1)[:, texel[reflects.reshape(-1)[texel]]]
+        low, high = np.minimum(low, shown.min(axis=1, initial=np.inf)), np.maximum(
+            high, shown.max(axis=1, initial=-np.inf))
+    return low, high

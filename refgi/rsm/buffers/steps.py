@@ -1,0 +1,183 @@
+"""Views one step after the other: which triangle each texel sees, what it is, what flux a lamp's texels reflect."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.rsm.buffers.direct import ShadowMap, SurfacePoints, looked_up
+from refgi.rsm.buffers.gbuffer import GBuffer
+from refgi.rsm.buffers.light_projection import MapShape, light_projection
+from refgi.rsm.buffers.reflective import Rsm
+from refgi.rsm.raster.projection import Projection
+from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
+from refgi.scene.lamps import Lamp, lamp_of, light_of
+from refgi.scene.material import MaterialTable
+from refgi.scene.model import Geometry, Light
+from refgi.stages import stage
+
+Array = npt.NDArray[Any]
+
+
+def _visible_triangles(geometry: Geometry, projection: Projection) -> Array:
+    """Find the nearest triangle at each texel's centre (docs/rasterizer).
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    projection : Projection
+        The view: one map, or several stacked.
+
+    Returns
+    -------
+    (h, w) ndarray of int32
+        Nearest triangle, -1 for none.
+    """
+    return rasterize(geometry, projection).triangle_id
+
+
+def _surface(
+    geometry: Geometry, materials: MaterialTable, projection: Projection, triangle_id: Array, dtype: Any
+) -> tuple[Array, Array, Array, Array]:
+    """Compute what each texel sees (SII Sec. 3.1).
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    materials : MaterialTable
+        Their materials.
+    projection : Projection
+        The view.
+    triangle_id : (h, w) ndarray of int32
+        Nearest triangle, -1 for none.
+    dtype : dtype
+        Float32 or float64.
+
+    Returns
+    -------
+    depth : (h, w) ndarray
+        Depth along the view's axis, m; inf without surface.
+    position : (3, h, w) ndarray
+        Surface point, m; 0 without surface.
+    normal : (3, h, w) ndarray
+        Unit normal on the side that is seen; 0 without surface.
+    albedo : (3, h, w) ndarray
+        Diffuse reflectance; 0 without surface.
+    """
+    depth, position, normal, albedo = _view(geometry, materials, projection, triangle_id, dtype).resolve(
+        "depth", "position", "normal", "albedo")
+    return depth, position, normal, albedo
+
+
+# of the camera, and of a lamp's map
+visible_triangles = stage("rsm.visible_triangles", kept=False)(_visible_triangles)
+surface = stage("rsm.surface", kept=False)(_surface)
+map_triangles = stage("rsm.map_triangles", kept=False, each="lamp")(_visible_triangles)
+map_surface = stage("rsm.map_surface", kept=False, each="lamp")(_surface)
+
+
+@stage("rsm.reflected_flux", kept=False, each="lamp")
+def reflected_flux(
+    geometry: Geometry, materials: MaterialTable, projection: Projection, lamp: Lamp, triangle_id: Array, dtype: Any
+) -> tuple[Array, Array, Array | None, Array | None, Array | None]:
+    """Compute the flux that each texel of a lamp's map reflects (SII Sec. 3.1; docs/radiometry).
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The triangles.
+    materials : MaterialTable
+        Their materials.
+    projection : Projection
+        The lamp's view: one map, or several stacked.
+    lamp : Lamp
+        The lamp.
+    triangle_id : (h, w) ndarray of int32
+        Nearest triangle, -1 for none.
+    dtype : dtype
+        Float32 or float64.
+
+    Returns
+    -------
+    solid_angle : (h, w) ndarray
+        Solid angle of the whole texel, sr; of a directional lamp its area across the light, m^2.
+    flux : (3, h, w) ndarray
+        Flux that the diffuse part of the surface reflects, W: Phi_t = albedo int_t I dw.
+    lobe_flux : (3, h, w) ndarray
+        Flux that the lobe reflects, W; absent without glossy materials.
+    lobe_axis : (3, h, w) ndarray
+        Mirror direction r = d - 2 (n . d) n, a unit vector; 0 without lobe or light.
+    lobe_exponent : (h, w) ndarray
+        Phong exponent; 0 without lobe or light.
+    """
+    rsm = Rsm(light_of(lamp), _view(geometry, materials, projection, triangle_id, dtype), materials)
+    return rsm.solid_angle, rsm.flux, rsm.lobe_flux, rsm.lobe_axis, rsm.lobe_exponent
+
+
+@stage("rsm.shadow_map", kept=False, each="lamp")
+def shadow_map(
+    position: Array, normal: Array, covered: Array, projection: Projection, depth: Array, map_position: Array,
+    lamp: Lamp, bias: float | None, interpolated: bool,
+) -> Array:
+    """Test where a lamp arrives: the nearest texel's point does not lie above the receiver's plane (docs/rasterizer).
+
+    Parameters
+    ----------
+    position, normal : (3, h, w) ndarray
+        Receivers, world space, m, and the unit normals of their faces.
+    covered : (h, w) ndarray of bool
+        Where there is a receiver.
+    projection : Projection
+        The lamp's view.
+    depth : (H, W) ndarray
+        Depth that the lamp sees, m.
+    map_position : (3, H, W) ndarray
+        Points that it sees, m.
+    lamp : Lamp
+        The lamp.
+    bias : float or None
+        A constant bias in place of the plane's, m.
+    interpolated : bool
+        Whether receivers whose faces are turned away from the lamp may have normals that face it; they are in shadow.
+
+    Returns
+    -------
+    (h, w) ndarray of bool
+        Whether the lamp reaches the receiver; false without surface.
+    """
+    seen = ShadowMap(depth, map_position, -1.0 if bias is None else bias)
+    return looked_up(SurfacePoints(position, normal, covered), projection, seen, light_of(lamp), interpolated)
+
+
+def _view(
+    geometry: Geometry, materials: MaterialTable, projection: Projection, triangle_id: Array, dtype: Any
+) -> GBuffer:
+    seen = Visibility(triangle_id, (triangle_id >= 0).astype(np.float32))
+    return GBuffer(geometry, materials, projection, seen, dtype)
+
+
+def view_steps(
+    geometry: Geometry, materials: MaterialTable, projection: Projection, dtype: npt.DTypeLike
+) -> dict[str, Array]:
+    """Return the channels of the camera's view, made by steps."""
+    triangle_id = visible_triangles(geometry, projection)
+    made = surface(geometry, materials, projection, triangle_id, np.dtype(dtype))
+    return _channels(triangle_id, *made)
+
+
+def _channels(*made: Array) -> dict[str, Array]:
+    return dict(zip(("triangle_id", "depth", "position", "normal", "albedo"), made, strict=True))
+
+
+def map_steps(
+    geometry: Geometry, materials: MaterialTable, light: Light, resolution: int, dtype: npt.DTypeLike,
+    projection: MapShape,
+) -> dict[str, Array | None]:
+    """Return the channels of a lamp's map, made by steps."""
+    maps = light_projection(light, geometry, resolution, projection)
+    triangle_id = map_triangles(geometry, maps)
+    seen = _channels(triangle_id, *map_surface(geometry, materials, maps, triangle_id, np.dtype(dtype)))
+    made = reflected_flux(geometry, materials, maps, lamp_of(light), seen["triangle_id"], np.dtype(dtype))
+    return {**seen, **dict(zip(("solid_angle", "flux", "lobe_flux", "lobe_axis", "lobe_exponent"), made, strict=True))}

@@ -1,0 +1,256 @@
+"""Imperfect shadow maps one step after the other: points of each light's map, their splats, filled holes, look-up."""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from refgi.draws import IMPERFECT_MAPS, draws
+from refgi.jit import kernel
+from refgi.pairs.pixel_lights import PixelLights
+from refgi.pairs.ray_steps import facing, placed, shadow_rays, shadowed_sum, visible
+from refgi.sampling import FIRST_STEP, SECOND_STEP
+from refgi.scene import Geometry
+from refgi.stages import stage
+from refgi.truth.imperfect import (
+    HORIZON,
+    Imperfect,
+    ImperfectDepth,
+    areas_of,
+    fill_frame,
+    fill_hidden,
+    fill_holes,
+    splat_box,
+)
+
+Array = npt.NDArray[Any]
+
+
+@stage("vpl.scattered_points", kept=False)
+def scattered_points(vertices: Array, faces: Array, shift: Array, count: int) -> tuple[Array, Array, Array]:
+    """Scatter the points of each light's map all over the surfaces (docs/methods/vpl).
+
+    Parameters
+    ----------
+    vertices : (vertex, 3) ndarray
+        Corners of the triangles, m.
+    faces : (triangle, corner) ndarray of int32
+        Vertices of the triangles.
+    shift : (light, number) ndarray
+        Random numbers x0, x1, x2 in [0, 1) of each light's points.
+    count : int
+        n, points of a map.
+
+    Returns
+    -------
+    point : (light, point, 3) ndarray
+        Point k at (k + x0) / n of the area, in the order of the faces, and at a = sqrt(x1 + k / g), b = x2 + k / g^2
+        modulo 1 of its face, (1 - a) A + a (1 - b) B + a b C, m; g^3 = g + 1.
+    point_face : (light, point) ndarray of int32
+        The triangle that each lies on.
+    radius : (number,) ndarray
+        r of a point's disc, pi r^2 = A / n, m.
+    """
+    corners, _, upto = areas_of(_triangles(vertices, faces))
+    place, face = np.zeros((len(shift), count, 3)), np.zeros((len(shift), count), np.int32)
+    for k in range(len(shift)):
+        _place(corners, upto, shift[k].astype(np.float64), place[k], face[k])
+    return place.astype(vertices.dtype), face, np.full(1, math.sqrt(upto[-1] / (math.pi * count)))
+
+
+@kernel
+def _place(corners: Array, upto: Array, shift: Array, place: Array, face: Array) -> None:
+    """Fill one light's points and their faces; the method draws each as soon as it is found."""
+    count = len(place)
+    for k in range(count):
+        f = min(np.searchsorted(upto, (k + shift[0]) / count * upto[-1], side="right"), len(upto) - 1)
+        a, b = math.sqrt((shift[1] + k * FIRST_STEP) % 1.0), (shift[2] + k * SECOND_STEP) % 1.0
+        face[k] = f
+        for c in range(3):
+            place[k, c] = (1 - a) * corners[f, 0, c] + a * (1 - b) * corners[f, 1, c] + a * b * corners[f, 2, c]
+
+
+@stage("vpl.map_frames", kept=False)
+def map_frames(normal: Array) -> Array:
+    """Compute the axes of each light's map, forward along its normal (docs/methods/vpl).
+
+    With e the sign of n_z, a = -1 / (e + n_z): right (1 + e n_x^2 a, e n_x n_y a, -e n_x), down (n_x n_y a,
+    e + n_y^2 a, -n_y), forward n.
+
+    Parameters
+    ----------
+    normal : (3, N) ndarray
+        Unit normals of the lights.
+
+    Returns
+    -------
+    (light, axis, 3) ndarray
+        Right, down and forward: axes of s, t and z.
+    """
+    frame, rows = np.zeros((normal.shape[1], 3, 3)), np.ascontiguousarray(normal.T, np.float64)
+    for k in range(len(rows)):
+        fill_frame(rows[k], frame[k])
+    return frame.astype(normal.dtype)
+
+
+@stage("vpl.depth_maps", kept=False)
+def depth_maps(
+    vertices: Array, faces: Array, point: Array, point_face: Array, radius: Array, light_position: Array, frame: Array,
+    side: int, splat: float,
+) -> Array:
+    """Draw points as boxes into a paraboloid map along each light's normal, nearest first (docs/methods/vpl).
+
+    (s, t) = (x, y) / (1 + z); a box r sqrt(c) (1 + s^2 + t^2) / d wide, c the cosine at the point, times its width in
+    discs; points nearer than r or beside the light's plane are left out.
+
+    Parameters
+    ----------
+    vertices : (vertex, 3) ndarray
+        Corners of the triangles, m.
+    faces : (triangle, corner) ndarray of int32
+        Vertices of the triangles.
+    point : (light, point, 3) ndarray
+        Points of each light's map, m.
+    point_face : (light, point) ndarray of int32
+        Their triangles.
+    radius : (number,) ndarray
+        r of a point's disc, m.
+    light_position : (3, N) ndarray
+        The lights, m.
+    frame : (light, axis, 3) ndarray
+        Axes of their maps.
+    side : int
+        Texels along a side of a map.
+    splat : float
+        Side of a box in the width of a point's disc.
+
+    Returns
+    -------
+    (light, h, w) ndarray
+        Distance, m; rows along t, columns along s; inf where no box covers a texel's centre.
+    """
+    normals = areas_of(_triangles(vertices, faces))[1]
+    made = np.full((len(point), side, side), np.inf, vertices.dtype)
+    place, position, axes = (np.ascontiguousarray(one, np.float64) for one in (point, light_position.T, frame))
+    for k in range(len(place)):
+        _splat_all(place[k], normals[point_face[k]], position[k], axes[k], float(radius[0]), splat, made[k])
+    return made
+
+
+@kernel
+def _splat_all(place: Array, facing: Array, position: Array, frame: Array, radius: float, splat: float,
+               depth: Array) -> None:
+    for k in range(len(place)):
+        d = place[k] - position
+        x, y, z = (d * frame[0]).sum(), (d * frame[1]).sum(), (d * frame[2]).sum()
+        distance = math.sqrt(x * x + y * y + z * z)
+        if z > HORIZON * distance and distance > radius:
+            wide = splat * radius * math.sqrt(abs((d * facing[k]).sum()) / distance)
+            splat_box(x / (distance + z), y / (distance + z), distance, wide, depth)
+
+
+@stage("vpl.filled", kept=False)
+def filled(depth: Array, levels: int) -> Array:
+    """Fill holes of maps from coarser levels: pull, then push (docs/methods/vpl).
+
+    Pull: the mean of those of four texels that are no farther than 1.1 times the nearest. Push: holes take from the
+    coarser level, bilinearly, what is no farther than 1.1 times the nearest of the four.
+
+    Parameters
+    ----------
+    depth : (light, h, w) ndarray
+        Distance, m; inf where nothing is.
+    levels : int
+        Of pulling and pushing.
+
+    Returns
+    -------
+    (light, h, w) ndarray
+        Distance, m; maps whose holes are filled.
+    """
+    made = depth.copy()
+    for one in made:
+        fill_holes(one, levels)
+    return made
+
+
+@stage("vpl.looked_up", kept=False)
+def looked_up(
+    vertices: Array, faces: Array, position: Array, normal: Array, triangle_id: Array, face_normal: Array,
+    light_position: Array, light_normal: Array, frame: Array, depth: Array, radius: Array,  # noqa: ARG001 axes for ports
+    bias: float,
+) -> Array:
+    """Look up whether a pixel is no farther from each light than its map says, by more than a bias (docs/methods/vpl).
+
+    Parameters
+    ----------
+    vertices : (vertex, 3) ndarray
+        Corners of the triangles, m.
+    faces : (triangle, corner) ndarray of int32
+        Vertices of the triangles.
+    position : (3, h, w) ndarray
+        Surface points of the pixels, m.
+    normal : (3, h, w) ndarray
+        Their unit normals.
+    triangle_id : (h, w) ndarray of int32
+        Their triangles, -1 for none.
+    face_normal : (3, h, w) ndarray
+        Unit normals of these, on the side of the pixels' normals.
+    light_position : (3, N) ndarray
+        Pixel lights, m.
+    light_normal : (3, N) ndarray
+        Their unit normals.
+    frame : (light, axis, 3) ndarray
+        Axes of their maps.
+    depth : (light, h, w) ndarray
+        Distance, m; inf where nothing is.
+    radius : (number,) ndarray
+        r of a point's disc, m.
+    bias : float
+        In what a pixel's own surface may differ by within a box or a texel.
+
+    Returns
+    -------
+    (light, h, w) ndarray of bool
+        True where the normals of light and pixel and the pixel's face look at the other and the texel does not hide the
+        pixel.
+    """
+    to, senders, reach, _ = shadow_rays(_triangles(vertices, faces), 1.0, (position, normal, triangle_id), face_normal,
+                                        light_position, light_normal)
+    count, hidden = senders.flux.shape[1], np.zeros(len(reach), np.bool_)
+    fill_hidden(ImperfectDepth(depth.astype(np.float64), radius, bias), to, (0, len(to.pixel)), senders, (0, count),
+                reach, hidden)
+    return placed(to, ~hidden.reshape(len(to.pixel), count).T, triangle_id.shape)
+
+
+def map_steps(
+    geometry: Geometry, lights: PixelLights, settings: Imperfect, seed: int = 0
+) -> dict[str, Array] | None:
+    """Return the map of each pixel light, made by steps; None where surfaces have holes or there is none."""
+    count = lights.flux.shape[1]
+    if geometry.cut is not None or count == 0:
+        return None
+    shift = np.stack([draws(seed, IMPERFECT_MAPS, 3, part=k) for k in range(count)])
+    point, face, radius = scattered_points(geometry.vertices, geometry.faces, shift, settings.points)
+    depth = depth_maps(geometry.vertices, geometry.faces, point, face, radius, lights.position,
+                       map_frames(lights.normal), settings.resolution, settings.splat)
+    return {"depth": filled(depth, settings.levels) if settings.levels else depth, "radius": radius}
+
+
+def light_steps(
+    geometry: Geometry, position: Array, normal: Array, triangle_id: Array, lights: PixelLights,
+    maps: ImperfectDepth | None, visibility: bool,
+) -> Array:
+    """Return the irradiance of pixel lights at pixels, made by steps."""
+    seen = None
+    if visibility:
+        face = facing(geometry.vertices, geometry.faces, normal, triangle_id)
+        pairs = position, normal, triangle_id, face, lights.position, lights.normal
+        seen = visible(geometry, *pairs) if maps is None else looked_up(
+            geometry.vertices, geometry.faces, *pairs, map_frames(lights.normal), maps.depth, maps.radius, maps.bias)
+    return shadowed_sum(position, normal, triangle_id, seen, *lights[:6])
+
+
+def _triangles(vertices: Array, faces: Array) -> Geometry:
+    return Geometry(vertices, faces, np.zeros(len(faces), np.int32), None)

@@ -1,0 +1,84 @@
+"""What a stage has beside its function: its literal form, lists of likely bugs, what its arrays are more than usual."""
+
+import dataclasses
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from refgi.vectors.edits import Edits, edited
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import Array, Arrays, Bug, Run
+
+Arguments = Mapping[str, Any]
+Names = Mapping[str, str]  # leaf of a stage's parameters or output: the case's name of that array
+
+
+@dataclass(frozen=True)
+class Described:
+    """What a run of a stage has beside its function; arrays by leaf: parameter or field of the output."""
+
+    form: Form | None = None
+    # literal module, "" for the form's own, list of rows, and how many first ones of it where not all
+    lists: tuple[tuple[str, str] | tuple[str, str, int], ...] = ()
+    exact: tuple[str, ...] = ()  # leaves of parameters, as `Stage.exact`
+    specs: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)  # of an output's leaf: fields of its Spec
+    paper: str = ""  # where the stage is described; that of its docstring where empty
+    facts: Mapping[str, Any] = field(default_factory=dict)  # beside the numbers among the arguments
+    factors: Mapping[str, float] = field(default_factory=dict)  # as `Case.factors`: "T/N"
+    variants: tuple[Callable[[Run, Names, Names], Run], ...] = ()  # other ways, of the stage, what it reads and writes
+    bugs: tuple[Callable[[Run, Names, Names], tuple[Bug, ...]], ...] = ()  # those that are no rows, likewise
+    without: tuple[str, ...] = ()  # words of causes of rows that cannot show
+
+
+def form_of(
+    function: Callable[..., Any], arguments: Arguments, writes: tuple[str, ...] = ("",),
+    others: Mapping[str, Any] = {}, *, double: bool = False,
+    adapt: Mapping[str, Callable[[Array], Array]] | None = None,
+) -> Form:
+    """Return the literal form of a stage whose parameters have the names of the literal function's.
+
+    Arrays of equal names are read, and tuples of arrays; numbers and texts are taken as they are, what is None is left
+    to its default.
+    `others`: for parameters of other names, the leaf or tuple of leaves to read, or the value of what is no text.
+    """
+    reads, numbers = dict[str, Any](), dict[str, Any]()
+    for name in inspect.signature(function).parameters:
+        value = others.get(name, arguments.get(name))
+        if name in others and isinstance(value, str | tuple):
+            reads[name] = value
+        elif isinstance(value, np.ndarray) and name not in others:
+            reads[name] = name
+        elif isinstance(value, tuple) and value and all(isinstance(one, np.ndarray) for one in value):
+            reads[name] = tuple(f"{name}.{k}" for k in range(len(value)))
+        elif value is not None:
+            numbers[name] = value
+    return Form(function, reads, writes, numbers, adapt=adapt or {}, double=double)
+
+
+def written(form: Form, *ways: Edits) -> tuple[Callable[[Run, Names, Names], Run], ...]:
+    """Return other ways in which ports write a form in float32: legal edits of its text, float32 throughout."""
+    def variant(edits: Edits, stage: Run, reads: Names, writes: Names) -> Run:  # noqa: ARG001
+        single = dataclasses.replace(form.named(reads, writes), function=edited(form.function, edits, "variant"),
+                                     double=False)
+
+        def run(arrays: Arrays, real: Any) -> Arrays:
+            with np.errstate(all="ignore"):  # texels without a surface
+                return single(arrays, real)
+
+        return run
+
+    return tuple(partial(variant, one) for one in ways)
+
+
+def own(*lists: str) -> tuple[tuple[str, str], ...]:
+    """Return lists of rows of the form's own literal module."""
+    return tuple(("", one) for one in lists)
+
+
+def ids(covered: Array) -> Array:
+    """Return triangle ids of receivers of which only whether there is one may be known."""
+    return np.where(covered, np.int32(0), np.int32(-1)) if covered.dtype == np.bool_ else covered

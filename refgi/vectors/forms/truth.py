@@ -1,0 +1,89 @@
+"""Likely bugs of the ground truth: an estimate that has no literal form, traced again with each of them."""
+
+import functools
+from typing import Any
+
+import numpy as np
+
+from refgi.settings import flat, replaced
+from refgi.vectors.forms.beside import Arguments, Described, Names
+from refgi.vectors.recipe import Change, reading, writing
+from refgi.vectors.spec import Array, Arrays, Bug, Run
+
+RADIOMETRY = "docs/radiometry: E = integral of L cos over the hemisphere, L = albedo/pi of the direct irradiance there"
+ESTIMATE = {"tier": "T3", "paper": RADIOMETRY}
+
+
+def path_traced(arguments: Arguments) -> Described:
+    """Return the path-traced irradiance."""
+    facts = {key: value for key, value in flat(arguments["settings"]).items()
+             if isinstance(value, bool | int | float | str)}
+    return Described(exact=("scene.geometry.vertices", "position"), paper=RADIOMETRY, facts=facts,
+                     specs={"mean": ESTIMATE, "variance_of_mean": {**ESTIMATE, "unit": "(W/m^2)^2", "axes": (
+                         "rgb, row, column"), "space": "linear RGB"}, "samples": {"tier": "T3"}},
+                     bugs=(functools.partial(of_light, arguments), functools.partial(of_settings, arguments)))
+
+
+def of_light(arguments: Arguments, stage: Run, reads: Names, writes: Names) -> tuple[Bug, ...]:
+    """Return bugs of what surfaces send and receive."""
+    mean = writes["mean"]
+
+    def by(**changes: Change) -> Run:
+        return reading(stage, **{reads[leaf.replace("__", ".")].replace(".", "__"): change
+                                 for leaf, change in changes.items()})
+
+    def scaled(factor: float) -> Run:
+        return writing(stage, **{mean.replace(".", "__"): lambda a: a * factor,
+                                 writes["variance_of_mean"].replace(".", "__"): lambda a: a * factor**2})
+
+    def with_direct(arrays: Arrays, real: Any) -> Arrays:
+        made = dict(stage(arrays, real))
+        return {**made, mean: made[mean] + _direct(arguments)}
+
+    bugs = [
+        Bug("the emitter's radiance lacks 1/pi", scaled(np.pi), RADIOMETRY),
+        Bug("irradiance is divided by pi", scaled(1 / np.pi), "E excludes the receiver's albedo/pi"),
+        Bug("lights are twice as bright", by(lights__intensity=lambda a: 2 * a), RADIOMETRY),
+        Bug("the emitter's albedo is left out", by(materials__diffuse=np.ones_like, materials__specular=np.zeros_like),
+            RADIOMETRY),
+        Bug("direct light is added", with_direct, "one bounce alone"),
+        Bug("the receiver's normal points inwards", by(normal=lambda a: -a), RADIOMETRY)]
+    if np.any(arguments["materials"].specular > 0):
+        bugs.append(Bug("lobes are missing", by(materials__specular=np.zeros_like), "SII Eq. 3"))
+    count = len(arguments["lights"].intensity)
+    if count > 1:
+        bugs.append(Bug("the last light is left out", by(
+            lights__intensity=lambda a: a * (np.arange(count) < count - 1)[:, None]), "all lights"))
+    return tuple(bugs)
+
+
+def of_settings(arguments: Arguments, _: Run, reads: Names, writes: Names) -> tuple[Bug, ...]:
+    """Return bugs of how many bounces there are, and of what emits and blocks."""
+    from refgi.truth.path_steps import path_traced as traced
+    from refgi.vectors.recorded import run_of
+
+    settings = arguments["settings"]
+
+    def changed(**values: Any) -> Run:
+        other = {**arguments, "settings": replaced(settings, values)}
+        return run_of(traced.__wrapped__, other, reads, writes)  # type: ignore[attr-defined]
+
+    if settings.bounces > 1:
+        bugs = [Bug("one bounce less", changed(bounces=settings.bounces - 1), "number of bounces: a fact")]
+    elif settings.visibility and settings.emitters == "all":
+        bugs = [Bug("one bounce more", changed(bounces=2), "number of bounces: a fact of the case")]
+    else:
+        bugs = [Bug("all surfaces emit and block", changed(visibility=True, emitters="all"), "facts of the case")]
+    if settings.visibility and settings.bounces == 1:
+        bugs.append(Bug("nothing blocks between emitter and receiver", changed(visibility=False), RADIOMETRY))
+    return tuple(bugs)
+
+
+def _direct(arguments: Arguments) -> Array:
+    from refgi.frame import Frame
+
+    rows, columns = arguments["triangle_id"].shape
+    return Frame(arguments["scene"], width=columns, height=rows, dtype=np.float64, shadows="exact").direct
+
+
+FORMS = {"truth.path_traced": path_traced}

@@ -1,0 +1,151 @@
+"""Literal forms of stages of the visibility of area lights by their maps."""
+
+from typing import Any
+
+import numpy as np
+
+from refgi.literal import val_back_projection, val_filters, val_maps, val_series, val_visibility
+from refgi.vectors.forms.beside import Arguments, Described, Names, form_of, ids, own
+from refgi.vectors.spec import Arrays, Run
+
+PLACES = {"position": "places.position", "center": "places.center", "frame": "places.frame"}
+SIZES = {"delta": "places.delta", "near": "places.near"}
+COVERED: dict[str, Any] = {"triangle_id": "places.covered"}
+EXACT = ("places.center",)
+OF_SEARCH = tuple(("val_visibility", one) for one in ("penumbra", "region"))
+SLACK = {"slack, of the distance": 1e-3}
+
+
+def by_default(arguments: Arguments) -> bool:
+    """Tell whether discs are found as errata say: by no printed form, nor by another size of the light."""
+    return not any(arguments.get(name) for name in ("solid_angle", "alpha", "squares", "foreshortened", "axial"))
+
+
+def series(arguments: Arguments) -> Described:
+    """Return the numbers of the series."""
+    plain = arguments["attenuation"] == 0 and arguments["rescale"] == "none" and arguments["fixed"] is None
+    return Described(form_of(val_series.series, arguments, ("weight", "bias", "end")),
+                     own("series", "series/plain" if plain else "series/damped"))
+
+
+def depth_scale(arguments: Arguments) -> Described:
+    """Return the scales of maps."""
+    kind = arguments["kind"]
+    others = (f"depth_scale/not {one}" for one in ("log_map", "map", "scene") if one != kind)
+    unit = "depths per octave" if kind == "log_map" else "1/m"
+    return Described(form_of(val_maps.depth_scale, arguments, ("origin", "slope")),
+                     own("depth_scale", f"depth_scale/{kind}", *others), specs={"slope": {"unit": unit}})
+
+
+def map_depths(arguments: Arguments) -> Described:
+    """Return depths of the series."""
+    kind = "map_depths/log_map" if arguments["logarithmic"] else "map_depths/linear"
+    return Described(form_of(val_maps.map_depths, arguments), own(
+        "map_depths", kind, *(("map_depths/mirrored",) if arguments["mirrored"] else ())), ("depth",))
+
+
+def basis(arguments: Arguments) -> Described:
+    """Return the channels of texels."""
+    kept = {"sines and cosines": "8 bits: floor((x + 1) 127.5 + 0.5001) / 127.5 - 1",
+            "times the depth, and the depth": "half floats"} if arguments["in_bytes"] else {}
+    return Described(form_of(val_maps.basis, arguments),
+                     own("basis", *(("basis/bytes",) if arguments["in_bytes"] else ())), ("t",), facts=kept)
+
+
+def mip_levels(arguments: Arguments) -> Described:
+    """Return the levels above the map."""
+    count = (arguments["basis"].shape[2] - 1).bit_length()
+    form = form_of(val_filters.mip_levels, arguments, tuple(str(level) for level in range(1, count + 1)))
+    return Described(form, own("mip_levels", *(("mip_levels/bytes",) if arguments["in_bytes"] else ())))
+
+
+def mip_means(arguments: Arguments) -> Described:
+    """Return means by levels."""
+    levels = ("basis", *(f"levels.{level}" for level in arguments["levels"]))
+    return Described(form_of(val_filters.mip_means, arguments, others={"levels": levels}), own("means", "mip_means"),
+                     facts={"level": "max(0, log2(radius * texels a side) - 1)"}, variants=(by_shares,))
+
+
+def by_shares(stage: Run, reads: Names, writes: Names) -> Run:  # noqa: ARG001 as every variant
+    """Return means at coordinates of textures, which are rounded as numbers in [0, 1] are."""
+    name = reads["region"]
+
+    def run(arrays: Arrays, _: Any) -> Arrays:
+        region = np.array(arrays[name], np.float64)
+        region[:, :2] = 2.0 * np.float32(0.5 * region[:, :2] + 0.5) - 1.0
+        return stage({**arrays, name: region}, np.float64)
+
+    return run
+
+
+def disc_means(arguments: Arguments) -> Described:
+    """Return means over discs."""
+    return Described(form_of(val_filters.disc_means, arguments), own("means", "disc_means"))
+
+
+def box_means(arguments: Arguments) -> Described:
+    """Return means over squares."""
+    return Described(form_of(val_filters.box_means, arguments), own("means", "box_means"))
+
+
+def csm_penumbra(arguments: Arguments) -> Described:
+    """Return penumbrae by the series."""
+    form = form_of(val_series.csm_penumbra, arguments, ("shaded", "z_avg", "region", "t"), {**PLACES, **SIZES})
+    exact = (("val_visibility", "cone"), *own("csm_penumbra", "shade")) if by_default(arguments) else ()
+    return Described(form, (*OF_SEARCH, *exact), EXACT, facts={"least blocked share": 0.02})
+
+
+def csm(arguments: Arguments) -> Described:
+    """Return V by the series."""
+    hard = ("csm/hard",) if arguments["hard"] is not None else ()
+    return Described(form_of(val_series.csm, arguments), own("csm", "shade", *hard))
+
+
+def search(arguments: Arguments) -> Described:
+    """Return search discs."""
+    form = form_of(val_visibility.search, arguments, ("pending", "region", "distance"),
+                   {**PLACES, **SIZES, **COVERED}, adapt={"triangle_id": ids})
+    exact = ("search/exact", "cone") if by_default(arguments) else ()
+    return Described(form, own("search", "region", *exact), EXACT, facts={"steepest, degrees": 80})
+
+
+def depth_tests(arguments: Arguments) -> Described:
+    """Return V by a square of depth tests."""
+    texels = arguments["texels"]
+    form = form_of(val_visibility.depth_tests, arguments, others={**PLACES, **SIZES, **COVERED},
+                   adapt={"triangle_id": ids})
+    lists = ("kernel", f"kernel {texels}") if texels > 1 else ("texel",)
+    return Described(form, own("depth_tests", *lists, *(("hard",) if arguments["points_only"] else ())),
+                     facts={**SLACK, "of lights without extent, texels": 1})
+
+
+def pcss_penumbra(arguments: Arguments) -> Described:
+    """Return penumbrae texel by texel."""
+    form = form_of(val_visibility.pcss_penumbra, arguments, ("shaded", "z_avg", "region"), {**PLACES, **SIZES})
+    return Described(form, own("pcss_penumbra", "penumbra", "region", *(("cone",) if by_default(arguments) else ())),
+                     facts=SLACK)
+
+
+def pcss(arguments: Arguments) -> Described:
+    """Return V texel by texel."""
+    return Described(form_of(val_visibility.pcss, arguments, others=PLACES), own("pcss"), facts=SLACK)
+
+
+def of_both(arguments: Arguments) -> Described:
+    """Return V of both maps."""
+    return Described(form_of(val_visibility.of_both, arguments), own("of_both"))
+
+
+def back_projection(arguments: Arguments) -> Described:
+    """Return V by texels projected back."""
+    form = form_of(val_back_projection.back_projection, arguments, others={
+        "position": "places.position", "triangle_id": "places.covered", "map_center": "places.center",
+        "frame": "places.frame"}, adapt={"triangle_id": ids})
+    return Described(form, own("back_projection"), EXACT, facts={
+        **SLACK, "cells along a side of the rectangle": val_back_projection.CELLS,
+        "least side, of the farthest place": val_back_projection.LEAST_SIDE})
+
+
+FORMS = {f"cluster.{one.__name__}": one for one in (
+    series, depth_scale, map_depths, basis, mip_levels, mip_means, disc_means, box_means, csm_penumbra, csm, search,
+    depth_tests, pcss_penumbra, pcss, of_both, back_projection)}

@@ -1,0 +1,29 @@
+"""A task of each part of `python -m benchmarks stability`, and whether its faults fit the sources as they are."""
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.stability.runner import run_parts
+from benchmarks.stability.seeded import faults
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize(("part", "task", "properties"), [
+    ("kernels", "ray.offset", 3), ("kernels", "map.borders", 1), ("rays", "rays.no_reach", 1), ("files", "ply", 1),
+    ("files", "replaced", 1), ("faults", "starts", 1)])
+def test_a_task_keeps_its_promises_and_is_kept(part, task, properties, tmp_path, capfd):
+    rows = list(run_parts([part], tmp_path, [task], short=True))
+    assert [(row.property, row.figure) for row in rows if not row.passed] == []
+    assert len({row.property for row in rows}) == properties
+    assert task in capfd.readouterr().err
+    assert list(run_parts([part], tmp_path, [task], short=True)) == rows
+    assert capfd.readouterr().err == ""
+
+
+def test_a_fault_of_precision_stands_once_in_its_file():
+    for fault in faults():
+        text = (ROOT / fault.file).read_text("utf-8")
+        assert text.count(fault.old) == 1, fault.name
+        assert fault.put_into(text) != text, fault.name

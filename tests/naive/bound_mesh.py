@@ -1,0 +1,64 @@
+"""Slow literal twin of drawing a pixel light's bound as a mesh: rays of pixels against an ellipsoid's triangles."""
+
+import math
+
+import numpy as np
+
+from refgi.literal.sii import ellipsoids
+from tests.naive import raster
+
+
+def drawn(frame, settings, lights, part, squares):
+    """Return at which covered pixels the line of sight meets the mesh of each light's part (N, n), R_0^2 (N,)."""
+    position = lights.position - settings.pairs.offset * lights.normal
+    axis = lights.lobe_axis if part else lights.normal
+    exponents = lights.lobe_exponent if part else np.ones(len(squares))
+    flux = lights.lobe_flux if part else lights.flux
+    found = np.zeros((len(squares), np.count_nonzero(frame.gbuffer.covered)), bool)
+    vertices, faces = sphere_mesh(settings.reach.bound.faces)
+    center, half_width, height = ellipsoids(np.asarray(exponents, float))[:3]
+    widening = settings.pairs.lobe.widening if part else 0.0
+    for k in np.flatnonzero(flux.any(axis=0)):
+        radius, along = math.sqrt(squares[k]), np.outer(vertices @ axis[:, k], axis[:, k])
+        bodies = [position[:, k] + radius * (center[k] * axis[:, k] + half_width[k] * along
+                                             + height[k] * (vertices - along))]
+        if widening:  # the exponent is P from a on, but as printed falls without end
+            ball = radius if "sii_widening" in settings.pairs.as_published else min(widening, radius)
+            bodies.append(position[:, k] + ball * vertices)
+        found[k] = np.any([met(frame, body, faces) for body in bodies], axis=0)
+    return found
+
+
+def met(frame, vertices, faces):
+    """Return at which covered pixels the ray through the pixel's centre meets any triangle."""
+    camera, (height, width) = frame.scene.camera, frame.gbuffer.covered.shape
+    view = raster.look(np.subtract(camera.target, camera.eye), camera.up)
+    half = math.tan(camera.vfov / 2) * np.array([width / height, 1.0])
+    rays = (raster.perspective_ray(camera.eye, view, half, height, width, row, column)
+            for row, column in np.argwhere(frame.gbuffer.covered))
+    return np.array([raster.nearest(*ray, vertices, faces)[0] >= 0 for ray in rays])
+
+
+def sphere_mesh(count):
+    """Return the octahedron of 8 faces or the icosahedron of 20, each cut in four until there are enough."""
+    if count == 8:
+        corners = np.concatenate([np.eye(3), -np.eye(3)])
+        return corners, np.array([(a, b, c) for a in (0, 3) for b in (1, 4) for c in (2, 5)])
+    golden = (1 + math.sqrt(5)) / 2
+    corners = [np.roll((0, s, t * golden), turn) for turn in range(3) for s in (-1, 1) for t in (-1, 1)]
+    triangles = [(p, q, r) for i, p in enumerate(corners) for j, q in enumerate(corners[:i]) for r in corners[:j]
+                 if all(abs(np.linalg.norm(u - v) - 2) < 1e-9 for u, v in ((p, q), (q, r), (r, p)))]
+    triangles = [tuple(unit(corner) for corner in triangle) for triangle in triangles]
+    while len(triangles) < count:
+        triangles = [four for triangle in triangles for four in cut_in_four(*triangle)]
+    return np.array(triangles).reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
+
+
+def cut_in_four(p, q, r):
+    """Cut a triangle at the middles of its edges, moved out to the ball."""
+    pq, qr, rp = unit(p + q), unit(q + r), unit(r + p)
+    return (p, pq, rp), (pq, q, qr), (rp, qr, r), (pq, qr, rp)
+
+
+def unit(vector):
+    return vector / np.linalg.norm(vector)

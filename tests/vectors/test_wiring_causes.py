@@ -1,0 +1,76 @@
+"""Causes of wiring, layouts in memory, tiles and texture formats; causes that another array of the stage refutes."""
+
+import numpy as np
+import pytest
+
+from refgi.vectors.cases import kit_cases
+from refgi.vectors.spec import kind_of, outputs_of
+from tests.vectors.port import Port
+
+
+def padded(a):
+    """Return the first numbers of vectors that take 16 bytes each."""
+    return np.stack([*a, np.zeros_like(a[0])], axis=-1).ravel()[: a.size]
+
+
+def eleven_bits(a):
+    """Return positive numbers with 6 bits after the first one, 5 of blue: R11G11B10F."""
+    unit = 2.0 ** np.floor(np.log2(np.maximum(a, 1e-30))) / np.array([64, 64, 32])[:, None, None]
+    return np.rint(a / unit) * unit
+
+
+FLUX = "rsm.reflected_flux0.flux"
+BUGS = [
+    ("rsm.surface.normal", lambda a: padded(a).reshape(a.shape), "vectors take 4 numbers each, as a vec3"),
+    ("rsm.surface.normal", lambda a: padded(a).reshape(-1, 3).T.reshape(a.shape), "read as if they took 3"),
+    ("rsm.surface.normal", lambda a: np.rint(255 * np.maximum(a, 0)) / 255, "unorm8, in which what is below 0 is cut"),
+    ("rsm.surface.normal", lambda a: np.rint(127 * a) / 127, "stored as snorm8"),
+    ("rsm.surface.normal", lambda a: np.rint(255 * (a + 1) / 2) / 255 * 2 - 1, "packed as (x + 1) / 2 in unorm8"),
+    (FLUX, eleven_bits, "R11G11B10F"),
+    ("pairs.sum", lambda a: np.where(np.arange(a.shape[2]) < a.shape[2] // 16 * 16, a, 0), "beyond whole tiles"),
+    ("lights.pixel_lights.flux", lambda a: np.where(np.arange(a.shape[1]) < a.shape[1] // 32 * 32, a, 0),
+     "lights beyond whole"),
+]
+
+
+@pytest.mark.parametrize(("array", "bug", "said"), BUGS)
+def test_a_layout_or_format_is_named(kit, tmp_path, array, bug, said):
+    port = Port(kit, "sii-warp-a", tmp_path)
+    with np.errstate(all="ignore"):
+        port.write(array, bug(port.arrays[array]))
+    assert array in {one.name for one in port.first().arrays if one.verdict == "out"}
+    causes = [one.cause for one in port.first().causes]
+    assert any(said in one for one in causes), causes
+
+
+@pytest.mark.parametrize(("case", "stage", "right", "wrong"), [
+    ("sii-halton", "pairs.sum", "rsm.surface.normal", "rsm.surface.position"),
+    ("sii-halton", "pairs.sum", "lights.pixel_lights.normal", "lights.pixel_lights.flux"),
+    ("sii-three-lamps", "rsm.map_triangles0", "rsm.map_triangles0.projection.half",
+     "rsm.map_triangles1.projection.half")])
+def test_a_buffer_in_the_place_of_another_is_named(kit, tmp_path, case, stage, right, wrong):
+    """The stage itself with one input for another, as a port binds it: rightly computed, from the wrong buffer."""
+    port = Port(kit, case, tmp_path)
+    step = next(one for one in kit_cases("quick")[case]().stages if one.name == stage)
+    known = {name: kit.array(port.case, name) for name in port.case.arrays}
+    for name, array in outputs_of(step, known | {right: known[wrong]}, np.float32).items():
+        port.write(name, array)
+    causes = [one.cause for one in port.first().causes]
+    assert any(f"{kind_of(right)} is bound to" in one for one in causes), causes
+
+
+def test_an_array_of_the_stage_that_is_right_refutes_what_would_change_it(kit, tmp_path):
+    """A likely bug of several arrays, put into one of them alone, is not what happened."""
+    port = Port(kit, "val-single", tmp_path)
+    bugs = kit.bugs(port.case)
+    several = [(step.name, bug) for step in port.case.stages for bug in bugs.of(step.name)
+               if not bug.blind and len(bug.arrays) > 1][:30]
+    assert several
+    for stage, bug in several:
+        name = min(bug.arrays)
+        wrong = port.arrays[name].copy()
+        places, values = bugs.told(bug, name, wrong)
+        wrong.reshape(-1)[places] = values
+        port.write(name, wrong)
+        assert bug.cause not in [one.cause for one in port.first().causes], (stage, bug.cause)
+        port.write(name, port.arrays[name])

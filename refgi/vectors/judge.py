@@ -72,14 +72,15 @@ def judge(
     beyond = off > allowed
     out = beyond & ~masked
     count, every = int(np.count_nonzero(out)), int(np.count_nonzero(beyond))
-    blunt = large_value(expected) > 0 and np.mean(allowed >= large_value(expected)) > MOST_SPARED
+    large = large_value(expected)
+    blunt = bool(large and np.mean(allowed >= large) > MOST_SPARED)
     verdict: Verdict = "exact"
     if off.any():
         fine: Verdict = "within" if every <= MOST_SPARED * out.size and not blunt else "not-judged"
         verdict = fine if count <= outliers * out.size else "out"
     worst, place = _worst(off, allowed, out if count else ~masked, expected)
     said = ArrayVerdict(name=name, verdict=verdict, tier=tier, worst=worst, element=place, outside=count,
-                        masked=every - count, said=_spared(verdict, every, out.size, blunt=bool(blunt)))
+                        masked=every - count, said=_spared(verdict, every, out.size, blunt=blunt))
     limit = np.where(masked, np.inf, allowed)
     return Judged(said.model_copy(update=_values(expected, got, allowed, place)), out, limit)
 

@@ -136,7 +136,8 @@ def test_few_elements_are_masked():
             if kind_of(step) in WITHOUT_FORM:
                 continue
             for one, bound in found.items():
-                assert bound.masked.sum() <= max(1, MASKED * bound.masked.size), (name, step, one)
+                few = max(1, MASKED * bound.masked.size)  # some have 22 elements
+                assert bound.masked.sum() <= few, (name, step, one)
 
 
 def test_the_cases_hold_what_they_say():

@@ -3,12 +3,14 @@
 Each sweep changes one number of a frame of the atrium and leaves the others; a method's sweep ends where a frame takes
 more than `LONGEST`. Times are processor time of all threads, from geometry to radiance, acceleration structures
 included; medians of three frames, or one of those that take long, after a first that is not counted.
+A last sweep sets a busy process beside frames: those of all threads shall not be slower than those of one.
 `python -m benchmarks.scaling DIR PICTURE` draws the figures of --out.
 """
 
 import json
 import math
 import statistics
+import subprocess
 import sys
 import time
 import warnings
@@ -16,9 +18,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from benchmarks.harness import Row
+from benchmarks.harness import Row, ratio
 from refgi.errors import InputError, RefgiWarning
 from refgi.frame import Frame
+from refgi.jit import most_threads, threads
 from refgi.methods import find_method, usual_shadows
 from refgi.scene import Scene, load_scene
 from refgi.settings import of
@@ -52,6 +55,28 @@ def rows(quick: bool) -> Iterator[Row]:
                 before = value, found
                 if found > LONGEST:
                     break
+    yield from _beside_a_neighbour(quick)
+
+
+def _beside_a_neighbour(quick: bool) -> Iterator[Row]:
+    scene = load_scene("atrium:faces=10000")
+    side = SIDE // 2 if quick else 2 * SIDE
+    for name in ("sii", "multires"):
+        method = find_method(name)
+
+        def frame(count: int, method: Any = method) -> None:
+            with threads(count):
+                view = Frame(scene, width=side, height=side)
+                view.radiance(method.compute(view, method.settings())[0])
+
+        frame(1)
+        with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as neighbour:
+            try:
+                found = ratio(lambda: frame(most_threads()), lambda: frame(1))
+            finally:
+                neighbour.kill()
+        yield Row(f"beside a busy process: {name}, all threads over one", found.median, "", "<= 1.1",
+                  f"{found.low:.2f} to {found.high:.2f}")
 
 
 def _cost(scene: Scene, name: str, side: int, lights: int) -> float:

@@ -3,6 +3,10 @@
 A kernel runs its bands by itself where the record has no threads: in a process that was forked off after they were
 started, where they do not exist any more and OpenMP would end the process. Numba's `workqueue` takes one caller at a
 time and aborts at a second; there the first kernel has the threads, and others run by themselves meanwhile.
+
+Threads sleep between loops. By OpenMP's default they spin, which gains nothing measurable where each has a core of its
+own, and takes the core of the one that is waited for where it has not: beside another busy process, or several
+processes at once.
 """
 
 import contextlib
@@ -45,6 +49,7 @@ def start_threads() -> None:
     Raises InputError if the threading layer that NUMBA_THREADING_LAYER asks for is not there.
     """
     if not _launcher.parallel_for and not _forked:
+        os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # read when OpenMP is loaded, which is now
         try:
             threading._launch_threads()
         except ValueError as error:

@@ -37,7 +37,7 @@ from refgi.vectors.manifest import (
 from refgi.vectors.scenefile import is_plain, write_scene
 from refgi.vectors.spec import Array, Arrays, Bug, Case, Stage, expected_of, kind_of, outputs_of, stored
 from refgi.vectors.standalone import standalone_text
-from refgi.vectors.wiring import wirings
+from refgi.vectors.wiring import ANOTHER, wirings
 
 SEED = 20090101  # of the changes that bounds are measured by
 TOLD_BY, BESIDE = 96, 32  # elements of a likely bug that are kept: those that tell it, and others
@@ -161,13 +161,13 @@ class _Told:
 
     def wiring(self, method: str, stage: str, cause: str) -> bool:
         """Return whether a wrong wiring is to be tried in a further case, and count it."""
-        key = method, kind_of(stage), cause
+        key = _wiring_key(method, stage, cause)
         self._wirings[key] = self._wirings.get(key, 0) + 1
         return self._wirings[key] <= WIRING_TRIED
 
     def wired(self, method: str, stage: str, cause: str) -> None:
         """Mark a wrong wiring that a case tells."""
-        self._wirings[method, kind_of(stage), cause] = WIRING_TRIED
+        self._wirings[_wiring_key(method, stage, cause)] = WIRING_TRIED
 
     def enough(self, method: str, stage: str, cause: str) -> bool:
         """Return whether enough cases of a method tell a bug."""
@@ -186,6 +186,11 @@ class _Told:
         blind = [f"{stage}: {cause}" for (stage, cause), count in told.items() if not count]
         if blind:
             raise InputError(f"kit: expected a case that tells each likely bug, got none for {'; '.join(blind)}")
+
+
+def _wiring_key(method: str, stage: str, cause: str) -> tuple[str, str, str]:
+    """Return what a wrong wiring is counted by: each lamp, level and round by itself where it is one of them."""
+    return method, stage if cause.endswith(ANOTHER) else kind_of(stage), cause
 
 
 def write_case(case: Case, folder: Path, told: _Told, tell: Tell) -> CaseManifest:

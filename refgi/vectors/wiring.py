@@ -16,6 +16,7 @@ from refgi.vectors.rows import Form
 from refgi.vectors.spec import Array, Arrays, Bug, Case, Run, Stage, axes_of, kind_of
 
 Layout = Callable[[Array], Array]
+ANOTHER = "that of another lamp, level or round"
 
 
 def wirings(case: Case, step: Stage, known: Arrays) -> Iterator[Bug]:
@@ -41,7 +42,7 @@ def wirings(case: Case, step: Stage, known: Arrays) -> Iterator[Bug]:
 
 def _cause(name: str, other: str) -> str:
     kind, wrong = kind_of(name), kind_of(other)
-    return f"{kind} is bound to {wrong if wrong != kind else 'that of another lamp, level or round'}"
+    return f"{kind} is bound to {wrong if wrong != kind else ANOTHER}"
 
 
 def _fits(right: Array, wrong: Array, *, decides: bool) -> bool:

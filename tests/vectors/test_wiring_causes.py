@@ -47,7 +47,9 @@ def test_a_layout_or_format_is_named(kit, tmp_path, array, bug, said):
     ("sii-halton", "pairs.sum", "rsm.surface.normal", "rsm.surface.position"),
     ("sii-halton", "pairs.sum", "lights.pixel_lights.normal", "lights.pixel_lights.flux"),
     ("sii-three-lamps", "rsm.map_triangles0", "rsm.map_triangles0.projection.half",
-     "rsm.map_triangles1.projection.half")])
+     "rsm.map_triangles1.projection.half"),
+    ("sii-three-lamps", "rsm.map_triangles1", "rsm.map_triangles1.projection.half",
+     "rsm.map_triangles0.projection.half")])
 def test_a_buffer_in_the_place_of_another_is_named(kit, tmp_path, case, stage, right, wrong):
     """The stage itself with one input for another, as a port binds it: rightly computed, from the wrong buffer."""
     port = Port(kit, case, tmp_path)

@@ -547,6 +547,7 @@ def test_the_picture_has_lobes_with_their_error():
     np.testing.assert_allclose(picture.radiance, frame.radiance(picture.irradiance) + picture.lobes, rtol=1e-5)
 
 
+@pytest.mark.slow("True-0.0", "True-1000000.0", "False-1e+20")
 @pytest.mark.parametrize("exponent", [0.0, 1e6, 1e20])
 @pytest.mark.parametrize("caustics", [False, True])
 def test_no_value_is_lost(exponent, caustics):

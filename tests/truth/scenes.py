@@ -1,14 +1,35 @@
 """Small scenes made by hand, and receivers without a camera."""
 
+import contextlib
+from unittest import mock
+
 import numpy as np
 
 from refgi.rays import Tracer
 from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, merge
 from refgi.truth import TruthSettings
+from refgi.truth.lobe_cells import lobe_cells
 from refgi.truth.truth import accumulate
 
 CAMERA = Camera((0.0, 0.0, 9.0), (0.0, 0.0, 0.0))
 WHITE = Material("white", (0.6, 0.6, 0.6))
+FEW_RAYS = {"light_grid": 12, "interleave": 3}  # of lights in a pass: where receivers are few these take most time
+
+
+@contextlib.contextmanager
+def cells_kept():
+    """Cut the lights of a scene into cells once for many runs: these depend on no seed, and take most of a short run.
+    """
+    kept = {}
+
+    def cells(scene, tracer, surfaces, lights):
+        key = id(scene), id(tracer), surfaces.specular.tobytes()  # 0 for lobes left to photons
+        if key not in kept:
+            kept[key] = scene, tracer, lobe_cells(scene, tracer, surfaces, lights)
+        return kept[key][2]
+
+    with mock.patch("refgi.truth.cell_pass.lobe_cells", cells):
+        yield
 
 
 def rectangle(corner, along, across, material=WHITE):

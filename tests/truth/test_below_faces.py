@@ -14,7 +14,7 @@ from refgi.rays import Tracer
 from refgi.scene import Camera, DirectionalLight, Material, Mesh, Scene, merge
 from refgi.truth import TruthSettings
 from refgi.truth.truth import accumulate, accumulate_lobes
-from tests.truth.scenes import rectangle
+from tests.truth.scenes import FEW_RAYS, rectangle
 
 ESTIMATORS = ["combined", "hemisphere", "light"]
 SIGMAS, BIAS = 4.0, 2e-4  # as of closed forms elsewhere; float32 rays
@@ -81,7 +81,7 @@ def test_irradiance_is_bounded_by_cosines_where_nothing_hides(name, estimator, e
     room, at, up, ids = place_at(name)
     for visibility in (False, True):
         truth = expected(name, visibility)
-        settings = TruthSettings(visibility=visibility, estimator=estimator, emitters=emitters, samples=400)
+        settings = TruthSettings(visibility=visibility, estimator=estimator, emitters=emitters, samples=400, **FEW_RAYS)
         line = compare(accumulate(room, Tracer(room.geometry), at, up, ids, settings), truth)
         evidence(f"{name}, {estimator}, {emitters}, visibility={visibility}: {line}")
     assert expected(name, False)[0] > 0.005

@@ -27,7 +27,7 @@ def mirror_over_floor(light):
 def test_a_mirror_acts_as_an_image_of_the_light(evidence):
     light = SpotLight((0.0, 1.0, 0.0), (1.0, -0.35, 0.0), math.radians(25), math.radians(25), (3.0, 2.0, 1.0))
     frame = Frame(mirror_over_floor(light))
-    result = trace_truth(frame, TruthSettings(samples=24 * 12, caustics=True, photons=1 << 18))
+    result = trace_truth(frame, TruthSettings(samples=24 * 12, caustics=True, photons=1 << 17))
     away = frame.gbuffer.position - np.array([2.0, 1.0, 0.0])[:, None, None]  # from the image of the light
     distance = np.linalg.norm(away, axis=0)
     axis = np.array([-1.0, -0.35, 0.0]) / math.hypot(1, 0.35)

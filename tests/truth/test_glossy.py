@@ -32,6 +32,7 @@ def glossy(name, exponent, specular=0.5):
                             exponent=exponent) for m in scene.materials))
 
 
+@pytest.mark.slow("True-80-900.0", "False-80-10000.0", "True-320-1000000.0", "False-80-1e+20")
 @pytest.mark.parametrize(("faces", "exponent"), [(80, 900.0), (80, 1e4), (320, 1e6), (80, 1e20)])
 @pytest.mark.parametrize("caustics", [False, True])
 def test_no_value_is_lost_on_a_glossy_sphere(faces, exponent, caustics):
@@ -63,6 +64,7 @@ def test_the_sharpest_lobes_are_mirrors(exponent, evidence):
     assert abs(got - expected) < SIGMAS * spread
 
 
+@pytest.mark.slow("1000000000000.0")
 @pytest.mark.parametrize("exponent", [1e8, 1e12, 1e20])
 def test_a_sharp_lobe_acts_as_an_image_of_the_light(exponent, evidence):
     light = SpotLight((0.0, 1.0, 0.0), (1.0, -0.35, 0.0), math.radians(25), math.radians(25), (3.0, 2.0, 1.0))

@@ -13,6 +13,7 @@ from refgi.scene import DirectionalLight, PointLight, SpotLight
 from refgi.truth import TruthSettings, trace_truth
 from tests.naive.face_quadrature import receivers_of
 from tests.truth.glossy_scenes import EXPONENTS, SCENES
+from tests.truth.scenes import cells_kept
 
 SEEDS, PASSES = 20, 3
 SIGMAS = 3  # joint standard errors of the picture's mean
@@ -106,10 +107,11 @@ def means(name, change):
     """Return means and variances of blocks and picture over all seeds, and the frame."""
     scene = SCENES[name](name)
     frame = Frame(CHANGES[change](scene) if change else scene, dtype=np.float64)
-    shortest = trace_truth(frame, TruthSettings(samples=1))
-    samples = PASSES * (int(shortest.samples.max()) // shortest.passes)
     first = 500 * (1 + list(CHANGES).index(change)) if change else 0  # no seed serves both
-    runs = [trace_truth(frame, TruthSettings(samples=samples, seed=first + seed)) for seed in range(SEEDS)]
+    with cells_kept():
+        shortest = trace_truth(frame, TruthSettings(samples=1))
+        samples = PASSES * (int(shortest.samples.max()) // shortest.passes)
+        runs = [trace_truth(frame, TruthSettings(samples=samples, seed=first + seed)) for seed in range(SEEDS)]
     sums = [np.mean([getattr(run, field) for run in runs], axis=0)
             for field in ("block_mean", "block_variance", "picture_mean", "picture_variance")]
     return *sums[:2], *sums[2:], frame

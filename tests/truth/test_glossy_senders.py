@@ -17,6 +17,7 @@ from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.truth import trace_lobes
 from tests.naive.face_quadrature import TOGETHER, glossy_of
 from tests.truth.glossy_scenes import EVERY, EXPONENTS, SCENES, frame, oracle, reference
+from tests.truth.scenes import cells_kept
 
 CERTAIN = 1e-4  # a value beyond the quantiles of this tail comes once in 10,000 runs
 DARK = 1e-3  # of the picture's mean: blocks below it see light in the far tails of lobes alone
@@ -34,6 +35,12 @@ ALONE = [("diffuse", "hemisphere"), ("diffuse", "light"), ("sun_on_blocks", "hem
 def run(name, seed, passes, estimator="combined", *, lobes=False):
     settings = TruthSettings(samples=passes * _per_pass(name, estimator, lobes), seed=seed, estimator=estimator)
     return (trace_lobes if lobes else trace_truth)(frame(name), settings)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_cut_of_each_scene():
+    with cells_kept():
+        yield
 
 
 @cache

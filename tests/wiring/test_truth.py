@@ -20,6 +20,7 @@ from refgi.truth.lobe_cells import lobe_cells
 from refgi.truth.surfaces import lights_of, surfaces
 from tests.naive import light_tracing
 from tests.naive.crossings import face_normals
+from tests.truth.scenes import cells_kept
 from tests.truth.test_caustics import mirror_over_floor
 from tests.wiring.cases import Case, uncovered
 
@@ -103,12 +104,19 @@ def rules_of(settings):
     return light_tracing.Rules(settings.visibility, settings.emitters == "visible", settings.bounces)
 
 
+@functools.cache
+def mean_of(scene, settings):
+    """Return the picture of a scene."""
+    return trace_truth(frame_of(scene), settings).mean
+
+
 def compared(name):
     """Return how far means of a case lie off those by NumPy, and its standard errors, (3, values)."""
     case = CASES[name]
     settings = case.settings(TruthSettings, BASE)
-    runs = np.array([trace_truth(frame_of(case.scene), dataclasses.replace(settings, seed=settings.seed + 100 * k)).mean
-                     for k in range(RUNS)])
+    with cells_kept():
+        runs = np.array([mean_of(case.scene, dataclasses.replace(settings, seed=settings.seed + 100 * k))
+                         for k in range(RUNS)])
     pictures = estimates(case.scene, rules_of(settings))
     weights = weights_of(pictures[:WEIGHING])
     got, expected = means(runs, weights), means(pictures[WEIGHING:], weights)
@@ -129,10 +137,10 @@ def test_the_mean(name, evidence):
 def test_each_key_counts(name):
     """The bits of one run."""
     case = CASES[name]
-    frame = frame_of(case.scene)
-    result = trace_truth(frame, case.settings(TruthSettings, BASE))
-    for _, settings in case.without(TruthSettings, BASE):
-        assert np.array_equal(result.mean, trace_truth(frame, settings).mean) == bool(case.same)
+    with cells_kept():
+        mean = mean_of(case.scene, case.settings(TruthSettings, BASE))
+        for _, settings in case.without(TruthSettings, BASE):
+            assert np.array_equal(mean, mean_of(case.scene, settings)) == bool(case.same)
 
 
 # rays of a pass

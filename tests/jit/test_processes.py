@@ -15,7 +15,7 @@ import numba
 import refgi
 from refgi.jit import thread_count
 
-METHODS = ["sii", "val", "vpl"]
+METHODS = ["sii", "multires", "val", "hssil", "gather", "vpl"]
 
 def bits(method):
     return refgi.render("cornell_box", method, width=24, height=24).irradiance.tobytes()

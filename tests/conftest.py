@@ -15,6 +15,8 @@ hypothesis.settings.load_profile("refgi")
 
 ROOT = Path(__file__).parents[1]
 COLLECTED: pytest.StashKey[tuple[list[pytest.Item], set[int]]] = pytest.StashKey()  # tests, and those left out
+# its first test makes the kit, for which the others of its folder would wait: it runs first, and they run last
+MAKES_THE_KIT = "tests/vectors/test_forms.py"
 # what `make quick` runs: a minute with warm kernels
 QUICK = (
     "tests/settings", "tests/image", "tests/scene/test_scenefile", "tests/compare", "tests/provenance",
@@ -37,6 +39,7 @@ def pytest_configure() -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    items.sort(key=_turn)
     for item in items:
         if item.nodeid.startswith(QUICK):
             item.add_marker("quick")
@@ -47,6 +50,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if left_out and not config.getoption("--all"):
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in left_out]
+
+
+def _turn(item: pytest.Item) -> int:
+    """Return when a test runs: 0 is first."""
+    return 0 if item.nodeid.startswith(MAKES_THE_KIT) else 2 if item.nodeid.startswith("tests/vectors/") else 1
 
 
 def _is_slow(item: pytest.Item) -> bool:

@@ -65,6 +65,7 @@ def test_a_hole_as_a_whole_changes_no_bit(method: str) -> None:
     np.testing.assert_array_equal(picture(method, pierced("hole")), picture(method, pierced("none")))
 
 
+@pytest.mark.slow("extra2")
 @pytest.mark.parametrize("extra", [
     {"source": "walk"}, {"maps_renderer": "rays"}, {"maps": "imperfect", "maps_points": 2000}])
 def test_other_ways_to_see_pass_holes_too(extra: dict[str, Any]) -> None:
@@ -153,7 +154,7 @@ def test_maps_of_area_lights_are_those_of_rays(rule: str, evidence: Callable[[st
     areas = area_lights([[0.1, 0.05, 0.2], [0.4, 1.0, 0.1], [-0.9, 1.2, 0.3]],
                         [[0, 1, 0], [0, -1, 0.2], [1, 0, 0]], 0.2)
     drawn, traced, whole = (shadow_maps(shape, areas, of(ValSettings, maps_resolution=64, maps_renderer=kind,
-                                                         near_geometry=rule).maps, np.float64)
+                                                         near_geometry=rule).maps, np.float32)
                             for shape, kind in ((scene.geometry, "raster"), (scene.geometry, "rays"),
                                                 (opaque(scene).geometry, "raster")))
     assert drawn.left_out == traced.left_out
@@ -167,6 +168,7 @@ def test_maps_of_area_lights_are_those_of_rays(rule: str, evidence: Callable[[st
     assert changed > 0.1
 
 
+@pytest.mark.slow
 def test_points_of_imperfect_maps_lie_on_what_is_there() -> None:
     """A light at 1 m below the plate sees points on its half alone, as many as the share of its area says."""
     scene = half_plate(size=4.0)
@@ -239,6 +241,7 @@ def test_light_that_leaves_glass_passes_holes_before_it() -> None:
         assert lobes["whole", mode].sum() < 0.95 * lobes["none", mode].sum()
 
 
+@pytest.mark.slow
 def test_imperfect_maps_are_smaller_than_nothing_blocked() -> None:
     free, mapped = (vpl(Frame(pierced("cut"), rsm_resolution=32), of(VplSettings, lights=50, **how))
                     for how in ({"visibility": False}, {"maps": "imperfect"}))

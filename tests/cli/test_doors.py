@@ -22,12 +22,19 @@ def run(*arguments, closed=(), **environment):
                           env=os.environ | {"PYTHONPATH": str(ROOT)} | environment, capture_output=True, check=False)
 
 
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    """The picture that the command makes with all files open."""
+    file = tmp_path_factory.mktemp("rendered") / "a.exr"
+    assert run("render", *TINY, "--out", file).returncode == 0
+    return file.read_bytes()
+
+
 @pytest.mark.parametrize("closed", [(2,), (1, 2), (0, 1, 2)])
-def test_closed_streams_change_no_picture(tmp_path, closed):
-    assert run("render", *TINY, "--out", tmp_path / "a.exr").returncode == 0
+def test_closed_streams_change_no_picture(rendered, tmp_path, closed):
     done = run("render", *TINY, "--out", tmp_path / "b.exr", closed=closed)
     assert (done.returncode, done.stderr) == (0, b"")
-    assert (tmp_path / "b.exr").read_bytes() == (tmp_path / "a.exr").read_bytes()
+    assert (tmp_path / "b.exr").read_bytes() == rendered
 
 
 def test_an_error_to_nobody_does_not_go_to_stdout():
@@ -35,6 +42,7 @@ def test_an_error_to_nobody_does_not_go_to_stdout():
     assert (done.returncode, done.stdout, done.stderr) == (2, b"", b"")
 
 
+@pytest.mark.slow("a.exr-force1", "a.png-force0", "folder/cornell_box_sii.exr-force0")
 @pytest.mark.parametrize("force", [[], ["--force"]])
 @pytest.mark.parametrize("name", ["a.exr", "a.png", "folder/cornell_box_sii.exr"])
 def test_a_pipe_is_no_place_for_results(tmp_path, name, force):

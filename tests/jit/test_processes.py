@@ -110,10 +110,12 @@ def test_a_layer_for_one_caller_is_never_called_by_two(tmp_path):
 
 @pytest.mark.parametrize(("name", "value", "said"), [
     ("NUMBA_NUM_THREADS", "0", "NUMBA_NUM_THREADS: expected a whole number from 1 to 4096, got '0'"),
-    ("NUMBA_NUM_THREADS", "two", "NUMBA_NUM_THREADS: expected a whole number from 1 to 4096, got 'two'"),
+    pytest.param("NUMBA_NUM_THREADS", "two", "NUMBA_NUM_THREADS: expected a whole number from 1 to 4096, got 'two'",
+                 marks=pytest.mark.slow),
     ("NUMBA_NUM_THREADS", "9" * 5000, "NUMBA_NUM_THREADS: expected a whole number from 1 to 4096, got '999"),
     ("NUMBA_THREADING_LAYER", "fast", "expected a threading layer that is installed, got 'fast': The threading layer"),
-    ("NUMBA_THREADING_LAYER_PRIORITY", "omp", "expected a threading layer that is installed, got 'default': THREADING"),
+    pytest.param("NUMBA_THREADING_LAYER_PRIORITY", "omp", "expected a threading layer that is installed, got 'default'"
+                 ": THREADING", marks=pytest.mark.slow),
 ])
 def test_threads_that_numba_cannot_start_are_one_line(tmp_path, name, value, said):
     done = subprocess.run([sys.executable, "-m", "refgi", "render", "cornell_box", "--size", "8x8", "--out",

@@ -45,6 +45,7 @@ def test_the_literal_text_passes(kit, tmp_path, evidence, name, chained):
     evidence(f"{name}, {'chained' if chained else 'isolated'}: {covered} stages within, worst {worst:.2g} bounds")
 
 
+@pytest.mark.slow
 def test_every_stage_of_the_full_kit_has_a_form_but_those_named():
     steps = [step for make in kit_cases("full").values() for step in make().stages]
     assert {kind_of(step.name) for step in steps if form_of(step) is None} == WITHOUT_FORM.keys()

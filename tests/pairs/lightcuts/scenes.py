@@ -1,6 +1,7 @@
 """Scenes of pixel lights and receivers, random and hostile, for the tests of lightcuts."""
 
 import numpy as np
+import pytest
 
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.pixel_lights import PixelLights
@@ -8,6 +9,9 @@ from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp
 
 CLAMPS = {"none": None, "disc": DiscClamp(), "distance": DistanceClamp(0.15), "geometry": GeometryClamp(8.0)}
 NAMES = ("cube", "floor", "corner", "ball", "coincident", "tiny", "far", "wide", "colours", "uneven", "dim")
+# each scene with two clamps, each clamp with half of the scenes; the others are slow
+GRID = [pytest.param(name, clamp, marks=[] if (i - j) % 4 < 2 else [pytest.mark.slow])
+        for i, name in enumerate(NAMES) for j, clamp in enumerate(CLAMPS)]
 
 
 def unit(vectors):

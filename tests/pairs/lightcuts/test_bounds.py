@@ -9,7 +9,7 @@ from refgi.pairs.packing import pack
 from refgi.pairs.pair_sum import ROWS, TILE
 from refgi.pairs.settings import PairSettings
 from tests.naive import lightcuts as naive
-from tests.pairs.lightcuts.scenes import CLAMPS, NAMES, scene
+from tests.pairs.lightcuts.scenes import CLAMPS, GRID, NAMES, scene
 
 ROUNDING = 1e-11  # of the cluster's flux over r^2, in float64
 UNBOUNDED = 1e20  # W/m^2: a bound of a receiver amid the lights need not be infinite
@@ -53,9 +53,8 @@ def noise(lights, receiver):
     return ROUNDING * sum(map(naive.weight, lights)) / max(nearest, 1e-9) ** 2
 
 
-@pytest.mark.parametrize("clamp", CLAMPS)
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("lanes", [[0], [5], list(range(RECEIVERS))], ids=["one", "another", "all"])
+@pytest.mark.parametrize(("name", "clamp"), GRID)
+@pytest.mark.parametrize("lanes", [[5], list(range(RECEIVERS))], ids=["one", "all"])
 def test_no_cluster_is_off_by_more(name, clamp, lanes):
     tree, points = tree_of(name, clamp)
     for level, place, bound in bounds_at(tree, points, lanes):
@@ -66,8 +65,7 @@ def test_no_cluster_is_off_by_more(name, clamp, lanes):
             assert off <= bound + noise(lights, receiver)
 
 
-@pytest.mark.parametrize("clamp", CLAMPS)
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("name", "clamp"), GRID)
 def test_no_bound_is_below_that_of_the_twin(name, clamp):
     """The kernels know clusters of clusters and take margins, so theirs is larger; not by much, for the first level."""
     tree, points = tree_of(name, clamp)
@@ -87,7 +85,7 @@ def test_no_bound_is_below_that_of_the_twin(name, clamp):
 def test_the_twin_itself(name):
     """The bound of the documentation holds: of clusters of all sizes, without rounding of clusters of clusters."""
     tree, points = tree_of(name, "disc")
-    for lane in range(RECEIVERS):
+    for lane in range(0, RECEIVERS, 3):
         receiver = points.position[:, 0, lane].tolist(), points.normal[:, 0, lane].tolist()
         for level in range(1, len(tree.starts) - 1):
             for place in range(int(tree.starts[level + 1] - tree.starts[level])):

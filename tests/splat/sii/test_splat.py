@@ -343,9 +343,9 @@ def test_the_map_sums_to_the_fragments_that_are_drawn(evidence):
 @pytest.mark.feature("SII-23")
 def test_lobes_are_counted_as_the_twin_counts_them(widening, evidence):
     rng = np.random.default_rng(9)
-    receivers, lights = sets.room(rng, 60)
+    receivers, lights = sets.room(rng, 60, np.float32)
     exponent, low = 6.0, 0.05
-    lights = sets.glossy(lights.position, lights.normal, sets.random_directions(rng, 60), exponent)
+    lights = sets.glossy(lights.position, lights.normal, sets.random_directions(rng, 60), exponent, real=np.float32)
     how = of(SiiSettings, cut_irradiance=low, lobe_norm="full_lobe", widening=widening)
     expected = np.zeros(60, int)
     for i, k in np.ndindex(60, 60):

@@ -21,7 +21,7 @@ from refgi.frame import Frame
 from refgi.methods import find_method, render
 from refgi.scene import Scene
 from refgi.settings import flat
-from refgi.vectors.docstrings import descriptions, field_description, returned, spec_of, summary
+from refgi.vectors.docstrings import field_description, returned, spec_of, summary, taken
 from refgi.vectors.forms import described
 from refgi.vectors.forms.beside import Described
 from refgi.vectors.inputs import input_spec
@@ -196,7 +196,7 @@ def _add(
     """Add a run of a stage; return the names of its arrays by their leaves."""
     function = inspect.unwrap(stages.STAGES[run.name])
     arguments = run.arguments or {}
-    told, made = descriptions(function), returned(function)
+    told, made = taken(function), returned(function)
     reads: dict[str, str] = {}  # leaf of the parameters: array
     handed = dict(item for parameter, value in arguments.items() for item in leaves(value, parameter))
     for leaf, array in handed.items():
@@ -205,13 +205,13 @@ def _add(
             f"{name}.given.{leaf}" if leaf in outputs else f"{name}.{leaf}")
         reads[leaf] = known.name(array) or known.ids(array) or known.view(leaf, handed) or known.give(
             own, array, input_spec(own, arguments[parameter], handed) or spec_of(
-                field_description(arguments[parameter], field) or told.get(parameter, ""), array, own))
+                field_description(arguments[parameter], field) or told.get(parameter), array, own))
     writes = {leaf: f"{name}.{leaf}" if leaf else name for leaf in outputs}
     for leaf, array in outputs.items():
         known.add(writes[leaf], array)
     beside = described(run.name, arguments)
     specs = {writes[leaf]: dataclasses.replace(spec_of(made.get(leaf) or made.get(leaf.partition(".")[0]) or
-        field_description(run.value, leaf) or made.get("", ""), array, leaf or name), **beside.specs.get(leaf, {}))
+        field_description(run.value, leaf) or made.get(""), array, leaf or name), **beside.specs.get(leaf, {}))
         for leaf, array in outputs.items()}
     stage = run_of(function, arguments, reads, writes)
     what, paper = summary(function)

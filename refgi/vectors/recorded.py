@@ -40,31 +40,11 @@ def recorded_case(
     id: str, scene: Scene, method: str, settings: Any = None, *, only: str = "", what: str = "", indirect: bool = False,
     **options: Any,
 ) -> Case:
-    """Return a method on a scene, stage by stage.
+    """Return a method on a scene as a case `id`, stage by stage as they ran in float64; `what`: one line for people.
 
-    Parameters
-    ----------
-    id : str
-        The case's name.
-    scene : Scene
-        The scene.
-    method : str
-        Short name of the method.
-    settings : object, optional
-        Its settings; its defaults where absent.
-    only : str
-        Start of the names of stages to keep; all where empty. What they read of others is given.
-    what : str
-        One line for people.
-    indirect : bool
-        End at the indirect irradiance, without direct light and receivers' lobes.
-    **options : object
-        As of `refgi.methods.render`: width, height, rsm_resolution, shadows.
-
-    Returns
-    -------
-    Case
-        The stages in their order, as they ran in float64.
+    `only`: start of the names of stages to keep, all where empty; what they read of others is given. `indirect`: end at
+    the indirect irradiance, without direct light and receivers' lobes. `options` are those of `refgi.methods.render`:
+    width, height, rsm_resolution, shadows.
     """
     recipe = Recipe(id, method, what or f"{method} as it ran")
     recipe.scene = scene

@@ -18,7 +18,8 @@ returns. What several stages of a module take stands once in the module's docstr
 - light_position (3, light): Places of the pixel lights, m.
 - light_normal (3, light): Unit normals of their surfaces.
 - flux (3, light): Flux of their diffuse part, W.
-- lobe_flux, lobe_axis (3, light): Flux of their lobes, W, and unit axes.
+- lobe_flux (3, light): Flux of their lobes, W.
+- lobe_axis (3, light): Axes of their lobes, unit vectors.
 - lobe_exponent (light,): Phong exponents of their lobes.
 - footprint (light,): Surface that each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
 - top: Coarsest level.

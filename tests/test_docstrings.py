@@ -10,6 +10,7 @@ import inspect
 import pkgutil
 import re
 import sys
+import typing
 from collections import Counter
 from pathlib import Path
 
@@ -25,7 +26,7 @@ REPEATED = 3  # stages of a module that say the same of an array: their module's
 PURE = """
     normal axis lobe_axis frame axes lobe_exponent albedo weight share count region points shifts bias end
     cluster.back_projection cluster.basis cluster.box_means cluster.csm cluster.csm_penumbra.t cluster.depth_scale.slope
-    cluster.depth_tests cluster.disc_means cluster.distances.left_out cluster.frames_behind
+    cluster.depth_tests cluster.disc_means cluster.frames_behind
     cluster.kmeans_assign.distance cluster.map_depths cluster.mip_levels cluster.mip_means cluster.of_both cluster.pcss
     cluster.traced_share cluster.visibility frame.sum_of_lamps gather.centers.center gather.pattern.offset
     lights.grid_points lights.halton_points lights.warp.warped lights.warp.density_weight multires.curvatures.high
@@ -95,12 +96,11 @@ def test_every_stage_says_what_it_takes_and_gives(known):
         faults += [f"{name}: no text of {field}" for field, told in (taken | made).items() if not told.text]
         faults += [f"{name}: no shape of {field}" for field, told in (taken | made).items()
                    if re.search(r"\bN?D?[aA]rray", told.kind) and "Callable" not in told.kind]
-        parts = getattr(annotation, "__args__", ())
-        several = len(made) > 1 and ... not in parts
-        if not made or (several and parts and len(made) != len(parts)):
+        parts = typing.get_args(annotation) if typing.get_origin(annotation) is tuple else ()
+        if not made or (parts and ... not in parts and "" not in made and len(made) != len(parts)):
             faults.append(f"{name}: returns {annotation}, says {list(made)}")
         faults += [f"{name}: no shape of what it returns" for told in made.values()
-                   if "(" not in told.kind and "rray" in str(annotation) and not several]
+                   if "(" not in told.kind and "rray" in str(annotation) and len(made) == 1]
     assert not faults
     assert len(known) > 200
 

@@ -135,7 +135,7 @@ def _refracted(
 ) -> Rsm:
     """Find the exits of the light through glass texels and put lobes there.
 
-    materials: Their materials; `ior` > 0 is glass.
+    materials: Those of the triangles; `ior` > 0 is glass.
     exponent: Phong exponent of the lobes.
     tracer: Finds the exit of each refracted ray; None: back faces in the map's own projection, as published.
     fresnel: Whether each interface transmits its Fresnel share.

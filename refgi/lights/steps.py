@@ -128,9 +128,11 @@ def pixel_lights(
     """Make lights of texels with flux; those without are dropped (SII Sec. 3.1).
 
     texel, weight sequence of (light,): Texels of each map and T/N w.
-    position, normal sequence of (3, h, w): Surface points, m, and unit normals of each map.
+    position sequence of (3, h, w): Surface points of each map, m.
+    normal sequence of (3, h, w): Their unit normals.
     flux sequence of (3, h, w): Flux of the diffuse part, W.
-    lobe_flux, lobe_axis sequence of (3, h, w): Flux of the lobe, W, and its axis.
+    lobe_flux sequence of (3, h, w): Flux of the lobe, W.
+    lobe_axis sequence of (3, h, w): Its axis, unit vectors.
     lobe_exponent sequence of (h, w): Its Phong exponent.
     cell sequence of (texels,): Light that carries the flux of each texel.
     gain: With cells, what lights of a map carry beside that.
@@ -158,7 +160,8 @@ def footprints(
 ) -> Array:
     """Compute the surface that each light stands for (docs/methods/sii_sum).
 
-    position, normal (3, light): Places of the lights, m, and unit normals of their surfaces.
+    position (3, light): Places of the lights, m.
+    normal (3, light): Unit normals of their surfaces.
     texel, number (light,) int32: Each light's texel and map.
     solid_angle sequence of (h, w): Solid angles of each map's texels, sr; of a directional lamp areas across the light,
         m^2.
@@ -185,7 +188,7 @@ def cell_areas(
 ) -> Array:
     """Sum the surface of each light's cell that reflects (SII Sec. 4).
 
-    position, normal (3, h, w): Surface points, m, and unit normals of a map.
+    position (3, h, w): Surface points of a map, m.
     solid_angle (h, w): Solid angles of its texels, sr; of a directional lamp areas across the light, m^2.
     flux, lobe_flux (3, h, w): Flux of the diffuse part and of the lobe, W.
     cell (texels,) int64: Light that carries the flux of each texel.

@@ -26,7 +26,7 @@ def shadowed_radiance(
 ) -> Array:
     """Sum the radiance that every receiver's lobe reflects towards the eye of the light that reaches it.
 
-    points: The same with their lobes.
+    points: The receivers with their lobes.
     visibility: Whether to trace the rays, none for a light that lies off the lobe; without, every pair counts.
     batch: Pairs held at a time; changes no bit of the result.
     hidden: As for `shadowed_sum`.

@@ -36,7 +36,7 @@ def visible(
     """Trace whether light reaches each pixel from each pixel light (docs/methods/vpl).
 
     geometry: What may block.
-    face_normal (3, h, w): Unit normals of these, on the side of the pixels' normals.
+    face_normal (3, h, w): Unit normals of the triangles that pixels see, on the side of the pixels' normals.
     -> (light, h, w) bool: True where the normals of light and pixel and the pixel's face look at the other, whatever
         the lobe, and nothing lies between.
     """

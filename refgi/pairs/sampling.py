@@ -88,7 +88,7 @@ def error_of_halves(first: Array, second: Array, samples: int, of: str = "pixel 
 def seen_light(camera: "Camera", albedo: Array, direct: Array, receivers: Receivers, lights: "PixelLights") -> float:
     """Return the light that visible surfaces under direct light send to each other, over that of all pixel lights.
 
-    albedo, direct (3, h, w): Reflectance, and direct irradiance, W/m^2.
+    direct (3, h, w): Direct irradiance, W/m^2.
     -> float: Both without visibility and at the same sampled pixels; 0 without any light. Pixels send as discs, which
         rather lowers their light.
     """

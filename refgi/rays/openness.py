@@ -36,7 +36,8 @@ def openness(
     """Return how open surface points are: the share of cosine-weighted directions free within a radius.
 
     tracer: What may block.
-    position, normal (3, ...): Points, m, and unit normals, world space.
+    position (3, ...): Points, world space, m.
+    normal (3, ...): Their unit normals.
     covered (...) bool: Where there is a surface; everywhere if absent.
     radius: How far blockers count, m; inf for no limit.
     rays: Directions a point.

@@ -24,7 +24,7 @@ def visible_from_light(
 ) -> Array:
     """Trace a ray from each receiver to a light.
 
-    position, normal (3, h, w): Receivers, world space, m, and the unit normals of their faces.
+    normal (3, h, w): Unit normals of the pixels' faces.
     -> (h, w) bool: Whether the light reaches the receiver; false without surface.
     """
     return tracer.visible_from_light(position, normal, covered, light)
@@ -34,7 +34,7 @@ def visible_from_light(
 def shadow_rays(geometry: Geometry, position: Array, normal: Array, covered: Array, lamp: Lamp) -> Array:
     """Test whether no triangle lies between each receiver and a lamp (docs/conventions).
 
-    position, normal (3, h, w): Receivers, world space, m, and the unit normals of their faces.
+    normal (3, h, w): Unit normals of the pixels' faces.
     lamp: The lamp; its cone does not matter here.
     -> (h, w) bool: Whether the lamp reaches the receiver; false without surface.
     """

@@ -136,7 +136,7 @@ def looked_up(
 ) -> Array:
     """Look up whether a pixel is no farther from each light than its map says, by more than a bias (docs/methods/vpl).
 
-    face_normal (3, h, w): Unit normals of these, on the side of the pixels' normals.
+    face_normal (3, h, w): Unit normals of the triangles that pixels see, on the side of the pixels' normals.
     frame (light, axis, 3): Axes of their maps.
     depth (light, h, w): Distance, m; inf where nothing is.
     radius (number,): r of a point's disc, m.

@@ -46,7 +46,7 @@ def path_traced(
     E is the integral of L cos over the hemisphere, L = albedo/pi of the direct irradiance there; without direct light
     and the receiver's albedo/pi.
 
-    lights: Its lamps, (lamp, number) each.
+    lights: The scene's lamps, (lamp, number) each.
     -> mean (3, h, w): Mean of all samples, W/m^2.
     -> variance_of_mean (3, h, w): Estimated variance of that mean, in units of its square; 0 without surface.
     -> samples (h, w) int32: Samples of each pixel; 0 without surface.

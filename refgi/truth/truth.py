@@ -118,7 +118,7 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
                settings: TruthSettings) -> TruthResult:
     """Average independent passes over a G-buffer until the settings say stop.
 
-    tracer Tracer: Its rays.
+    tracer Tracer: Rays against the scene.
     -> TruthResult: Mean, variance of the mean and sample count of every pixel.
 
     Raises
@@ -134,7 +134,7 @@ def accumulate_lobes(scene: Scene, tracer: Any, position: Array, normal: Array, 
                      settings: TruthSettings) -> TruthResult:
     """Average independent passes of what lobes reflect towards the eye until the settings say stop.
 
-    tracer Tracer: Its rays.
+    tracer Tracer: Rays against the scene.
     settings: How and how long; a checkpoint has a file of its own, with ".lobes" behind its name.
     -> TruthResult: Mean, variance of the mean and sample count of every pixel, W/m^2/sr.
 

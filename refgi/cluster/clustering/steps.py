@@ -92,7 +92,6 @@ def kmeans_rounds(
 def kmeans_each(position: Array, normal: Array) -> tuple[Array, Array, Array]:
     """Let each light be a cluster, coincident ones too, where as many are asked for as there are (VAL Sec. 5.1).
 
-    normal (3, light): Their normals.
     -> center (3, cluster): Place of each cluster's light, m.
     -> normal (3, cluster): Its unit normal.
     -> of (light,) int: C(i): cluster of each light.

@@ -107,7 +107,7 @@ def mip_means(
     """Read means of the channels over discs by 8 texels of two levels (VAL Sec. 6).
 
     basis (area light, channel, row, column): Level 0.
-    levels mapping of str to: Levels from 1 on.
+    levels mapping of str to (area light, channel, row, column): Levels from 1 on.
     t (area light, row, column): Depths of the series where the basis is kept in 8 bits, of which level 0 is made anew.
     -> (area light, channel, h, w): Means of the channels over the disc; 0 where none is asked for.
     """

@@ -100,7 +100,7 @@ def traced_share(
 ) -> Array:
     """Find V of each area light by rays, or by what is no test of a map's texels alone (docs/methods/val_visibility).
 
-    maps mapping of str to: Their maps, where they are read.
+    maps mapping of str to (area light, ...): Maps of the area lights, where they are read.
     visibility_of: V from elsewhere.
     rays: The scene's triangles, for points behind an area light.
     -> (area light, h, w): V, 0 hidden to 1 seen; 1 without surface.

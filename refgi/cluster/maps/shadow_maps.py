@@ -208,8 +208,8 @@ def draw_maps(
     radius (k,): What is nearer to a centre counts as the settings say, m.
     tracer: Rays against the same triangles.
     -> distance (k, n, n): Distance, m; inf where the map is empty and outside the disc.
-    -> nearest (k,): Float64: smallest distance on each map, m; inf where nothing is.
-    -> left_out (k,): Int64: triangles that reach into each map's hemisphere and are ignored.
+    -> nearest (k,) float64: Smallest distance on each map, m; inf where nothing is.
+    -> left_out (k,) int64: Triangles that reach into each map's hemisphere and are ignored.
     """
     n = settings.resolution
     projection = Projection(PARABOLOID, n, n, center, np.ascontiguousarray(frame), np.ones(2), np.inf)

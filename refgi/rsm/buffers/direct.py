@@ -61,7 +61,7 @@ def shadow_map_visibility(
 ) -> Array:
     """Return which receivers a light reaches: the shadow-map test, one look-up at the nearest texel.
 
-    position, normal (3, h, w): Receivers, world space, and the unit normals of their faces.
+    normal (3, h, w): Unit normals of the pixels' faces.
     bias: A receiver is visible up to this far behind the stored depth, m: the published test. By default it is in
         shadow where the stored point lies above the receiver's own plane by more than a fraction of a texel.
     interpolated: Whether cosines are those of interpolated normals. These may face a light that the face is turned away

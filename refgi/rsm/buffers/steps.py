@@ -74,7 +74,7 @@ def shadow_map(
 ) -> Array:
     """Test where a lamp arrives: the nearest texel's point does not lie above the receiver's plane (docs/rasterizer).
 
-    position, normal (3, h, w): Receivers, world space, m, and the unit normals of their faces.
+    normal (3, h, w): Unit normals of the pixels' faces.
     depth (H, W): Depth that the lamp sees, m.
     map_position (3, H, W): Points that it sees, m.
     bias: A constant bias in place of the plane's, m.

@@ -135,7 +135,7 @@ def gather_coarsely(
 ) -> tuple[Array, int]:
     """Sum at coarse pixels and at those that are not like them; interpolate between the coarse ones elsewhere.
 
-    shown (h, w) bool: Those that are computed.
+    shown (h, w) bool: Pixels that are computed.
     coarsely: The grid of coarse pixels.
     extent: Box of the visible surfaces, m.
     -> irradiance (3, h, w): Irradiance, W/m^2, linear RGB.

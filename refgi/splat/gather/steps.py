@@ -83,7 +83,8 @@ def disc_sum(
 
     texel (S, h, w) int32: Texels of the samples.
     weight (S,): Weights of samples.
-    surface, surface_normal (3, H, W): The map's surface, m, and its unit normals.
+    surface (3, H, W): The map's surface, m.
+    surface_normal (3, H, W): Its unit normals.
     flux (3, H, W): Reflected flux of its diffuse part, W.
     radius: R, widths of a map.
     texels: T, of one map.
@@ -106,7 +107,7 @@ def disc_sum(
 def all_maps(irradiance: tuple[Array, ...]) -> Array:
     """Add the light of all maps (RSM 2005, Sec. 4).
 
-    irradiance tuple of (3, h, w): That of each map, W/m^2.
+    irradiance tuple of (3, h, w): Light of each map, W/m^2.
     -> (3, h, w): Gathered irradiance where every pixel runs the sum, W/m^2.
     """
     total = np.zeros_like(irradiance[0])

@@ -38,14 +38,14 @@ def first_level(
 ) -> Closest:
     """Keep the nearest surface to each texel, what it reflects and the surface it stands for (HSS Sec. 4, E-HSS-09).
 
-    -> position (3, h, w): Surface point from the eye, along the axes of the world, m: depth times the ray of depth 1
-        through the pixel's centre (E-HSS-10); 0 without surface.
-    -> depth (h, w): Depth along the view direction, m; inf without surface.
-    -> normal (3, h, w): Its unit normal on the side that is seen; 0 without surface.
-    -> radiance (3, h, w): Diffusely reflected direct light, albedo/pi E, W/m^2/sr; 0 without surface.
-    -> area (h, w): Surface ds that the texel stands for, Eq. 2 with tan(f / 2) (E-HSS-03) and dP = 4^k pixels
+    -> position (3, h_l, w_l): Surface point from the eye, along the axes of the world, m: depth times the ray of depth
+        1 through the pixel's centre (E-HSS-10); 0 without surface.
+    -> depth (h_l, w_l): Depth along the view direction, m; inf without surface.
+    -> normal (3, h_l, w_l): Its unit normal on the side that is seen; 0 without surface.
+    -> radiance (3, h_l, w_l): Diffusely reflected direct light, albedo/pi E, W/m^2/sr; 0 without surface.
+    -> area (h_l, w_l): Surface ds that the texel stands for, Eq. 2 with tan(f / 2) (E-HSS-03) and dP = 4^k pixels
         (E-HSS-06), m^2; 0 without surface.
-    -> pixel (h, w) int32: Pixel that was kept, row * columns + column; of equally near ones that nearest to the
+    -> pixel (h_l, w_l) int32: Pixel that was kept, row * columns + column; of equally near ones that nearest to the
         vertical centre line, then the upper, then the left; -1 without surface.
     """
     level = empty_level(number, depth.shape, depth.dtype)
@@ -65,12 +65,12 @@ def coarser_level(
     area (h, w): What they stand for, m^2.
     pixel (h, w) int32: Pixels that they show.
     number: Level k, the coarser one.
-    -> position (3, h, w): Surface point from the eye, along the axes of the world, m; 0 without surface.
-    -> depth (h, w): Depth along the view direction, m; inf without surface.
-    -> normal (3, h, w): Its unit normal; 0 without surface.
-    -> radiance (3, h, w): Diffusely reflected direct light, W/m^2/sr; 0 without surface.
-    -> area (h, w): Surface that the texel stands for: as often its own as it covers more pixels (E-HSS-06), m^2.
-    -> pixel (h, w) int32: Pixel that was kept, row * columns + column; of equally near ones that nearest to the
+    -> position (3, h_l, w_l): Surface point from the eye, along the axes of the world, m; 0 without surface.
+    -> depth (h_l, w_l): Depth along the view direction, m; inf without surface.
+    -> normal (3, h_l, w_l): Its unit normal; 0 without surface.
+    -> radiance (3, h_l, w_l): Diffusely reflected direct light, W/m^2/sr; 0 without surface.
+    -> area (h_l, w_l): Surface that the texel stands for: as often its own as it covers more pixels (E-HSS-06), m^2.
+    -> pixel (h_l, w_l) int32: Pixel that was kept, row * columns + column; of equally near ones that nearest to the
         vertical centre line, then the upper, then the left; -1 without surface.
     """
     return _next(Level(number - 1, position, depth, normal, radiance, area, pixel), size)[1:]
@@ -83,11 +83,11 @@ def first_mean(
 ) -> Means:
     """Average the pixels of each texel by area, add their areas, make normals unit vectors (HSS Sec. 4: average).
 
-    -> position (3, h, w): Mean surface point from the eye, along the axes of the world, m; 0 without surface.
-    -> depth (h, w): Mean depth along the view direction, m; inf without surface.
-    -> normal (3, h, w): Mean normal, a unit vector again; 0 without surface.
-    -> radiance (3, h, w): Mean of diffusely reflected direct light, albedo/pi E, W/m^2/sr; 0 without surface.
-    -> area (h, w): Sum of the pixels' surface ds, Eq. 2 with tan(f / 2) (E-HSS-03), m^2.
+    -> position (3, h_l, w_l): Mean surface point from the eye, along the axes of the world, m; 0 without surface.
+    -> depth (h_l, w_l): Mean depth along the view direction, m; inf without surface.
+    -> normal (3, h_l, w_l): Mean normal, a unit vector again; 0 without surface.
+    -> radiance (3, h_l, w_l): Mean of diffusely reflected direct light, albedo/pi E, W/m^2/sr; 0 without surface.
+    -> area (h_l, w_l): Sum of the pixels' surface ds, Eq. 2 with tan(f / 2) (E-HSS-03), m^2.
     """
     picture, view = Picture(depth, normal, albedo, irradiance), view_of(projection, as_published)
     return _averaged_pixels(picture, view, number, by_surface=True)[0][1:6]
@@ -104,11 +104,11 @@ def level_of_means(
     radiance (3, h, w): Their radiance, W/m^2/sr.
     area (h, w): Their surface, m^2.
     number: Level k, the coarser one.
-    -> position (3, h, w): Mean surface point from the eye, m; 0 without surface.
-    -> depth (h, w): Mean depth along the view direction, m; inf without surface.
-    -> normal (3, h, w): Mean normal, a unit vector again; 0 without surface.
-    -> radiance (3, h, w): Mean radiance, W/m^2/sr; 0 without surface.
-    -> area (h, w): Sum of areas, m^2.
+    -> position (3, h_l, w_l): Mean surface point from the eye, m; 0 without surface.
+    -> depth (h_l, w_l): Mean depth along the view direction, m; inf without surface.
+    -> normal (3, h_l, w_l): Mean normal, a unit vector again; 0 without surface.
+    -> radiance (3, h_l, w_l): Mean radiance, W/m^2/sr; 0 without surface.
+    -> area (h_l, w_l): Sum of areas, m^2.
     """
     fine = Level(number - 1, position, depth, normal, radiance, area, np.zeros(depth.shape, np.int32))
     coarse = _next(fine, size)
@@ -123,13 +123,13 @@ def first_mean_radiance(
 ) -> Counted:
     """Keep the nearest surface to each texel, with the mean radiance of all its pixels (HSS Sec. 4: average).
 
-    -> position (3, h, w): Surface point from the eye, along the axes of the world, m; 0 without surface.
-    -> depth (h, w): Depth along the view direction, m; inf without surface.
-    -> normal (3, h, w): Its unit normal; 0 without surface.
-    -> radiance (3, h, w): Mean over the texel's pixels with a surface of albedo/pi E, W/m^2/sr.
-    -> area (h, w): Surface ds that the texel stands for, m^2; 0 without surface.
-    -> pixel (h, w) int32: Pixel that was kept, row * columns + column; -1 without surface.
-    -> count (h, w) int32: Pixels with a surface that the texel covers.
+    -> position (3, h_l, w_l): Surface point from the eye, along the axes of the world, m; 0 without surface.
+    -> depth (h_l, w_l): Depth along the view direction, m; inf without surface.
+    -> normal (3, h_l, w_l): Its unit normal; 0 without surface.
+    -> radiance (3, h_l, w_l): Mean over the texel's pixels with a surface of albedo/pi E, W/m^2/sr.
+    -> area (h_l, w_l): Surface ds that the texel stands for, m^2; 0 without surface.
+    -> pixel (h_l, w_l) int32: Pixel that was kept, row * columns + column; -1 without surface.
+    -> count (h_l, w_l) int32: Pixels with a surface that the texel covers.
     """
     picture, view = Picture(depth, normal, albedo, irradiance), view_of(projection, as_published)
     level, count = _averaged_pixels(picture, view, number, by_surface=False)
@@ -150,13 +150,13 @@ def coarser_mean_radiance(
     pixel (h, w) int32: Pixels that they show.
     count (h, w) int32: Their pixels with a surface.
     number: Level k, the coarser one.
-    -> position (3, h, w): Surface point from the eye, m; 0 without surface.
-    -> depth (h, w): Depth along the view direction, m; inf without surface.
-    -> normal (3, h, w): Its unit normal; 0 without surface.
-    -> radiance (3, h, w): Mean over all pixels with a surface, W/m^2/sr.
-    -> area (h, w): Surface that the texel stands for, m^2; 0 without surface.
-    -> pixel (h, w) int32: Pixel that was kept, row * columns + column; -1 without surface.
-    -> count (h, w) int32: Pixels with a surface that the texel covers.
+    -> position (3, h_l, w_l): Surface point from the eye, m; 0 without surface.
+    -> depth (h_l, w_l): Depth along the view direction, m; inf without surface.
+    -> normal (3, h_l, w_l): Its unit normal; 0 without surface.
+    -> radiance (3, h_l, w_l): Mean over all pixels with a surface, W/m^2/sr.
+    -> area (h_l, w_l): Surface that the texel stands for, m^2; 0 without surface.
+    -> pixel (h_l, w_l) int32: Pixel that was kept, row * columns + column; -1 without surface.
+    -> count (h_l, w_l) int32: Pixels with a surface that the texel covers.
     """
     fine = Level(number - 1, position, depth, normal, radiance, area, pixel)
     coarse, pixels = _next(fine, size), plane(empty_level(number, size, depth.dtype).shape, depth.dtype)

@@ -149,7 +149,7 @@ def sum_of_pictures(
     """Upsample each light's subsplats by themselves, coarsest level first, and add (AMS Sec. 3.3.1, 3.5; E-AMS-09).
 
     first (N + 1,): Where each light's list begins.
-    level, row, column (subsplat): The lists of all lights.
+    level, row, column (subsplat) int: The lists of all lights.
     irradiance (rgb, subsplat): Their light, W/m^2.
     mode: Filter from level to level.
     filter_all, corner_rule: Whether leaves are filtered too; whether a cell across a corner counts only beside one that

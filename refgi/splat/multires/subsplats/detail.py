@@ -20,7 +20,7 @@ def surface_detail(
     """Darken what faces away from the camera: E (a <V, N> + 1 - a) (AMS Eq. 3).
 
     irradiance (3, h, w): Indirect irradiance, W/m^2.
-    position, normal (3, h, w): World space, m; unit normal on the camera's side.
+    normal (3, h, w): Unit normals on the camera's side.
     eye (3,) or (1, 3): Where the camera is, m.
     a: How much, 0 (nothing changes) to 1; the paper shows 0.5.
     -> (3, h, w): Irradiance, W/m^2; 0 where there is no surface.

@@ -49,7 +49,8 @@ def representative_points(
     """Return the point at which each subsplat is evaluated.
 
     representative: Position and normal of the cell's representative pixel, or the mean over the cell's surface.
-    -> points, normals (3, n): World space, m, and unit vectors.
+    -> points (3, n): World space, m.
+    -> normals (3, n): Unit normals there.
     """
     position, normal = buffer.resolve("position", "normal")
     return points_of(position, normal, buffer.covered, subsplats, representative)
@@ -79,7 +80,8 @@ def evaluate(
 ) -> Array:
     """Sum the irradiance of every pixel light at some points (Eq. 2).
 
-    points, normals (3, n): World space, m, and unit vectors; neighbours should follow each other.
+    points (3, n): World space, m; neighbours should follow each other.
+    normals (3, n): Unit normals there.
     lightcuts: Sum diffuse lights by clusters, to an error.
     -> (3, n): Irradiance, W/m^2, linear RGB: that of `irradiance` at the same points, to the bit; with lightcuts within
         their error.

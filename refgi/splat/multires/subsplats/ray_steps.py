@@ -44,7 +44,8 @@ def lights_seen(
 ) -> Array:
     """Trace whether light reaches each subsplat from each pixel light (SII Eq. 2 with V).
 
-    point, point_normal (3, n): The subsplats, m.
+    point (3, n): The subsplats, m.
+    point_normal (3, n): Their unit normals.
     pixel (n,): Pixel of each subsplat.
     face_normal (3, n): Normals of the subsplats' faces.
     -> (light, subsplat) bool: True where the subsplat's point, its normal and its face look at the light, it at them,
@@ -78,7 +79,8 @@ def seen_irradiance(
 ) -> Array:
     """Sum the irradiance of the lights that each subsplat sees, without albedo/pi (AMS Eq. 2 with V; E-AMS-02).
 
-    point, point_normal (3, n): The subsplats, m.
+    point (3, n): The subsplats, m.
+    point_normal (3, n): Their unit normals.
     seen (light, n) bool: Which lights reach which.
     -> (rgb, subsplat): Indirect irradiance, W/m^2.
     """

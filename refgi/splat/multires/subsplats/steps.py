@@ -1,6 +1,6 @@
 """Light at subsplats and its upsampling one step after the other: points, Eq. 2, levels of the picture.
 
-- level, row, column (subsplat): The list of subsplats.
+- level, row, column (subsplat) int: The list of subsplats.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -37,7 +37,7 @@ def points(
 ) -> tuple[Array, Array]:
     """Find the point and normal that each subsplat is evaluated at (AMS Sec. 3.4; E-AMS-11).
 
-    pixel (subsplat): Each one's representative.
+    pixel (subsplat) int: Each one's representative.
     representative: Its representative pixel's, or the mean surface's.
     -> point (xyz, subsplat): Surface point, m.
     -> normal (xyz, subsplat): Its unit normal.
@@ -96,7 +96,7 @@ def upsample_level(
 ) -> tuple[Array, Array]:
     """Make the light of a level from that of the level above and subsplats (AMS Sec. 3.5; E-AMS-09).
 
-    irradiance (rgb, subsplat): Their light, W/m^2.
+    irradiance (rgb, subsplat): Light at the subsplats, W/m^2.
     at: The level.
     mode: Weights (1, 2, 1) x (1, 2, 1) of the level itself ("tent"), or (1 - f, 1, f) / 2 on the coarser level
         ("demo").
@@ -121,7 +121,7 @@ def upsample_at_once(
 ) -> Array:
     """Fill pixels from subsplats without levels (AMS Sec. 3.5, Fig. 7).
 
-    irradiance (rgb, subsplat): Their light, W/m^2.
+    irradiance (rgb, subsplat): Light at the subsplats, W/m^2.
     mode: Each pixel has the light of its subsplat ("nearest"), or the sum of all levels, each interpolated as if it
         were black where it holds nothing ("naive_bilinear").
     -> (rgb, h, w): Indirect irradiance, W/m^2; 0 without surface.

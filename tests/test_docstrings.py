@@ -31,6 +31,7 @@ PURE = """
     cluster.traced_share cluster.visibility frame.sum_of_lamps gather.centers.center gather.pattern.offset
     lights.grid_points lights.halton_points lights.warp.warped lights.warp.density_weight multires.curvatures.high
     multires.depth_slopes.high multires.normal_ranges.low multires.normal_ranges.high multires.subsplat_facing
+    multires.representative_points.normals
     rays.openness rsm.facing rsm.resolve rsm.spread_over_picture sii.ellipsoids.appendix_center
     sii.ellipsoids.appendix_half_width sii.ellipsoids.appendix_height sii.ellipsoids.tangent_center
     sii.ellipsoids.tangent_half_width sii.ellipsoids.tangent_height sssil.reproject.mean sssil.sample_points

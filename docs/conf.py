@@ -1,6 +1,11 @@
 """Sphinx configuration."""
 
+import inspect
+import re
+from typing import Any
+
 from refgi import __version__
+from refgi.vectors.docstrings import documented
 
 project = "refgi"
 author = "the refgi authors"
@@ -15,3 +20,22 @@ html_theme = "alabaster"
 html_theme_options = {"description": release, "page_width": "1100px"}
 exclude_patterns = ["_build"]
 suppress_warnings = ["myst.header"]
+
+
+def sections(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:  # noqa: ARG001
+    """Make numpydoc's sections of the lines of arrays in a stage's docstring."""
+    if not hasattr(thing, "stage_name"):
+        return
+    first, *others = (inspect.getdoc(thing) or "").split("\n\n")
+    made = []
+    for title, told in zip(("Parameters", "Returns"), documented(thing), strict=True):
+        entries = (f"{f'{field} : ' if field else ''}{kind}\n    {text}" for field, (kind, text) in told.items())
+        made.append("\n".join([title, "-" * len(title), *entries]))
+    rest = [part for part in others if not re.match(r"(\w+, )*\w+( [^\n]+)?: |-> ", part)]
+    heading = next((k for k, part in enumerate(rest) if re.match(r"\w+\n--", part)), len(rest))
+    lines[:] = "\n\n".join([first, *rest[:heading], *made, *rest[heading:], ""]).split("\n")
+
+
+def setup(app: Any) -> None:
+    """Let stages' docstrings be read before numpydoc reads them."""
+    app.connect("autodoc-process-docstring", sections, priority=400)

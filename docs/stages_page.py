@@ -6,7 +6,6 @@
 import importlib
 import inspect
 import pkgutil
-import re
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 import refgi
 from refgi import stages
 from refgi.methods import METHODS, render
+from refgi.vectors.docstrings import documented
 
 PAGE = Path(__file__).with_name("stages.md")
 HEAD = """# Stages
@@ -75,26 +75,13 @@ def _tables() -> list[str]:
 
 
 def _stage(name: str, stage: Callable[..., Any]) -> list[str]:
-    text = inspect.cleandoc(stage.__doc__ or "")
-    summary = text.splitlines()[0] if text else ""
-    lines = [f"### `{name}`", "", f"{summary} `{stage.__module__}.{stage.__name__}`", "", "| | type | what |",
+    what = (inspect.getdoc(stage) or "").splitlines()[0]
+    lines = [f"### `{name}`", "", f"{what} `{stage.__module__}.{stage.__name__}`", "", "| | type | what |",
              "|---|---|---|"]
-    for section, label in (("Parameters", "in"), ("Returns", "out"), ("Yields", "out")):
-        lines += [f"| {label}: {field} | {kind} | {about} |" for field, kind, about in _fields(text, section)]
+    for way, told in zip(("in", "out"), documented(stage), strict=True):
+        rows = ((f"`{field}`" if field else "", *one) for field, one in told.items())
+        lines += [f"| {way}: {' | '.join(cell.replace('|', 'or') for cell in row)} |" for row in rows]
     return [*lines, ""]
-
-
-def _fields(text: str, section: str) -> list[tuple[str, str, str]]:
-    """Return name, type and first sentence of the entries of a docstring's section."""
-    found = re.search(rf"^{section}\n-+\n(.*?)(?=^\w+\n-+\n|\Z)", text, re.MULTILINE | re.DOTALL)
-    fields = []
-    for entry in re.split(r"\n(?=\S)", found[1].rstrip()) if found else []:
-        head, _, about = entry.partition("\n")
-        name, colon, kind = head.partition(" : ")
-        name, kind = (name, kind) if colon else ("", head)
-        about = " ".join(about.split())
-        fields.append((f"`{name}`" if name else "", kind.replace("|", "or"), about.replace("|", "or")))
-    return fields
 
 
 if __name__ == "__main__":

@@ -220,15 +220,8 @@ class Frame:
 def sum_of_lamps(parts: list[Array]) -> Array:
     """Add up what receivers have of each lamp.
 
-    Parameters
-    ----------
-    parts : list of (3, ...) ndarray
-        Irradiance, W/m^2, or radiance of lobes, W/m^2/sr; one a lamp.
-
-    Returns
-    -------
-    (3, ...) ndarray
-        Their sum.
+    parts list of (3, ...): Irradiance, W/m^2, or radiance of lobes, W/m^2/sr; one a lamp.
+    -> (3, ...): Their sum.
     """
     return np.asarray(sum(parts[1:], start=parts[0]))
 
@@ -243,21 +236,10 @@ def _compose_steps(direct: Array, indirect: Array | None, buffer: "GBuffer", mat
 def compose(direct: Array, indirect: Array | None, buffer: "GBuffer", materials: MaterialTable) -> Array:
     """Turn irradiance into what the camera receives.
 
-    Parameters
-    ----------
-    direct : (3, h, w) ndarray
-        Direct irradiance, W/m^2.
-    indirect : (3, h, w) ndarray, optional
-        Indirect irradiance, W/m^2.
-    buffer : GBuffer
-        The camera's G-buffer.
-    materials : MaterialTable
-        The scene's materials; only their emission is used here.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Radiance, W/m^2/sr, linear RGB.
+    direct (3, h, w): Direct irradiance, W/m^2.
+    indirect (3, h, w): Indirect irradiance, W/m^2.
+    materials: The scene's materials; only their emission is used here.
+    -> (3, h, w): Radiance, W/m^2/sr, linear RGB.
     """
     from refgi.rsm import leaving_radiance
 
@@ -268,19 +250,10 @@ def compose(direct: Array, indirect: Array | None, buffer: "GBuffer", materials:
 def add_lobes(radiance: Array, direct: Array, indirect: Array | None) -> Array:
     """Add to what the camera receives from diffuse receivers what their lobes reflect.
 
-    Parameters
-    ----------
-    radiance : (3, h, w) ndarray
-        Emission and diffuse reflection, W/m^2/sr.
-    direct : (3, h, w) ndarray
-        Lobes by direct light, W/m^2/sr.
-    indirect : (3, h, w) ndarray, optional
-        Lobes by indirect light, W/m^2/sr.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Radiance, W/m^2/sr, linear RGB.
+    radiance (3, h, w): Emission and diffuse reflection, W/m^2/sr.
+    direct (3, h, w): Lobes by direct light, W/m^2/sr.
+    indirect (3, h, w): Lobes by indirect light, W/m^2/sr.
+    -> (3, h, w): Radiance, W/m^2/sr, linear RGB.
     """
     return radiance + direct if indirect is None else radiance + (direct + indirect)
 
@@ -299,15 +272,8 @@ def _dtype(requested: npt.DTypeLike) -> np.dtype[Any]:
 def _tracer(geometry: Any) -> "Tracer":
     """Build Embree's acceleration structure.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-
-    Returns
-    -------
-    Tracer
-        Traces closest hits and occlusion.
+    geometry Geometry: The triangles.
+    -> Tracer: Traces closest hits and occlusion.
     """
     from refgi.rays import Tracer
 

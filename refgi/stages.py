@@ -3,6 +3,27 @@
 A stage is a pure function. Called plainly it is just that function. Inside `observe()` each call leaves a `Run` in
 the log: what ran and for how long, what was reused because every input was the same object or an equal value, and,
 through `skip`, what was left out and why. Nothing else in refgi times, caches or logs.
+
+A stage's docstring has a line for each array that it takes, `name (shape) type: text.`, and after `->` for each that it
+returns. What several stages of a module take stands once in the module's docstring, and here what stages of several do:
+
+- position (3, h, w): Surface points of the pixels, world space, m.
+- normal (3, h, w): Their unit normals, world space.
+- facing (3, h, w): Unit normals of the triangles that pixels see.
+- covered (h, w) bool: Whether a pixel shows a surface.
+- triangle_id (h, w) int32: Nearest triangle, that a pixel sees; -1 for none.
+- albedo (3, h, w): Diffuse reflectance.
+- vertices (vertex, 3): Corners of the triangles, m.
+- faces (triangle, corner) int32: Vertices of the triangles.
+- light_position (3, light): Places of the pixel lights, m.
+- light_normal (3, light): Unit normals of their surfaces.
+- flux (3, light): Flux of their diffuse part, W.
+- lobe_flux (3, light): Flux of their lobes, W.
+- lobe_axis (3, light): Axes of their lobes, unit vectors.
+- lobe_exponent (light,): Phong exponents of their lobes.
+- footprint (light,): Surface that each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
+- top: Coarsest level.
+- dtype: Float32 or float64.
 """
 
 import dataclasses

@@ -103,21 +103,10 @@ def count_for_error(
 ) -> Adaptive:
     """Find how many area lights bring the error of visibility below a target.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene with its buffers.
-    lights : PixelLights
-        N lights.
-    settings : ValSettings
-        `clusters.target_error`, and all that makes the visibility of an area light.
-    footprint : (N,) ndarray, optional
-        Surface area of each light, m^2, where a cluster of one light is its footprint.
-
-    Returns
-    -------
-    Adaptive
-        The fewest area lights tried whose error lies below the target at 95 %; where none does, those of least error.
+    settings: `clusters.target_error`, and all that makes the visibility of an area light.
+    footprint (light,): Surface area of each light, m^2, where a cluster of one light is its footprint.
+    -> Adaptive: The fewest area lights tried whose error lies below the target at 95 %; where none does, those of least
+        error.
 
     Raises
     ------
@@ -199,25 +188,10 @@ def _samples(frame: "Frame", lights: "PixelLights", settings: "ValSettings") -> 
 def sampled_pixels(position: Array, normal: Array, triangle_id: Array, shifts: Array) -> tuple[Array, Array, Array]:
     """Take one pixel of each of as many equal parts of the surface that is seen, row by row (docs/methods/val).
 
-    Parameters
-    ----------
-    position : (3, h, w) ndarray
-        Surface points, m.
-    normal : (3, h, w) ndarray
-        Unit normals.
-    triangle_id : (h, w) int ndarray
-        Which triangle a pixel sees; -1 for none.
-    shifts : (sample,) ndarray
-        Random numbers, places within the parts, [0, 1).
-
-    Returns
-    -------
-    position : (3, one, sample) ndarray
-        Surface points, m.
-    normal : (3, one, sample) ndarray
-        Unit normals.
-    triangle_id : (one, sample) int ndarray
-        Which triangle each sees.
+    shifts (sample,): Random numbers, places within the parts, [0, 1).
+    -> position (3, one, sample): Surface points, m.
+    -> normal (3, one, sample): Unit normals.
+    -> triangle_id (one, sample) int: Which triangle each sees.
     """
     surface = np.flatnonzero(triangle_id >= 0)
     drawn = np.arange(len(shifts))

@@ -19,17 +19,7 @@ if TYPE_CHECKING:
 def val_ledger(frame: "Frame", settings: ValSettings) -> Ledger:
     """Account for the power of the lights under `val`.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its buffers.
-    settings : ValSettings
-        Those of `val`.
-
-    Returns
-    -------
-    Ledger
-        Its lines sum to `emitted` but for the rounding of the frame's dtype.
+    -> Ledger: Its lines sum to `emitted` but for the rounding of the frame's dtype.
 
     Notes
     -----

@@ -50,29 +50,15 @@ def flux_importance(
 ) -> Array:
     """Compute the importance of each texel for `warp_samples`: the largest channel of its flux (SII Sec. 3.5).
 
-    Parameters
-    ----------
-    flux : (3, H, W) ndarray
-        Flux of the diffuse part, W.
-    lobe_flux : (3, H, W) ndarray or None
-        Flux of the lobe, W.
-    lobe_exponent : (H, W) ndarray or None
-        Its exponent P.
-    kind : {"flux", "peak", "openness"}
-        Phi; Phi g(P); or Phi g(P) max(floor, 1 - O).
-    openness : (H, W) ndarray, optional
-        Share O of unoccluded directions, 0 to 1, for the kind "openness".
-    floor : float
-        Least factor that openness leaves, 0 to 1. With 0 texels in the open are never chosen and their flux is lost.
-    defensive : float
-        Share beta, 0 to 1, of the samples that are uniform over the map.
-    as_printed : bool
-        Take g(P) = P, so that sharp lobes count up to twice as much; with it a lobe of P = 0 is never chosen.
-
-    Returns
-    -------
-    (H, W) ndarray
-        Importance of each texel, W, in the dtype of the flux.
+    flux (3, H, W): Flux of the diffuse part, W.
+    lobe_flux (3, H, W): Flux of the lobe, W.
+    lobe_exponent (H, W): Its exponent P.
+    kind: Phi; Phi g(P); or Phi g(P) max(floor, 1 - O).
+    openness (H, W): Share O of unoccluded directions, 0 to 1, for the kind "openness".
+    floor: Least factor that openness leaves, 0 to 1. With 0 texels in the open are never chosen and their flux is lost.
+    defensive: Share beta, 0 to 1, of the samples that are uniform over the map.
+    as_printed: Take g(P) = P, so that sharp lobes count up to twice as much; with it a lobe of P = 0 is never chosen.
+    -> (H, W): Importance of each texel, W, in the dtype of the flux.
 
     Raises
     ------

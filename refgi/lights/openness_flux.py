@@ -27,21 +27,10 @@ def scale_flux(
 ) -> "tuple[PixelLights, Array]":
     """Scale each light's flux by 1 - O.
 
-    Parameters
-    ----------
-    lights : PixelLights
-        N' lights.
-    openness : (N',) ndarray
-        Share O of unoccluded directions of each light, 0 to 1.
-    as_printed : bool
-        Scale by O, the ambient occlusion term as the paper defines it.
-
-    Returns
-    -------
-    lights : PixelLights
-        All of them, in the same order; those with O = 1, as printed O = 0, are dark.
-    lost : (3,) ndarray of float64
-        Flux removed, W, diffuse and lobe together.
+    openness (light,): Share O of unoccluded directions of each light, 0 to 1.
+    as_printed: Scale by O, the ambient occlusion term as the paper defines it.
+    -> lights PixelLights: All of them, in the same order; those with O = 1, as printed O = 0, are dark.
+    -> lost (3,) float64: Flux removed, W, diffuse and lobe together.
 
     Raises
     ------
@@ -60,21 +49,10 @@ def scale_flux(
 def roulette(lights: "PixelLights", openness: Array, floor: float, seed: int) -> "PixelLights":
     """Keep each light with chance p = max(floor, 1 - O) and divide its flux by p.
 
-    Parameters
-    ----------
-    lights : PixelLights
-        N' lights.
-    openness : (N',) ndarray
-        Share O of unoccluded directions of each light, 0 to 1.
-    floor : float
-        Least chance, above 0 to 1: no light's flux grows by more than 1 / floor.
-    seed : int
-        Which random choice: one number a light, in their order.
-
-    Returns
-    -------
-    PixelLights
-        The survivors, in order. Sums over them have the mean of sums over `lights`.
+    openness (light,): Share O of unoccluded directions of each light, 0 to 1.
+    floor: Least chance, above 0 to 1: no light's flux grows by more than 1 / floor.
+    seed: Which random choice: one number a light, in their order.
+    -> PixelLights: The survivors, in order. Sums over them have the mean of sums over `lights`.
 
     Raises
     ------

@@ -65,30 +65,15 @@ def draw_texels(
 ) -> list[Drawn]:
     """Draw texels of maps as pixel lights.
 
-    Parameters
-    ----------
-    rsms : sequence of Rsm
-        One map a light.
-    count : int or None
-        How many are asked for, over all maps; None with pattern "all". `map_shares` says how many each map draws.
-    pattern : {"grid", "halton", "all", "random"}
-        Where the texels lie: the centres of n x n equal cells on each map (on each of a cube's faces); the Halton set
-        in bases 2, 3 over the stacked maps; every texel; independently random.
-    seed : int
-        Of the random pattern, and of the Halton set's shift modulo 1; seed 0 leaves the Halton set unshifted.
-    filtered : bool
-        Let each light carry the flux of its cell: the grid's cell, or the texels nearest to it.
-    warp : Warp, optional
-        Move the pattern to where the map is important; stacked maps are chosen by importance first.
-    importance : sequence of (H, W) ndarray, optional
-        Importance of each map's texels for the warp; the flux if absent.
-    renormalise : bool
-        Scale each map's weights w to a sum of N. Biased, and noisier where the warp goes down to texels.
-
-    Returns
-    -------
-    list of Drawn
-        One a map.
+    count: How many are asked for, over all maps; None with pattern "all". `map_shares` says how many each map draws.
+    pattern: Where the texels lie: the centres of n x n equal cells on each map (on each of a cube's faces); the Halton
+        set in bases 2, 3 over the stacked maps; every texel; independently random.
+    seed: Of the random pattern, and of the Halton set's shift modulo 1; seed 0 leaves the Halton set unshifted.
+    filtered: Let each light carry the flux of its cell: the grid's cell, or the texels nearest to it.
+    warp: Move the pattern to where the map is important; stacked maps are chosen by importance first.
+    importance sequence of (H, W): Importance of each map's texels for the warp; the flux if absent.
+    renormalise: Scale each map's weights w to a sum of N. Biased, and noisier where the warp goes down to texels.
+    -> list of Drawn: One a map.
 
     Raises
     ------
@@ -136,17 +121,7 @@ def _light_steps(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> dict[str, Array
 def lights_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> PixelLights:
     """Return drawn texels as pixel lights.
 
-    Parameters
-    ----------
-    rsms : sequence of Rsm
-        One map a light.
-    drawn : sequence of Drawn
-        The texels drawn from each.
-
-    Returns
-    -------
-    PixelLights
-        Those with flux.
+    -> PixelLights: Those with flux.
 
     Notes
     -----
@@ -200,17 +175,8 @@ def _area_steps(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> Array:
 def footprints_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> Array:
     """Return the surface area that each pixel light of `lights_of` stands for.
 
-    Parameters
-    ----------
-    rsms : sequence of Rsm
-        One map a light.
-    drawn : sequence of Drawn
-        The texels drawn from each.
-
-    Returns
-    -------
-    (N,) ndarray
-        Area, m^2: O d^2 / cos of the texel with the same T/N w as its flux, or of all texels of its cell that reflect.
+    -> (light,): Area, m^2: O d^2 / cos of the texel with the same T/N w as its flux, or of all texels of its cell that
+        reflect.
     """
     parts = []
     for index in _drawn_from(drawn):

@@ -135,25 +135,11 @@ def _refracted(
 ) -> Rsm:
     """Find the exits of the light through glass texels and put lobes there.
 
-    Parameters
-    ----------
-    rsm : Rsm
-        The map of one light.
-    geometry : Geometry
-        The triangles.
-    materials : MaterialTable
-        Their materials; `ior` > 0 is glass.
-    exponent : float
-        Phong exponent of the lobes.
-    tracer : RayTracer or None
-        Finds the exit of each refracted ray; None: back faces in the map's own projection, as published.
-    fresnel : bool
-        Whether each interface transmits its Fresnel share.
-
-    Returns
-    -------
-    Rsm
-        The map with texels of glass replaced by their exits: positions, m, and lobes with their flux, W.
+    materials: Those of the triangles; `ior` > 0 is glass.
+    exponent: Phong exponent of the lobes.
+    tracer: Finds the exit of each refracted ray; None: back faces in the map's own projection, as published.
+    fresnel: Whether each interface transmits its Fresnel share.
+    -> Rsm: The map with texels of glass replaced by their exits: positions, m, and lobes with their flux, W.
     """
     glass = materials.ior[geometry.material_of_face] > 0
     texel = np.flatnonzero(np.append(glass, False)[rsm.triangle_id.reshape(-1)])  # the last for -1, no surface

@@ -43,15 +43,7 @@ class MapShare(NamedTuple):
 def map_flux(rsm: "Rsm") -> float:
     """Return the flux that the surfaces of a map reflect, by its diffuse part and by lobes, all channels together.
 
-    Parameters
-    ----------
-    rsm : Rsm
-        The map.
-
-    Returns
-    -------
-    float
-        W, from a grid of texels, 128 x 128 of each face; of all texels where those have none.
+    -> float: W, from a grid of texels, 128 x 128 of each face; of all texels where those have none.
     """
     texel = texel_grid(rsm.covered, SIDE)
     found = _flux_at(rsm, texel) * (rsm.texels / len(texel))
@@ -69,22 +61,11 @@ def _flux_at(rsm: "Rsm", texel: Array) -> float:
 def map_shares(rsms: "Sequence[Rsm]", count: int | None, pattern: Pattern, seed: int = 0) -> list[MapShare]:
     """Return how many texels are drawn from each map.
 
-    Parameters
-    ----------
-    rsms : sequence of Rsm
-        Reflective shadow maps, one a light.
-    count : int or None
-        How many are asked for, over all maps; None with pattern "all".
-    pattern : {"grid", "halton", "all", "random"}
-        As for `choose_pixel_lights`.
-    seed : int
-        Which lamps are drawn where there are fewer lights than lamps.
-
-    Returns
-    -------
-    list of MapShare
-        One a map. The numbers sum to the count, but for the grid, whose m x m cells on each of a map's faces come as
-        near to the map's share as they can.
+    count: How many are asked for, over all maps; None with pattern "all".
+    pattern: As for `choose_pixel_lights`.
+    seed: Which lamps are drawn where there are fewer lights than lamps.
+    -> list of MapShare: One a map. The numbers sum to the count, but for the grid, whose m x m cells on each of a map's
+        faces come as near to the map's share as they can.
 
     Raises
     ------

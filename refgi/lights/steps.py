@@ -46,19 +46,10 @@ class MapPlanes(NamedTuple):
 def halton_points(counts: tuple[int, ...], shifts: Array, number: int) -> Array:
     """Compute the Halton points of a map in bases 2 and 3 from index 0 (SII Sec. 3.1).
 
-    Parameters
-    ----------
-    counts : tuple of int
-        Points of each map.
-    shifts : (maps, uv) ndarray
-        What is added to the points of each map, modulo 1.
-    number : int
-        Which map.
-
-    Returns
-    -------
-    (point, uv) ndarray
-        Points of the unit square in [0, 1): u along columns, v along rows downwards.
+    counts: Points of each map.
+    shifts (maps, uv): What is added to the points of each map, modulo 1.
+    number: Which map.
+    -> (point, uv): Points of the unit square in [0, 1): u along columns, v along rows downwards.
     """
     return np.minimum(halton(counts[number], shift=shifts[number].tolist()), BELOW_1)
 
@@ -67,19 +58,10 @@ def halton_points(counts: tuple[int, ...], shifts: Array, number: int) -> Array:
 def grid_points(n: int, maps: int, rows: int) -> Array:
     """Compute the centres of n x n cells of each map, row by row (SII Sec. 3.1).
 
-    Parameters
-    ----------
-    n : int
-        Cells along a side.
-    maps : int
-        How many are stacked along rows.
-    rows : int
-        Texels along a column of one map.
-
-    Returns
-    -------
-    (point, uv) ndarray
-        Points of the unit square in [0, 1): u along columns, v along rows downwards.
+    n: Cells along a side.
+    maps: How many are stacked along rows.
+    rows: Texels along a column of one map.
+    -> (point, uv): Points of the unit square in [0, 1): u along columns, v along rows downwards.
     """
     one = grid(n)
     if maps == 1:
@@ -95,29 +77,15 @@ def texels(
 ) -> tuple[Array, Array]:
     """Find the texel that each point falls on, and T/N w (SII Sec. 3.1).
 
-    Parameters
-    ----------
-    points : (point, uv) ndarray
-        Points of the unit square.
-    counts : tuple of int
-        Lights of each map.
-    number : int
-        Which map.
-    maps, rows, columns : int
-        Stacked maps of rows and columns.
-    density_weight : (point,) ndarray, optional
-        Weight w of the warp.
-    gain : float
-        What lights carry beside T/N where lamps are drawn.
-    renormalise : bool
-        Scale w to a sum of N.
-
-    Returns
-    -------
-    texel : (light,) ndarray of int64
-        Row * columns + column over the stacked maps.
-    weight : (light,) ndarray
-        T/N times the weight of the warp: how many texels a light stands for.
+    points (point, uv): Points of the unit square.
+    counts: Lights of each map.
+    number: Which map.
+    maps, rows, columns: Stacked maps of rows and columns.
+    density_weight (point,): Weight w of the warp.
+    gain: What lights carry beside T/N where lamps are drawn.
+    renormalise: Scale w to a sum of N.
+    -> texel (light,) int64: Row * columns + column over the stacked maps.
+    -> weight (light,): T/N times the weight of the warp: how many texels a light stands for.
     """
     height, count = maps * rows, counts[number]
     at = texel_of(points[:, 1], height) * columns + texel_of(points[:, 0], columns)
@@ -131,17 +99,9 @@ def texels(
 def every_texel(count: int) -> tuple[Array, Array]:
     """List all texels of a map as lights (SII Sec. 3.1).
 
-    Parameters
-    ----------
-    count : int
-        Texels.
-
-    Returns
-    -------
-    texel : (light,) ndarray of int64
-        Row * columns + column over the stacked maps.
-    weight : (light,) ndarray
-        1: each stands for itself.
+    count: Texels.
+    -> texel (light,) int64: Row * columns + column over the stacked maps.
+    -> weight (light,): 1: each stands for itself.
     """
     return np.arange(count), np.ones(count)
 
@@ -150,19 +110,10 @@ def every_texel(count: int) -> tuple[Array, Array]:
 def cells(texel: Array, maps: int, rows: int, columns: int, on_grid: bool) -> Array:
     """Find the light that carries the flux of each texel (SII Sec. 4).
 
-    Parameters
-    ----------
-    texel : (light,) ndarray of int64
-        Texels of the lights.
-    maps, rows, columns : int
-        Stacked maps of rows and columns.
-    on_grid : bool
-        By cells of a grid; else by the nearest light.
-
-    Returns
-    -------
-    (texels,) ndarray of int64
-        Index of a light for each texel of the flattened map.
+    texel (light,) int64: Texels of the lights.
+    maps, rows, columns: Stacked maps of rows and columns.
+    on_grid: By cells of a grid; else by the nearest light.
+    -> (texels,) int64: Index of a light for each texel of the flattened map.
     """
     view = Projection(0, rows, columns, np.zeros((maps, 3)), np.zeros((maps, 3, 3)), np.ones(2), math.inf)
     return cells_of_grid(view, len(texel)) if on_grid else cells_of_nearest(view, texel)
@@ -176,41 +127,23 @@ def pixel_lights(
 ) -> tuple[Array | None, ...]:
     """Make lights of texels with flux; those without are dropped (SII Sec. 3.1).
 
-    Parameters
-    ----------
-    texel, weight : sequence of (light,) ndarray
-        Texels of each map and T/N w.
-    position, normal : sequence of (3, h, w) ndarray
-        Surface points, m, and unit normals of each map.
-    flux : sequence of (3, h, w) ndarray
-        Flux of the diffuse part, W.
-    lobe_flux, lobe_axis : sequence of (3, h, w) ndarray, optional
-        Flux of the lobe, W, and its axis.
-    lobe_exponent : sequence of (h, w) ndarray, optional
-        Its Phong exponent.
-    cell : sequence of (texels,) ndarray, optional
-        Light that carries the flux of each texel.
-    gain : tuple of float
-        With cells, what lights of a map carry beside that.
-
-    Returns
-    -------
-    position : (3, light) ndarray
-        Places of the lights, m.
-    normal : (3, light) ndarray
-        Unit normals of their surfaces.
-    flux : (3, light) ndarray
-        Diffuse flux, W, T/N w included: Phi_i = T/N w Phi_t.
-    lobe_flux : (3, light) ndarray
-        Flux of the lobe, W, T/N w included; absent without glossy materials.
-    lobe_axis : (3, light) ndarray
-        Axis of the lobe, unit vectors.
-    lobe_exponent : (light,) ndarray
-        Phong exponent of the lobe.
-    texel : (light,) ndarray of int32
-        Each light's texel.
-    map_index : (light,) ndarray of int32
-        Each light's map.
+    texel, weight sequence of (light,): Texels of each map and T/N w.
+    position sequence of (3, h, w): Surface points of each map, m.
+    normal sequence of (3, h, w): Their unit normals.
+    flux sequence of (3, h, w): Flux of the diffuse part, W.
+    lobe_flux sequence of (3, h, w): Flux of the lobe, W.
+    lobe_axis sequence of (3, h, w): Its axis, unit vectors.
+    lobe_exponent sequence of (h, w): Its Phong exponent.
+    cell sequence of (texels,): Light that carries the flux of each texel.
+    gain: With cells, what lights of a map carry beside that.
+    -> position (3, light): Places of the lights, m.
+    -> normal (3, light): Unit normals of their surfaces.
+    -> flux (3, light): Diffuse flux, W, T/N w included: Phi_i = T/N w Phi_t.
+    -> lobe_flux (3, light): Flux of the lobe, W, T/N w included; absent without glossy materials.
+    -> lobe_axis (3, light): Axis of the lobe, unit vectors.
+    -> lobe_exponent (light,): Phong exponent of the lobe.
+    -> texel (light,) int32: Each light's texel.
+    -> map_index (light,) int32: Each light's map.
     """
     lobes = ([None] * len(texel) if one is None else one for one in (lobe_flux, lobe_axis, lobe_exponent))
     maps = list(map(MapPlanes, position, normal, flux, *lobes))
@@ -227,25 +160,15 @@ def footprints(
 ) -> Array:
     """Compute the surface that each light stands for (docs/methods/sii_sum).
 
-    Parameters
-    ----------
-    position, normal : (3, light) ndarray
-        Places of the lights, m, and unit normals of their surfaces.
-    texel, number : (light,) ndarray of int32
-        Each light's texel and map.
-    solid_angle : sequence of (h, w) ndarray
-        Solid angles of each map's texels, sr; of a directional lamp areas across the light, m^2.
-    drawn, weight : sequence of (light,) ndarray
-        Texels drawn from each map and T/N w.
-    lamp : sequence of (3,) ndarray
-        Places of the lamps, m; where one is not near its direction.
-    near : tuple of bool
-        Whether each lamp has a place.
-
-    Returns
-    -------
-    (light,) ndarray
-        Area Omega d^2 / cos of the light's texel, times T/N w, m^2.
+    position (3, light): Places of the lights, m.
+    normal (3, light): Unit normals of their surfaces.
+    texel, number (light,) int32: Each light's texel and map.
+    solid_angle sequence of (h, w): Solid angles of each map's texels, sr; of a directional lamp areas across the light,
+        m^2.
+    drawn, weight sequence of (light,): Texels drawn from each map and T/N w.
+    lamp sequence of (3,): Places of the lamps, m; where one is not near its direction.
+    near: Whether each lamp has a place.
+    -> (light,): Area Omega d^2 / cos of the light's texel, times T/N w, m^2.
     """
     area = np.zeros(len(texel), position.dtype)
     for k, angles in enumerate(solid_angle):
@@ -265,27 +188,14 @@ def cell_areas(
 ) -> Array:
     """Sum the surface of each light's cell that reflects (SII Sec. 4).
 
-    Parameters
-    ----------
-    position, normal : (3, h, w) ndarray
-        Surface points, m, and unit normals of a map.
-    solid_angle : (h, w) ndarray
-        Solid angles of its texels, sr; of a directional lamp areas across the light, m^2.
-    flux, lobe_flux : (3, h, w) ndarray
-        Flux of the diffuse part and of the lobe, W.
-    cell : (texels,) ndarray of int64
-        Light that carries the flux of each texel.
-    lights : int
-        How many are drawn from the map.
-    lamp : (3,) ndarray
-        Place of the lamp, m; where it is not near its direction.
-    near : bool
-        Whether the lamp has a place.
-
-    Returns
-    -------
-    (light,) ndarray
-        Area, m^2, of those lights that have any.
+    position (3, h, w): Surface points of a map, m.
+    solid_angle (h, w): Solid angles of its texels, sr; of a directional lamp areas across the light, m^2.
+    flux, lobe_flux (3, h, w): Flux of the diffuse part and of the lobe, W.
+    cell (texels,) int64: Light that carries the flux of each texel.
+    lights: How many are drawn from the map.
+    lamp (3,): Place of the lamp, m; where it is not near its direction.
+    near: Whether the lamp has a place.
+    -> (light,): Area, m^2, of those lights that have any.
     """
     points, normals, fluxes = (one.reshape(3, -1) for one in (position, normal, flux))
     lobes = None if lobe_flux is None else lobe_flux.reshape(3, -1)

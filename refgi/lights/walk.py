@@ -60,28 +60,13 @@ def walk_lights(
 ) -> "PixelLights":
     """Trace light paths and leave a pixel light at every bounce.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        Traces rays through `geometry`.
-    geometry : Geometry
-        The scene's triangles.
-    materials : MaterialTable
-        Float64.
-    lights : LightTable
-        Float64.
-    paths : int
-        How many to trace, over all lamps. Of several each gets its share of the flux that `TRIAL` paths of each bring
-        to surfaces; one whose trial meets nothing gets a path beyond the number, as it may light something small.
-    bounces : int
-        How many surfaces each path meets, up to `MOST_BOUNCES`.
-    seed : int
-        Shifts the quasi-random set modulo 1, 0 leaves it as it is; draws the lamps where there are fewer paths.
-
-    Returns
-    -------
-    PixelLights
-        At most paths x bounces of them, float64; those without flux are dropped.
+    materials: Float64.
+    lights: Float64.
+    paths: How many to trace, over all lamps. Of several each gets its share of the flux that `TRIAL` paths of each
+        bring to surfaces; one whose trial meets nothing gets a path beyond the number, as it may light something small.
+    bounces: How many surfaces each path meets, up to `MOST_BOUNCES`.
+    seed: Shifts the quasi-random set modulo 1, 0 leaves it as it is; draws the lamps where there are fewer paths.
+    -> PixelLights: At most paths x bounces of them, float64; those without flux are dropped.
 
     Raises
     ------

@@ -43,23 +43,11 @@ class Warp:
 def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tuple[Array, Array]:
     """Warp points of the unit square over several maps that are stacked along rows (SII Sec. 3.5, Eq. 5 and 6).
 
-    Parameters
-    ----------
-    points : (point, uv) array_like
-        Points (u, v) in [0, 1).
-    importance : (k h, w) ndarray
-        Importance of each texel, >= 0.
-    maps : int
-        k: a cube's six faces, a dual paraboloid's two.
-    warp : Warp
-        How each map is warped.
-
-    Returns
-    -------
-    warped : (point, uv) ndarray of float64
-        Warped points in [0, 1) over the stacked maps.
-    density_weight : (point,) ndarray of float64
-        Weight w of each point, 1 / density over the unit square.
+    points (point, uv): Points (u, v) in [0, 1).
+    importance (k h, w): Importance of each texel, >= 0.
+    maps: k: a cube's six faces, a dual paraboloid's two.
+    -> warped (point, uv) float64: Warped points in [0, 1) over the stacked maps.
+    -> density_weight (point,) float64: Weight w of each point, 1 / density over the unit square.
 
     Notes
     -----

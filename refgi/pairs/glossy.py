@@ -31,23 +31,9 @@ def glossy_radiance(
 ) -> Array:
     """Sum the radiance that every receiver's lobe reflects towards the eye, of every pixel light (AMS Eq. 2).
 
-    Parameters
-    ----------
-    points : GlossyPoints
-        The n receivers; their dtype is that of the result.
-    lights : PixelLights
-        Lights to sum.
-    settings : PairSettings
-        How one light lights one receiver.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-    width : int
-        Of the picture that the points are pixels of; 0: neighbours follow each other already. Of no other meaning.
-
-    Returns
-    -------
-    (3, n) ndarray
-        W/m^2/sr, linear RGB, without visibility.
+    points: The n receivers; their dtype is that of the result.
+    width: Of the picture that the points are pixels of; 0: neighbours follow each other already. Of no other meaning.
+    -> (3, n): W/m^2/sr, linear RGB, without visibility.
 
     Raises
     ------

@@ -26,27 +26,11 @@ def shadowed_radiance(
 ) -> Array:
     """Sum the radiance that every receiver's lobe reflects towards the eye of the light that reaches it.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        The scene's Embree tracer.
-    to : RayReceivers
-        The n receivers of shadow rays.
-    points : GlossyPoints
-        The same with their lobes.
-    lights : PixelLights
-        Lights to sum.
-    visibility : bool
-        Whether to trace the rays, none for a light that lies off the lobe; without, every pair counts.
-    batch : int
-        Pairs held at a time; changes no bit of the result.
-    hidden : callable, optional
-        As for `shadowed_sum`.
-
-    Returns
-    -------
-    (3, n) ndarray of float64
-        W/m^2/sr.
+    points: The receivers with their lobes.
+    visibility: Whether to trace the rays, none for a light that lies off the lobe; without, every pair counts.
+    batch: Pairs held at a time; changes no bit of the result.
+    hidden: As for `shadowed_sum`.
+    -> (3, n) float64: W/m^2/sr.
     """
     return summed(tracer, to, lights, visibility, batch, hidden, partial(weigh_by_lobes, points))
 

@@ -48,24 +48,10 @@ def irradiance(
 ) -> Array:
     """Sum the irradiance of every pixel light at every receiver (SII Eq. 2).
 
-    Parameters
-    ----------
-    receivers : Receivers
-        Points to light; their dtype is that of the result.
-    lights : PixelLights
-        Lights to sum.
-    settings : PairSettings
-        How one light lights one receiver.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-    lightcuts : Lightcuts, optional
-        Sum diffuse lights by clusters, to an error; lobes are summed in full.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2, linear RGB; 0 where there is no surface. Contains both cosines and the light's 1/pi;
-        excludes the receiver's albedo/pi and visibility.
+    receivers: Points to light; their dtype is that of the result.
+    lightcuts: Sum diffuse lights by clusters, to an error; lobes are summed in full.
+    -> (3, h, w): Irradiance, W/m^2, linear RGB; 0 where there is no surface. Contains both cosines and the light's
+        1/pi; excludes the receiver's albedo/pi and visibility.
 
     Raises
     ------

@@ -89,21 +89,8 @@ def clamp_loss(
 ) -> float:
     """Return the share of the light that a clamp removes from a picture; below 0 where it adds some.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        The picture's points.
-    lights : PixelLights
-        Lights to sum.
-    settings : PairSettings
-        The clamp.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-
-    Returns
-    -------
-    float
-        Of the light without visibility.
+    settings: The clamp.
+    -> float: Of the light without visibility.
     """
     sample = sample_for(receivers, lights)
     clamped = light_at(sample, lights, settings, footprint)

@@ -21,21 +21,7 @@ Array = npt.NDArray[Any]
 def facing(vertices: Array, faces: Array, normal: Array, triangle_id: Array) -> Array:
     """Compute the normal of the triangle that each pixel sees, on the side of the pixel's normal (docs/conventions).
 
-    Parameters
-    ----------
-    vertices : (vertex, 3) ndarray
-        Corners of the triangles, m.
-    faces : (triangle, corner) ndarray of int32
-        Vertices of the triangles.
-    normal : (3, h, w) ndarray
-        Unit normals of the pixels' surfaces.
-    triangle_id : (h, w) ndarray of int32
-        Their triangles, -1 for none.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        The face's unit normal; 0 without surface.
+    -> (3, h, w): The face's unit normal; 0 without surface.
     """
     geometry = Geometry(vertices, faces, np.zeros(len(faces), np.int32), None)
     to = receivers(geometry, np.zeros_like(normal), normal, triangle_id, 1.0)
@@ -49,28 +35,10 @@ def visible(
 ) -> Array:
     """Trace whether light reaches each pixel from each pixel light (docs/methods/vpl).
 
-    Parameters
-    ----------
-    geometry : Geometry
-        What may block.
-    position : (3, h, w) ndarray
-        Surface points of the pixels, m.
-    normal : (3, h, w) ndarray
-        Their unit normals.
-    triangle_id : (h, w) ndarray of int32
-        Their triangles, -1 for none.
-    face_normal : (3, h, w) ndarray
-        Unit normals of these, on the side of the pixels' normals.
-    light_position : (3, N) ndarray
-        Pixel lights, m.
-    light_normal : (3, N) ndarray
-        Their unit normals.
-
-    Returns
-    -------
-    (light, h, w) ndarray of bool
-        True where the normals of light and pixel and the pixel's face look at the other, whatever the lobe, and nothing
-        lies between.
+    geometry: What may block.
+    face_normal (3, h, w): Unit normals of the triangles that pixels see, on the side of the pixels' normals.
+    -> (light, h, w) bool: True where the normals of light and pixel and the pixel's face look at the other, whatever
+        the lobe, and nothing lies between.
     """
     tracer = Tracer(geometry)
     to, senders, reach, rays = shadow_rays(geometry, tracer.grain, (position, normal, triangle_id), face_normal,
@@ -87,33 +55,8 @@ def shadowed_sum(
 ) -> Array:
     """Sum the irradiance of the visible pixel lights at every pixel, without albedo/pi (SII Eq. 2, 3).
 
-    Parameters
-    ----------
-    position : (3, h, w) ndarray
-        Surface points of the pixels, m.
-    normal : (3, h, w) ndarray
-        Their unit normals.
-    triangle_id : (h, w) ndarray of int32
-        Their triangles, -1 for none.
-    seen : (light, h, w) ndarray of bool
-        Whether a pixel sees a light; absent: all do.
-    light_position : (3, N) ndarray
-        Pixel lights, m.
-    light_normal : (3, N) ndarray
-        Their unit normals.
-    flux : (3, N) ndarray
-        Flux that they reflect diffusely, W.
-    lobe_flux : (3, N) ndarray, optional
-        Flux that their lobes reflect, W.
-    lobe_axis : (3, N) ndarray, optional
-        Axes of the lobes, unit vectors.
-    lobe_exponent : (N,) ndarray, optional
-        Exponents of the lobes.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Indirect irradiance, W/m^2; 0 without surface.
+    seen (light, h, w) bool: Whether a pixel sees a light; absent: all do.
+    -> (3, h, w): Indirect irradiance, W/m^2; 0 without surface.
     """
     pixel = np.flatnonzero(triangle_id.reshape(-1) >= 0)
     at, up = (np.ascontiguousarray(plane.reshape(3, -1)[:, pixel], np.float32) for plane in (position, normal))

@@ -53,23 +53,8 @@ def sampling_error(
 ) -> SamplingError | None:
     """Return how much a picture's light depends on which lights were drawn.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        The picture's points.
-    lights : PixelLights
-        Its lights.
-    settings : PairSettings
-        How one light lights one receiver.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-    least : int
-        Pixels to sample at least.
-
-    Returns
-    -------
-    SamplingError or None
-        Of the light without visibility; None where every texel is a light, or there is no light.
+    least: Pixels to sample at least.
+    -> SamplingError: Of the light without visibility; None where every texel is a light, or there is no light.
     """
     if lights.half is None:
         return None
@@ -103,21 +88,8 @@ def error_of_halves(first: Array, second: Array, samples: int, of: str = "pixel 
 def seen_light(camera: "Camera", albedo: Array, direct: Array, receivers: Receivers, lights: "PixelLights") -> float:
     """Return the light that visible surfaces under direct light send to each other, over that of all pixel lights.
 
-    Parameters
-    ----------
-    camera : Camera
-        Of the view.
-    albedo, direct : (3, h, w) ndarray
-        Reflectance, and direct irradiance, W/m^2.
-    receivers : Receivers
-        The points seen.
-    lights : PixelLights
-        All pixel lights.
-
-    Returns
-    -------
-    float
-        Both without visibility and at the same sampled pixels; 0 without any light. Pixels send as discs, which
+    direct (3, h, w): Direct irradiance, W/m^2.
+    -> float: Both without visibility and at the same sampled pixels; 0 without any light. Pixels send as discs, which
         rather lowers their light.
     """
     sample = sample_pixels(receivers, SENDERS)

@@ -90,26 +90,11 @@ def shadowed_sum(
 ) -> Array:
     """Sum the irradiance of every pixel light at every receiver, each pair with its visibility.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        The scene's rays.
-    to : RayReceivers
-        RayReceivers.
-    lights : PixelLights
-        The lights.
-    visibility : bool
-        Whether to trace the rays; without, every pair counts, below the receiver's face as well.
-    batch : int
-        Pairs held at a time; changes no bit of the result.
-    hidden : callable, optional
-        Fills which pairs are blocked, in place of rays: called with the receivers, first and one past the last of them,
-        the senders, first and one past the last of those, the pairs' reach and what it fills.
-
-    Returns
-    -------
-    (3, r) ndarray of float64
-        Irradiance, W/m^2.
+    visibility: Whether to trace the rays; without, every pair counts, below the receiver's face as well.
+    batch: Pairs held at a time; changes no bit of the result.
+    hidden: Fills which pairs are blocked, in place of rays: called with the receivers, first and one past the last of
+        them, the senders, first and one past the last of those, the pairs' reach and what it fills.
+    -> (3, r) float64: Irradiance, W/m^2.
     """
     return summed(tracer, to, lights, visibility, batch, hidden, None)
 

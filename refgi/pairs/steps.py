@@ -20,29 +20,9 @@ def pairs(
 ) -> Array:
     """Compute the irradiance of light k at receiver k alone (SII Eq. 2 and 3).
 
-    Parameters
-    ----------
-    position : (3, row, receiver) ndarray
-        Receivers, m.
-    normal : (3, row, receiver) ndarray
-        Their unit normals.
-    light_position : (3, light) ndarray
-        Places of the lights, m.
-    light_normal : (3, light) ndarray
-        Unit normals of their surfaces.
-    flux : (3, light) ndarray
-        Flux of the diffuse part, W.
-    lobe_flux : (3, light) ndarray
-        Flux of the lobe, W.
-    lobe_axis : (3, light) ndarray
-        Axis of the lobe, unit vectors.
-    lobe_exponent : (light,) ndarray
-        Phong exponent of the lobe.
-
-    Returns
-    -------
-    (3, row, pair) ndarray
-        Irradiance, W/m^2; 0 where light and receiver coincide.
+    position (3, row, receiver): Receivers, m.
+    normal (3, row, receiver): Their unit normals.
+    -> (3, row, pair): Irradiance, W/m^2; 0 where light and receiver coincide.
     """
     made, bare = np.zeros_like(position), PairSettings(clamp=None)
     for k in range(flux.shape[1]):

@@ -35,25 +35,14 @@ def openness(
 ) -> Array:
     """Return how open surface points are: the share of cosine-weighted directions free within a radius.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        What may block.
-    position, normal : (3, ...) ndarray
-        Points, m, and unit normals, world space.
-    covered : (...) ndarray of bool, optional
-        Where there is a surface; everywhere if absent.
-    radius : float
-        How far blockers count, m; inf for no limit.
-    rays : int
-        Directions a point.
-    seed : int
-        Which randomisation.
-
-    Returns
-    -------
-    (...) ndarray
-        0 to 1, dtype of `position`; 1 without surface.
+    tracer: What may block.
+    position (3, ...): Points, world space, m.
+    normal (3, ...): Their unit normals.
+    covered (...) bool: Where there is a surface; everywhere if absent.
+    radius: How far blockers count, m; inf for no limit.
+    rays: Directions a point.
+    seed: Which randomisation.
+    -> (...): 0 to 1, dtype of `position`; 1 without surface.
 
     Raises
     ------

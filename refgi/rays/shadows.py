@@ -24,23 +24,8 @@ def visible_from_light(
 ) -> Array:
     """Trace a ray from each receiver to a light.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        Of the geometry.
-    geometry : Geometry
-        The triangles.
-    position, normal : (3, h, w) ndarray
-        Receivers, world space, m, and the unit normals of their faces.
-    covered : (h, w) ndarray of bool
-        Where there is a receiver.
-    light : Light
-        The light.
-
-    Returns
-    -------
-    (h, w) ndarray of bool
-        Whether the light reaches the receiver; false without surface.
+    normal (3, h, w): Unit normals of the pixels' faces.
+    -> (h, w) bool: Whether the light reaches the receiver; false without surface.
     """
     return tracer.visible_from_light(position, normal, covered, light)
 
@@ -49,20 +34,8 @@ def visible_from_light(
 def shadow_rays(geometry: Geometry, position: Array, normal: Array, covered: Array, lamp: Lamp) -> Array:
     """Test whether no triangle lies between each receiver and a lamp (docs/conventions).
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    position, normal : (3, h, w) ndarray
-        Receivers, world space, m, and the unit normals of their faces.
-    covered : (h, w) ndarray of bool
-        Where there is a receiver.
-    lamp : Lamp
-        The lamp; its cone does not matter here.
-
-    Returns
-    -------
-    (h, w) ndarray of bool
-        Whether the lamp reaches the receiver; false without surface.
+    normal (3, h, w): Unit normals of the pixels' faces.
+    lamp: The lamp; its cone does not matter here.
+    -> (h, w) bool: Whether the lamp reaches the receiver; false without surface.
     """
     return Tracer(geometry).visible_from_light(position, normal, covered, light_of(lamp))

@@ -25,29 +25,18 @@ def load_scene(
 ) -> Scene:
     """Load a built-in scene, a scene file or a mesh file.
 
-    Parameters
-    ----------
-    source : str or Path
-        A built-in scene's name, with parameters after a colon (``"atrium:faces=1000000,seed=3"``), or the path of a
+    source: A built-in scene's name, with parameters after a colon (``"atrium:faces=1000000,seed=3"``), or the path of a
         ``.json`` scene file or a ``.glb``, ``.gltf``, ``.obj`` or ``.ply`` mesh.
-    camera : Camera, optional
-        Replaces the scene's own camera.
-    lights : sequence of Light, optional
-        Replace the scene's own lights.
-    strict : bool
-        Refuse what is else passed over with a warning: absent material files and textures of meshes, faces of fewer
+    camera: Replaces the scene's own camera.
+    lights: Replace the scene's own lights.
+    strict: Refuse what is else passed over with a warning: absent material files and textures of meshes, faces of fewer
         than three corners, indices of normals and texture coordinates that are not there.
-    light_unit : str
-        What glTF's intensities are in: "cd" as the format says, "lm" (an isotropic source's flux), or "W/sr", which
-        some exporters write.
-    emissive : str
-        "seen": emissive surfaces of files light nothing, only the camera sees them. "lamps": each connected emissive
-        part gets a lamp of its power at its middle, along its mean normal, with a cosine falloff: an approximation.
-
-    Returns
-    -------
-    Scene
-        At least one face, one light of power above zero, and a camera.
+    light_unit: What glTF's intensities are in: "cd" as the format says, "lm" (an isotropic source's flux), or "W/sr",
+        which some exporters write.
+    emissive: "seen": emissive surfaces of files light nothing, only the camera sees them. "lamps": each connected
+        emissive part gets a lamp of its power at its middle, along its mean normal, with a cosine falloff: an
+        approximation.
+    -> Scene: At least one face, one light of power above zero, and a camera.
 
     Raises
     ------

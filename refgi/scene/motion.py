@@ -128,17 +128,8 @@ def near_origin(scene: Scene) -> tuple[Scene, Vector]:
 def _moved_geometry(geometry: Geometry, origin: Vector) -> Geometry:
     """Move triangles so that `origin` becomes the origin.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    origin : tuple of 3 floats
-        World space, m.
-
-    Returns
-    -------
-    Geometry
-        The moved triangles.
+    origin: World space, m.
+    -> Geometry: The moved triangles.
 
     Notes
     -----

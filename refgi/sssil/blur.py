@@ -44,27 +44,14 @@ def window_means(
 
     The mean over a row, then over a column (after Keller and Heidrich 2001).
 
-    Parameters
-    ----------
-    light : (3, h, w) ndarray
-        Irradiance of a level's texels, W/m^2.
-    position : (3, h, w) ndarray
-        Their surface points, m.
-    normal : (3, h, w) ndarray
-        Their unit normals.
-    depth : (h, w) ndarray
-        Their depths, m; inf without surface.
-    size : int
-        n: the window has n x n texels.
-    plane_tolerance : float
-        Largest distance from the tangent plane, a share of the depth.
-    cosine : float
-        Least cosine between normals.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance by this level, averaged, W/m^2; 0 without surface. Equal irradiance stays as it is, to the bit.
+    light (3, h, w): Irradiance of a level's texels, W/m^2.
+    position (3, h, w): Their surface points, m.
+    depth (h, w): Their depths, m; inf without surface.
+    size: n: the window has n x n texels.
+    plane_tolerance: Largest distance from the tangent plane, a share of the depth.
+    cosine: Least cosine between normals.
+    -> (3, h, w): Irradiance by this level, averaged, W/m^2; 0 without surface. Equal irradiance stays as it is, to the
+        bit.
 
     Notes
     -----

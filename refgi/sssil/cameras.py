@@ -39,18 +39,9 @@ SHARED = ("materials", "lights", "rsms", "tracer")  # of a frame: independent of
 def place_cameras(frame: Frame, count: int) -> tuple[Camera, ...]:
     """Place cameras one after the other, each the candidate that adds most irradiance to the frame's picture.
 
-    Parameters
-    ----------
-    frame : Frame
-        Scene, camera and lights.
-    count : int
-        Number of cameras at most.
-
-    Returns
-    -------
-    tuple of Camera
-        Fewer than `count`, perhaps none, where no candidate adds a thousandth of the light that there is. Places are
-        relative to the origin of `frame.scene`; sizes are the frame's.
+    count: Number of cameras at most.
+    -> tuple of Camera: Fewer than `count`, perhaps none, where no candidate adds a thousandth of the light that there
+        is. Places are relative to the origin of `frame.scene`; sizes are the frame's.
 
     Notes
     -----
@@ -150,22 +141,10 @@ def _unit(vectors: Array) -> Array:
 def join_cameras(frame: Frame, light: Array, settings: CameraSettings, one_view: OneView) -> Array:
     """Join the irradiance by a camera's own picture with that by further cameras' pictures.
 
-    Parameters
-    ----------
-    frame : Frame
-        Scene, camera and lights.
-    light : (3, h, w) ndarray
-        Irradiance by what this camera alone sees, W/m^2.
-    settings : CameraSettings
-        The user's views, number of cameras to place, and the test for the same surface.
-    one_view : callable
-        Irradiance of a frame by its own camera alone.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        For each pixel and channel the largest of all irradiances found for its surface, W/m^2; nowhere less than
-        `light`.
+    light (3, h, w): Irradiance by what this camera alone sees, W/m^2.
+    one_view: Irradiance of a frame by its own camera alone.
+    -> (3, h, w): For each pixel and channel the largest of all irradiances found for its surface, W/m^2; nowhere less
+        than `light`.
 
     Notes
     -----

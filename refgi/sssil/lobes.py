@@ -77,23 +77,9 @@ def glossy_level(
 ) -> Array:
     """Sum what lobes reflect of the samples of one level.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene whose view the level is.
-    points : GlossyPoints
-        The n receivers.
-    senders : Level
-        The level.
-    index : int
-        0 for the first level, whose inner disc is sampled as well.
-    settings : HssilSettings
-        Sampling, with its radius, form factor and visibility.
-
-    Returns
-    -------
-    (3, n) ndarray of float64
-        Radiance over the lobes' reflectance, W/m^2/sr.
+    frame: The scene whose view the level is.
+    index: 0 for the first level, whose inner disc is sampled as well.
+    -> (3, n) float64: Radiance over the lobes' reflectance, W/m^2/sr.
     """
     to = glossy_receivers(points, frame.gbuffer.projection)
     draws, slices = _draws(senders, index, settings), None

@@ -34,34 +34,18 @@ def reproject(
 ) -> tuple[Array, Array]:
     """Fetch values of a view at surface points of another; disoccluded points get none.
 
-    Parameters
-    ----------
-    values : (3 or 4, h, w) ndarray
-        Values for each texel of `source`.
-    source : SourceView
-        The view that values are fetched from.
-    position : (3, h', w') ndarray
-        The points, in the view's own world space unless `origin` is given, m.
-    normal : (3, h', w') ndarray
-        Their unit normals.
-    covered : (h', w') ndarray of bool
-        Pixels with a surface point.
-    depth_tolerance : float
-        Largest difference of a texel's depth from the point's, or from that of the point's tangent plane at the texel,
-        as a share of the point's.
-    normal_cosine : float
-        Smallest cosine between a texel's normal and the point's.
-    fetch : {"bilinear", "nearest"}
-        From the four texels around the point, or from the one it falls in.
-    origin : tuple of 3 floats, optional
-        Origin of `position`, m; that of `source` where absent.
-
-    Returns
-    -------
-    mean : (3 or 4, h', w') ndarray
-        Mean of the texels that show the same surface, weighted bilinearly; 0 where none does.
-    weight : (h', w') ndarray
-        Share of the four weights that those texels have, 0 to 1.
+    values (3 or 4, h, w): Values for each texel of `source`.
+    source: The view that values are fetched from.
+    position (3, h', w'): The points, in the view's own world space unless `origin` is given, m.
+    normal (3, h', w'): Their unit normals.
+    covered (h', w') bool: Pixels with a surface point.
+    depth_tolerance: Largest difference of a texel's depth from the point's, or from that of the point's tangent plane
+        at the texel, as a share of the point's.
+    normal_cosine: Smallest cosine between a texel's normal and the point's.
+    fetch: From the four texels around the point, or from the one it falls in.
+    origin: Origin of `position`, m; that of `source` where absent.
+    -> mean (3 or 4, h', w'): Mean of the texels that show the same surface, weighted bilinearly; 0 where none does.
+    -> weight (h', w'): Share of the four weights that those texels have, 0 to 1.
 
     Raises
     ------

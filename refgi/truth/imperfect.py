@@ -84,21 +84,10 @@ def _steps(*arguments: Any, **named: Any) -> dict[str, Array] | None:
 def imperfect_maps(geometry: Geometry, lights: "PixelLights", settings: Imperfect, seed: int = 0) -> ImperfectDepth:
     """Draw the map of each pixel light.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        What may block.
-    lights : PixelLights
-        N lights; each map looks along its light's normal.
-    settings : Imperfect
-        Points, resolution, levels and bias.
-    seed : int
-        Of the points.
-
-    Returns
-    -------
-    ImperfectDepth
-        The maps. Light i has points of its own, by the stream i of random numbers.
+    geometry: What may block.
+    lights: N lights; each map looks along its light's normal.
+    seed: Of the points.
+    -> ImperfectDepth: The maps. Light i has points of its own, by the stream i of random numbers.
 
     Notes
     -----

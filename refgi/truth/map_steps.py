@@ -31,26 +31,12 @@ Array = npt.NDArray[Any]
 def scattered_points(vertices: Array, faces: Array, shift: Array, count: int) -> tuple[Array, Array, Array]:
     """Scatter the points of each light's map all over the surfaces (docs/methods/vpl).
 
-    Parameters
-    ----------
-    vertices : (vertex, 3) ndarray
-        Corners of the triangles, m.
-    faces : (triangle, corner) ndarray of int32
-        Vertices of the triangles.
-    shift : (light, number) ndarray
-        Random numbers x0, x1, x2 in [0, 1) of each light's points.
-    count : int
-        n, points of a map.
-
-    Returns
-    -------
-    point : (light, point, 3) ndarray
-        Point k at (k + x0) / n of the area, in the order of the faces, and at a = sqrt(x1 + k / g), b = x2 + k / g^2
-        modulo 1 of its face, (1 - a) A + a (1 - b) B + a b C, m; g^3 = g + 1.
-    point_face : (light, point) ndarray of int32
-        The triangle that each lies on.
-    radius : (number,) ndarray
-        r of a point's disc, pi r^2 = A / n, m.
+    shift (light, number): Random numbers x0, x1, x2 in [0, 1) of each light's points.
+    count: n, points of a map.
+    -> point (light, point, 3): Point k at (k + x0) / n of the area, in the order of the faces, and at a = sqrt(x1 + k /
+        g), b = x2 + k / g^2 modulo 1 of its face, (1 - a) A + a (1 - b) B + a b C, m; g^3 = g + 1.
+    -> point_face (light, point) int32: The triangle that each lies on.
+    -> radius (number,): r of a point's disc, pi r^2 = A / n, m.
     """
     corners, _, upto = areas_of(_triangles(vertices, faces))
     place, face = np.zeros((len(shift), count, 3)), np.zeros((len(shift), count), np.int32)
@@ -78,15 +64,8 @@ def map_frames(normal: Array) -> Array:
     With e the sign of n_z, a = -1 / (e + n_z): right (1 + e n_x^2 a, e n_x n_y a, -e n_x), down (n_x n_y a,
     e + n_y^2 a, -n_y), forward n.
 
-    Parameters
-    ----------
-    normal : (3, N) ndarray
-        Unit normals of the lights.
-
-    Returns
-    -------
-    (light, axis, 3) ndarray
-        Right, down and forward: axes of s, t and z.
+    normal (3, light): Unit normals of the lights.
+    -> (light, axis, 3): Right, down and forward: axes of s, t and z.
     """
     frame, rows = np.zeros((normal.shape[1], 3, 3)), np.ascontiguousarray(normal.T, np.float64)
     for k in range(len(rows)):
@@ -104,31 +83,13 @@ def depth_maps(
     (s, t) = (x, y) / (1 + z); a box r sqrt(c) (1 + s^2 + t^2) / d wide, c the cosine at the point, times its width in
     discs; points nearer than r or beside the light's plane are left out.
 
-    Parameters
-    ----------
-    vertices : (vertex, 3) ndarray
-        Corners of the triangles, m.
-    faces : (triangle, corner) ndarray of int32
-        Vertices of the triangles.
-    point : (light, point, 3) ndarray
-        Points of each light's map, m.
-    point_face : (light, point) ndarray of int32
-        Their triangles.
-    radius : (number,) ndarray
-        r of a point's disc, m.
-    light_position : (3, N) ndarray
-        The lights, m.
-    frame : (light, axis, 3) ndarray
-        Axes of their maps.
-    side : int
-        Texels along a side of a map.
-    splat : float
-        Side of a box in the width of a point's disc.
-
-    Returns
-    -------
-    (light, h, w) ndarray
-        Distance, m; rows along t, columns along s; inf where no box covers a texel's centre.
+    point (light, point, 3): Points of each light's map, m.
+    point_face (light, point) int32: Their triangles.
+    radius (number,): r of a point's disc, m.
+    frame (light, axis, 3): Axes of their maps.
+    side: Texels along a side of a map.
+    splat: Side of a box in the width of a point's disc.
+    -> (light, h, w): Distance, m; rows along t, columns along s; inf where no box covers a texel's centre.
     """
     normals = areas_of(_triangles(vertices, faces))[1]
     made = np.full((len(point), side, side), np.inf, vertices.dtype)
@@ -154,20 +115,12 @@ def _splat_all(place: Array, facing: Array, position: Array, frame: Array, radiu
 def filled(depth: Array, levels: int) -> Array:
     """Fill holes of maps from coarser levels: pull, then push (docs/methods/vpl).
 
-    Pull: the mean of those of four texels that are no farther than 1.1 times the nearest. Push: holes take from the
-    coarser level, bilinearly, what is no farther than 1.1 times the nearest of the four.
+    Pulling takes the mean of those of four texels that are no farther than 1.1 times the nearest; pushing fills holes
+    from the coarser level, bilinearly, with what is no farther than 1.1 times the nearest of the four.
 
-    Parameters
-    ----------
-    depth : (light, h, w) ndarray
-        Distance, m; inf where nothing is.
-    levels : int
-        Of pulling and pushing.
-
-    Returns
-    -------
-    (light, h, w) ndarray
-        Distance, m; maps whose holes are filled.
+    depth (light, h, w): Distance, m; inf where nothing is.
+    levels: Of pulling and pushing.
+    -> (light, h, w): Distance, m; maps whose holes are filled.
     """
     made = depth.copy()
     for one in made:
@@ -183,38 +136,13 @@ def looked_up(
 ) -> Array:
     """Look up whether a pixel is no farther from each light than its map says, by more than a bias (docs/methods/vpl).
 
-    Parameters
-    ----------
-    vertices : (vertex, 3) ndarray
-        Corners of the triangles, m.
-    faces : (triangle, corner) ndarray of int32
-        Vertices of the triangles.
-    position : (3, h, w) ndarray
-        Surface points of the pixels, m.
-    normal : (3, h, w) ndarray
-        Their unit normals.
-    triangle_id : (h, w) ndarray of int32
-        Their triangles, -1 for none.
-    face_normal : (3, h, w) ndarray
-        Unit normals of these, on the side of the pixels' normals.
-    light_position : (3, N) ndarray
-        Pixel lights, m.
-    light_normal : (3, N) ndarray
-        Their unit normals.
-    frame : (light, axis, 3) ndarray
-        Axes of their maps.
-    depth : (light, h, w) ndarray
-        Distance, m; inf where nothing is.
-    radius : (number,) ndarray
-        r of a point's disc, m.
-    bias : float
-        In what a pixel's own surface may differ by within a box or a texel.
-
-    Returns
-    -------
-    (light, h, w) ndarray of bool
-        True where the normals of light and pixel and the pixel's face look at the other and the texel does not hide the
-        pixel.
+    face_normal (3, h, w): Unit normals of the triangles that pixels see, on the side of the pixels' normals.
+    frame (light, axis, 3): Axes of their maps.
+    depth (light, h, w): Distance, m; inf where nothing is.
+    radius (number,): r of a point's disc, m.
+    bias: In what a pixel's own surface may differ by within a box or a texel.
+    -> (light, h, w) bool: True where the normals of light and pixel and the pixel's face look at the other and the
+        texel does not hide the pixel.
     """
     to, senders, reach, _ = shadow_rays(_triangles(vertices, faces), 1.0, (position, normal, triangle_id), face_normal,
                                         light_position, light_normal)

@@ -46,31 +46,10 @@ def path_traced(
     E is the integral of L cos over the hemisphere, L = albedo/pi of the direct irradiance there; without direct light
     and the receiver's albedo/pi.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    materials : MaterialTable
-        Its materials.
-    lights : Lamps
-        Its lamps, (lamp, number) each.
-    position : (3, h, w) ndarray
-        Surface points of the pixels, m.
-    normal : (3, h, w) ndarray
-        Their unit normals.
-    triangle_id : (h, w) ndarray of int32
-        Their triangles, -1 for none.
-    settings : TruthSettings
-        How and how long.
-
-    Returns
-    -------
-    mean : (3, h, w) ndarray
-        Mean of all samples, W/m^2.
-    variance_of_mean : (3, h, w) ndarray
-        Estimated variance of that mean, in units of its square; 0 without surface.
-    samples : (h, w) ndarray of int32
-        Samples of each pixel; 0 without surface.
+    lights: The scene's lamps, (lamp, number) each.
+    -> mean (3, h, w): Mean of all samples, W/m^2.
+    -> variance_of_mean (3, h, w): Estimated variance of that mean, in units of its square; 0 without surface.
+    -> samples (h, w) int32: Samples of each pixel; 0 without surface.
     """
     given = dataclasses.replace(scene, materials=tuple(
         dataclasses.replace(one, diffuse=tuple(diffuse), specular=tuple(specular), exponent=exponent)

@@ -118,23 +118,8 @@ def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triang
                settings: TruthSettings) -> TruthResult:
     """Average independent passes over a G-buffer until the settings say stop.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    tracer : Tracer
-        Its rays.
-    position, normal : (3, h, w) ndarray
-        The G-buffer's, world space.
-    triangle_id : (h, w) int ndarray
-        Which triangle each pixel sees; -1 for none.
-    settings : TruthSettings
-        How and how long.
-
-    Returns
-    -------
-    TruthResult
-        Mean, variance of the mean and sample count of every pixel.
+    tracer Tracer: Rays against the scene.
+    -> TruthResult: Mean, variance of the mean and sample count of every pixel.
 
     Raises
     ------
@@ -149,23 +134,9 @@ def accumulate_lobes(scene: Scene, tracer: Any, position: Array, normal: Array, 
                      settings: TruthSettings) -> TruthResult:
     """Average independent passes of what lobes reflect towards the eye until the settings say stop.
 
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    tracer : Tracer
-        Its rays.
-    position, normal : (3, h, w) ndarray
-        The G-buffer's, world space.
-    triangle_id : (h, w) int ndarray
-        Which triangle each pixel sees; -1 for none.
-    settings : TruthSettings
-        How and how long; a checkpoint has a file of its own, with ".lobes" behind its name.
-
-    Returns
-    -------
-    TruthResult
-        Mean, variance of the mean and sample count of every pixel, W/m^2/sr.
+    tracer Tracer: Rays against the scene.
+    settings: How and how long; a checkpoint has a file of its own, with ".lobes" behind its name.
+    -> TruthResult: Mean, variance of the mean and sample count of every pixel, W/m^2/sr.
 
     Raises
     ------

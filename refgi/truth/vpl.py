@@ -110,31 +110,10 @@ def light_of_pixel_lights(
 ) -> Array:
     """Sum the irradiance of pixel lights at every pixel, with their visibility by rays or maps (SII Eq. 2, 3).
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    position : (3, h, w) ndarray
-        Surface points of the pixels, m.
-    normal : (3, h, w) ndarray
-        Their unit normals.
-    triangle_id : (h, w) ndarray of int32
-        Their triangles, -1 for none.
-    lights : PixelLights
-        The lights.
-    maps : ImperfectDepth or None
-        A map of each light in place of rays.
-    visibility : bool
-        Whether anything blocks.
-    tracer : Tracer
-        The scene's rays.
-    batch : int
-        Pairs held at a time; changes no bit of the result.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Indirect irradiance, W/m^2; 0 without surface.
+    maps: A map of each light in place of rays.
+    visibility: Whether anything blocks.
+    batch: Pairs held at a time; changes no bit of the result.
+    -> (3, h, w): Indirect irradiance, W/m^2; 0 without surface.
     """
     points = receivers(geometry, position, normal, triangle_id, tracer.grain)
     irradiance = np.zeros_like(normal)
@@ -148,19 +127,8 @@ def light_of_pixel_lights(
 def vpl_sampling_error(frame: "Frame", lights: "PixelLights", settings: VplSettings) -> SamplingError | None:
     """Return how much the light of a picture depends on which lights were drawn, from two halves of them.
 
-    Parameters
-    ----------
-    frame : Frame
-        The view of the scene.
-    lights : PixelLights
-        Its lights.
-    settings : VplSettings
-        Whether they are shadowed; imperfect maps, which shadow all lights together, are left out here.
-
-    Returns
-    -------
-    SamplingError or None
-        At sampled pixels; None where every texel is a light, or there is no light.
+    settings: Whether they are shadowed; imperfect maps, which shadow all lights together, are left out here.
+    -> SamplingError: At sampled pixels; None where every texel is a light, or there is no light.
     """
     if lights.half is None:
         return None

@@ -75,18 +75,7 @@ class BugWriter:
 
 
 class Bugs:
-    """Likely bugs of a case.
-
-    Parameters
-    ----------
-    content : bytes
-        The file.
-
-    Raises
-    ------
-    ValueError
-        If it is none.
-    """
+    """Likely bugs of a case, from the bytes of its file; ValueError if it is none."""
 
     def __init__(self, content: bytes) -> None:
         try:

@@ -46,21 +46,10 @@ class Difference(NamedTuple):
 def explain(
     difference: Difference, factors: Mapping[str, float], others: Mapping[str, Array]
 ) -> list[Cause]:
-    """Return the causes that explain a difference, the likeliest first.
+    """Return the causes that explain a difference, the likeliest first; none where they explain less than `EXPLAINED`.
 
-    Parameters
-    ----------
-    difference : Difference
-        The array that is out.
-    factors : mapping
-        Numbers of the case that a port may forget or repeat.
-    others : mapping
-        Expected arrays of the case, one of which the port may have written in this one's place.
-
-    Returns
-    -------
-    list of Cause
-        None where no hypothesis explains `EXPLAINED` of the elements that differ.
+    `factors`: numbers of the case that a port may forget or repeat; `others`: expected arrays of the case, one of which
+    the port may have written in this one's place.
     """
     found = told_at_once(difference)
     if not found:

@@ -82,17 +82,9 @@ class Change:
 
 
 def changes_of(function: ast.AST) -> list[Change]:
-    """Return the changes of a function's body.
+    """Return the changes of a function's body, each of which leaves a program, if not always one that runs.
 
-    Parameters
-    ----------
-    function : FunctionDef or Lambda
-        A part of a module's tree; functions within it have changes of their own.
-
-    Returns
-    -------
-    list of Change
-        Each leaves a tree that is a program, if not always one that runs.
+    Functions within it have changes of their own.
     """
     holders = dict(_below(function))
     names, keys, attributes = _locals(function, holders), _keys(holders), _attributes(holders)

@@ -1,16 +1,22 @@
 """What arrays are, from the docstrings of stages and the comments beside fields: axes, unit, text, source."""
 
+import ast
 import inspect
 import re
+import sys
+import textwrap
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
+from refgi import stages
 from refgi.vectors.spec import Array, Spec
 
 UNIT = re.compile(r"(?<![\w^/])(W/m\^2/sr|W/m\^2|W/sr|W|m\^2|m|sr|rad)(?![\w^/])")
 SHAPE = re.compile(r"^\(([^()]*)\)")
 SOURCE = re.compile(r" \(((?:SII|VAL|AMS|HSS|RSM|E-|docs/)[^()]*)\)\.?$")  # ends a stage's first line: section, erratum
-TYPE = re.compile(r"^.*(?:ndarray(?: of \w+)?|array_like) ")
+MANY = "sequence|tuple|list|mapping|dict"
+TAKEN = re.compile(rf"(\w+(?:, \w+)*)(?: ((?:[({{A-Z]|{MANY}).*?))?: (.*)")
+RETURNED = re.compile(rf"-> (?:(?!(?:{MANY}) )([a-z]\w*(?:, [a-z]\w*)*) )?(\S.*?): (.*)")
 AXES = {"h": "row", "w": "column", "H": "row", "W": "column", "h_l": "row", "w_l": "column", "h x w": "row, column"}
 COLOURED = re.compile(r"reflectance|linear RGB")  # has channels, whatever its unit
 COLOUR = ("W", "W/m^2", "W/m^2/sr", "W/sr")
@@ -23,29 +29,54 @@ def summary(function: Callable[..., Any]) -> tuple[str, str]:
     return line[:source.start()] if source else line.rstrip("."), source[1] if source else ""
 
 
-def descriptions(function: Callable[..., Any]) -> dict[str, str]:
-    """Return what a stage's docstring says of its parameters: type, then text."""
-    return _section(function, "Parameters")
+class Told(NamedTuple):
+    """What is said of an array or another argument."""
+
+    kind: str  # shape and type; "" where a comment or an annotation says it
+    text: str
 
 
-def returned(function: Callable[..., Any]) -> dict[str, str]:
+def taken(function: Callable[..., Any]) -> dict[str, Told]:
+    """Return what a stage's docstring says of its parameters, else its module's, else that of `refgi.stages`."""
+    return {name: told for place in (stages, sys.modules[function.__module__], function)
+            for name, told in entries(place, TAKEN).items()}
+
+
+def returned(function: Callable[..., Any]) -> dict[str, Told]:
     """Return what a stage's docstring says of what it returns, by name in order; "" where it has none."""
-    return _section(function, "Returns")
+    return entries(function, RETURNED)
 
 
-def _section(function: Callable[..., Any], section: str) -> dict[str, str]:
-    text = inspect.cleandoc(function.__doc__ or "")
-    part = re.search(rf"^{section}\n-+\n(.*?)(?=^\w+\n-+\n|\Z)", text, re.MULTILINE | re.DOTALL)
-    found: dict[str, str] = {}
-    for entry in re.split(r"\n(?=\S)", part[1].rstrip()) if part else []:
-        head, _, about = entry.partition("\n")
-        names, colon, kind = head.partition(" : ")
-        for name in names.split(", ") if colon else [""]:
-            found[name] = f"{kind if colon else head} {' '.join(about.split())}"
-    return found
+def entries(thing: Any, form: re.Pattern[str]) -> dict[str, Told]:
+    """Return what the lines of one form in a stage's docstring, or the list in a module's, say below its first line."""
+    text = re.split(r"\n\w+\n--", (inspect.getdoc(thing) or "").partition("\n")[2])[0]
+    mark = "- " if inspect.ismodule(thing) else ""
+    lines = (" ".join(one.split()).removeprefix(mark) for one in re.split(r"\n(?=\S|\n)", text) if mark in one[:2])
+    return {name: Told(one[2] or "", one[3]) for one in map(form.fullmatch, lines) if one
+            for name in (one[1] or "").split(", ")}
 
 
-def field_description(value: Any, leaf: str) -> str:
+def documented(function: Callable[..., Any]) -> tuple[dict[str, Told], dict[str, Told]]:
+    """Return type and text of all that a stage takes and returns; "" where there is no text."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
+    assert isinstance(tree, ast.FunctionDef)
+    told, made = taken(function), {}
+    for one in (*tree.args.args, *tree.args.kwonlyargs):
+        annotation = ast.unparse(one.annotation).strip("'") if one.annotation else ""
+        kind, text = told.get(one.arg) or Told("", _of_class(annotation, sys.modules[function.__module__]))
+        made[one.arg] = Told(kind + ", optional" * ("None" in annotation) if kind else annotation, text)
+    return made, returned(function)
+
+
+def _of_class(annotation: str, module: Any) -> str:
+    """Return the first line of the first class of refgi that an annotation names."""
+    modules = (module, *(sys.modules[key] for key in sorted(sys.modules) if key.startswith("refgi.")))
+    classes = (vars(one).get(name) for name in re.findall(r"\b[A-Z]\w*", annotation) for one in modules)
+    return next(((one.__doc__ or "").splitlines()[0] for one in classes if isinstance(one, type)
+                 and one.__module__.startswith("refgi.")), "")
+
+
+def field_description(value: Any, leaf: str) -> Told | None:
     """Return the comment or docstring of a field of a value, of the last one that a dotted name goes through."""
     said = ""
     for field in leaf.split(".") if leaf else []:
@@ -58,11 +89,12 @@ def field_description(value: Any, leaf: str) -> str:
             said = found[1] if found else said
         value = value[int(field)] if isinstance(value, list | tuple) and field.isdigit() else (
             value.get(field) if isinstance(value, Mapping) else getattr(value, field, None))
-    return said
+    return Told("", said) if said else None
 
 
-def spec_of(about: str, array: Array, name: str) -> Spec:
+def spec_of(told: Told | None, array: Array, name: str) -> Spec:
     """Return what an array is, as far as a line says: its axes by the shape written there, its unit, the text."""
+    about = " ".join(told).strip() if told else ""
     shape = SHAPE.search(about) or re.search(r"\((?:\d+|[A-Za-z]\w*'?)(?:, (?:\d+|[A-Za-z]\w*'?))*,?\)", about)
     names = [one.strip() for one in (shape[1] if shape and shape.re is SHAPE else shape[0].strip("()") if shape else
                                      "").split(",") if one.strip()]
@@ -74,4 +106,4 @@ def spec_of(about: str, array: Array, name: str) -> Spec:
     twice = {one for one in axes if axes.count(one) > 1}
     axes = [f"{one} {k}" if one in twice else one for k, one in enumerate(axes)]
     space = "world" if "xyz" in axes else "linear RGB" if "rgb" in axes else ""
-    return Spec(", ".join(axes) or "value", unit[1] if unit else "1", TYPE.sub("", about) or name, space)
+    return Spec(", ".join(axes) or "value", unit[1] if unit else "1", (told.text if told else "") or name, space)

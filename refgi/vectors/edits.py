@@ -21,13 +21,7 @@ class StaleEditError(ValueError):
 
 
 def replaced(text: str, old: str, new: str, what: str = "edit") -> str:
-    """Return a text with one edit.
-
-    Raises
-    ------
-    StaleEditError
-        If `old` does not stand in it exactly once.
-    """
+    """Return a text with one edit; StaleEditError if `old` does not stand in it exactly once."""
     if text.count(old) != 1:
         raise StaleEditError(f"{what}: expected one match of {old!r}, got {text.count(old)}")
     return text.replace(old, new)
@@ -37,10 +31,7 @@ def replaced(text: str, old: str, new: str, what: str = "edit") -> str:
 def edited(function: Callable[..., Any], edits: Edits, what: str = "edit") -> Callable[..., Any]:
     """Return a literal function with edits in its text or in that of the literal functions that it calls.
 
-    Raises
-    ------
-    StaleEditError
-        If an edit does not match exactly once, or leaves no program.
+    StaleEditError if an edit does not match exactly once, or leaves no program.
     """
     parts = {one: code_of(one) for one in called_by(function)}
     for old, new in edits:
@@ -56,10 +47,7 @@ def compiled(
 ) -> Callable[..., Any]:
     """Return a function anew from the texts, or trees, of itself and of those that it calls.
 
-    Raises
-    ------
-    StaleEditError
-        If one is no program.
+    StaleEditError if one is no program.
     """
     scope: dict[str, Any] = {}
     for one in parts:

@@ -13,10 +13,7 @@ from refgi.vectors.words import did_you_mean
 def lines_of(file: str) -> tuple[str, ...]:
     """Return the stages that a file of expected failures names: [CASE/]STAGE a line, # begins a remark.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read.
+    InputError if it cannot be read.
     """
     try:
         text = Path(file).read_text(encoding="utf-8")

@@ -11,17 +11,8 @@ CAUSES = 3  # that are told
 def findings(verdicts: Iterable[StageVerdict], tried: Callable[[StageVerdict], set[str]]) -> tuple[Finding, ...]:
     """Return one finding a kind of stage that is wrong by itself, in the order in which they are met.
 
-    Parameters
-    ----------
-    verdicts : iterable of StageVerdict
-        Of all cases, with all their causes; those made from wrong inputs are not blamed.
-    tried : callable
-        Gives the likely bugs of a verdict's stage that its case can tell.
-
-    Returns
-    -------
-    tuple of Finding
-        Causes by the share of wrong verdicts that they explain, of those that could know them.
+    Those made from wrong inputs are not blamed. `tried` gives the likely bugs of a verdict's stage that its case can
+    tell: causes go by the share of wrong verdicts that they explain, of those that could know them.
     """
     ran: dict[str, int] = {}
     wrong: dict[str, list[StageVerdict]] = {}

@@ -32,30 +32,12 @@ def judge(
     name: str, expected: Array, got: Array, tier: str, limit: Array | None, masked: Array | None,
     tolerance: Tolerance | None, few: Few | None = None,
 ) -> Judged:
-    """Compare an array with what is expected, element by element.
+    """Compare an array with what is expected, of one shape, element by element; equal in tier "T0", else within bounds.
 
-    Parameters
-    ----------
-    name : str
-        Of the array.
-    expected, got : ndarray
-        Of one shape.
-    tier : str
-        "T0": equal; else within bounds.
-    limit : ndarray or None
-        Bound of each element, where there is one.
-    masked : ndarray of bool or None
-        Elements that may differ at will.
-    tolerance : Tolerance or None
-        In place of bounds for each element: one of the whole array, with a share of outliers.
-    few : Few or None
-        What storage in few bits allows beside either.
-
-    Returns
-    -------
-    Judged
-        Not judged where more than MOST_SPARED of the elements are beyond, but allowed to be. The worst element is the
-        one farthest beyond its bound; a number that is not finite where a finite one is expected is beyond any.
+    `limit` bounds each element, or `tolerance` the whole array, with a share of outliers; `few` is what storage in few
+    bits allows beside either; `masked` elements may differ at will. Not judged where more than MOST_SPARED are beyond,
+    but allowed to be. The worst element is the farthest beyond its bound; one that is not finite where a finite number
+    is expected is beyond any.
     """
     off = distance(got, expected)
     if tier == "T0" or expected.dtype.kind != "f":
@@ -100,22 +82,9 @@ def judge_estimate(
 ) -> Judged:
     """Compare two estimates by the standard error of their difference (tier T3).
 
-    Parameters
-    ----------
-    name : str
-        Of the array.
-    expected, got : ndarray
-        Means.
-    variance : ndarray
-        Of the expected mean.
-    own : ndarray or None
-        Of the port's mean; as the expected one's where it gives none.
-
-    Returns
-    -------
-    Judged
-        Out where the sum over all pixels is SIGMAS standard errors off, more than FEW pixels are, or the mean square
-        of z lies outside of STEADY.
+    `variance` is that of the expected mean, `own` that of the port's; the expected one's where it gives none. Out where
+    the sum over all pixels is SIGMAS standard errors off, more than FEW pixels are, or the mean square of z lies
+    outside of STEADY.
     """
     both = np.asarray(variance, np.float64) + (variance if own is None else own)
     off = distance(got, expected)

@@ -188,13 +188,7 @@ def text_of(model: pydantic.BaseModel) -> str:
 
 
 def read_model(model: type[M], file: Path) -> M:
-    """Read and check a file.
-
-    Raises
-    ------
-    InputError
-        If it is absent, no JSON, or not what its schema says; all faults at once.
-    """
+    """Read and check a file; InputError, all faults at once, if it is absent, no JSON, or not what its schema says."""
     try:
         return model.model_validate_json(file.read_bytes())
     except OSError as error:

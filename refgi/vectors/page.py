@@ -19,26 +19,7 @@ MOST_BYTES = 24_000_000  # of arrays in a page; beyond that only those that are 
 
 
 def write_page(file: str, kit: Kit, output: Path, result: Result, asked: Asked) -> None:
-    """Write the page, whole or not at all.
-
-    Parameters
-    ----------
-    file : str
-        Its name.
-    kit : Kit
-        The kit.
-    output : Path
-        The port's arrays.
-    result : Result
-        What was found.
-    asked : Asked
-        How the port's arrays are read.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-    """
+    """Write the page of what was found, whole or not at all; InputError if it cannot be written."""
     import jinja2
 
     manifests = {case.id: case for case in kit.cases(Asked(cases=tuple({one.case for one in result.stages})))}

@@ -31,27 +31,10 @@ def judge_picture(
     got: Array, expected: Array, variance: Array | None = None, own: Array | None = None,
     tolerance: float = TOLERANCE,
 ) -> PictureVerdict:
-    """Compare a picture with a reference.
+    """Compare a picture (3, h, w) with a reference, linear values of one unit; InputError if shapes differ.
 
-    Parameters
-    ----------
-    got, expected : (3, h, w) ndarray
-        Linear values, of one unit.
-    variance, own : (3, h, w) ndarray, optional
-        Variance of the expected mean, and of the port's.
-    tolerance : float
-        Largest RMSE above the noise, as a share of the reference's mean.
-
-    Returns
-    -------
-    PictureVerdict
-        Close where the RMSE, less the noise, is within the tolerance, or where the difference is one of noise alone
-        (tier T3).
-
-    Raises
-    ------
-    InputError
-        If shapes differ.
+    `variance` and `own`: of the expected mean and of the port's. Close where the RMSE, less the noise, is within
+    `tolerance`, a share of the reference's mean, or where the difference is one of noise alone (tier T3).
     """
     expect(got.shape == expected.shape, "picture", f"shape {expected.shape} as its reference", got.shape)
     difference = np.asarray(got, np.float64) - expected

@@ -36,19 +36,7 @@ class Few(NamedTuple):
 
 
 class Port:
-    """What a port has written of a case; its stages are read in order.
-
-    Parameters
-    ----------
-    kit : Kit
-        The kit.
-    case : CaseManifest
-        The case.
-    output : Path
-        The port's folder.
-    asked : Asked
-        Layout, storage, tiers, mode and lists in another order.
-    """
+    """What a port has written of a case, in its folder `output`; its stages are read in order."""
 
     def __init__(self, kit: Kit, case: CaseManifest, output: Path, asked: Asked) -> None:
         self.kit, self.case, self.output, self.asked = kit, case, output, asked

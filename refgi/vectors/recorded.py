@@ -21,7 +21,7 @@ from refgi.frame import Frame
 from refgi.methods import find_method, render
 from refgi.scene import Scene
 from refgi.settings import flat
-from refgi.vectors.docstrings import descriptions, field_description, returned, spec_of, summary
+from refgi.vectors.docstrings import field_description, returned, spec_of, summary, taken
 from refgi.vectors.forms import described
 from refgi.vectors.forms.beside import Described
 from refgi.vectors.inputs import input_spec
@@ -40,31 +40,11 @@ def recorded_case(
     id: str, scene: Scene, method: str, settings: Any = None, *, only: str = "", what: str = "", indirect: bool = False,
     **options: Any,
 ) -> Case:
-    """Return a method on a scene, stage by stage.
+    """Return a method on a scene as a case `id`, stage by stage as they ran in float64; `what`: one line for people.
 
-    Parameters
-    ----------
-    id : str
-        The case's name.
-    scene : Scene
-        The scene.
-    method : str
-        Short name of the method.
-    settings : object, optional
-        Its settings; its defaults where absent.
-    only : str
-        Start of the names of stages to keep; all where empty. What they read of others is given.
-    what : str
-        One line for people.
-    indirect : bool
-        End at the indirect irradiance, without direct light and receivers' lobes.
-    **options : object
-        As of `refgi.methods.render`: width, height, rsm_resolution, shadows.
-
-    Returns
-    -------
-    Case
-        The stages in their order, as they ran in float64.
+    `only`: start of the names of stages to keep, all where empty; what they read of others is given. `indirect`: end at
+    the indirect irradiance, without direct light and receivers' lobes. `options` are those of `refgi.methods.render`:
+    width, height, rsm_resolution, shadows.
     """
     recipe = Recipe(id, method, what or f"{method} as it ran")
     recipe.scene = scene
@@ -196,7 +176,7 @@ def _add(
     """Add a run of a stage; return the names of its arrays by their leaves."""
     function = inspect.unwrap(stages.STAGES[run.name])
     arguments = run.arguments or {}
-    told, made = descriptions(function), returned(function)
+    told, made = taken(function), returned(function)
     reads: dict[str, str] = {}  # leaf of the parameters: array
     handed = dict(item for parameter, value in arguments.items() for item in leaves(value, parameter))
     for leaf, array in handed.items():
@@ -205,13 +185,13 @@ def _add(
             f"{name}.given.{leaf}" if leaf in outputs else f"{name}.{leaf}")
         reads[leaf] = known.name(array) or known.ids(array) or known.view(leaf, handed) or known.give(
             own, array, input_spec(own, arguments[parameter], handed) or spec_of(
-                field_description(arguments[parameter], field) or told.get(parameter, ""), array, own))
+                field_description(arguments[parameter], field) or told.get(parameter), array, own))
     writes = {leaf: f"{name}.{leaf}" if leaf else name for leaf in outputs}
     for leaf, array in outputs.items():
         known.add(writes[leaf], array)
     beside = described(run.name, arguments)
     specs = {writes[leaf]: dataclasses.replace(spec_of(made.get(leaf) or made.get(leaf.partition(".")[0]) or
-        field_description(run.value, leaf) or made.get("", ""), array, leaf or name), **beside.specs.get(leaf, {}))
+        field_description(run.value, leaf) or made.get(""), array, leaf or name), **beside.specs.get(leaf, {}))
         for leaf, array in outputs.items()}
     stage = run_of(function, arguments, reads, writes)
     what, paper = summary(function)

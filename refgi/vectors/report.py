@@ -70,15 +70,10 @@ def github(result: Result) -> str:
 
 
 def write_junit(file: str, result: Result) -> None:
-    """Write a check as JUnit XML: a suite for each case, a test for each stage.
+    """Write a check as JUnit XML: a suite for each case, a test for each stage; InputError if it cannot be written.
 
     What does not count is skipped: expected failures, what is not judged, stages made from wrong inputs, what has not
     run unless it must.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
     """
     names = {f"{one.case}/{one.stage}" for one in result.stages}
     required = names if all(one.verdict == "not-run" for one in result.stages) else {*result.missing}

@@ -9,10 +9,9 @@ that take a wrong one.
 
 import dataclasses
 import functools
-import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from importlib import import_module, resources
+from importlib import resources
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -96,10 +95,7 @@ def _lazily(form: Form, row: Row) -> Run:
 def rows(module: str) -> tuple[Row, ...]:
     """Return the rows beside a module of refgi.literal.
 
-    Raises
-    ------
-    StaleEditError
-        If a line is no row, or two of a list have one cause.
+    StaleEditError if a line is no row, or two of a list have one cause.
     """
     name = module.removeprefix(f"{PACKAGE}.")
     file = f"{name}.bugs"
@@ -120,10 +116,3 @@ def _row(line: str, where: str) -> Row:
     if any(len(edit) != 2 or not edit[0] for edit in edits):
         raise StaleEditError(f"{where}: expected old => new, got {parts[2]!r}")
     return Row(parts[0], parts[1], tuple((edit[0], edit[1]) for edit in edits), parts[3] if len(parts) == 4 else "")
-
-
-def literal_modules() -> tuple[types.ModuleType, ...]:
-    """Return the modules of refgi.literal that have rows."""
-    names = sorted(file.name.removesuffix(".bugs") for file in resources.files(PACKAGE).iterdir()
-                   if file.name.endswith(".bugs"))
-    return tuple(import_module(f"{PACKAGE}.{name}") for name in names)

@@ -62,25 +62,8 @@ def searched(
 ) -> Result:
     """Look for causes of the first wrong stage among single changes of its literal text, after those that are known.
 
-    Parameters
-    ----------
-    kit : Kit
-        The kit.
-    output : Path
-        Folder of the port's arrays.
-    asked : Asked
-        As it was checked.
-    result : Result
-        What the check found.
-    seconds : float
-        After which no further change is tried.
-    tell : callable
-        Called with (what runs, share done).
-
-    Returns
-    -------
-    Result
-        With up to three causes for the first finding; as it was where nothing is wrong or nothing was found.
+    Return the result with up to three causes for its first finding; as it was where nothing is wrong or found. No
+    change is tried after some seconds; `tell` is called with what runs and the share done.
     """
     if not result.findings:
         return result
@@ -141,19 +124,7 @@ def _explaining(
 
 
 class Trial:
-    """The literal form of one stage of one case, run again and again.
-
-    Parameters
-    ----------
-    kit : Kit
-        The kit.
-    asked : Asked
-        Mode and tiers.
-    output : Path
-        The port's folder.
-    case, stage : str
-        Which stage is wrong.
-    """
+    """The literal form of one stage of one case, run again and again on what a port has read."""
 
     def __init__(self, kit: Kit, asked: Asked, output: Path, case: str, stage: str) -> None:
         manifest = next(one for one in kit.cases(Asked(cases=(case,))) if one.id == case)

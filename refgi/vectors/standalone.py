@@ -16,10 +16,7 @@ Definition = ast.FunctionDef | ast.ClassDef | ast.Assign | ast.AnnAssign
 def standalone_text() -> str:
     """Return check.py.
 
-    Raises
-    ------
-    ValueError
-        If two modules define one name, or a function that is needed imports from refgi in its body.
+    ValueError if two modules define one name, or a function that is needed imports from refgi in its body.
     """
     frame, models = (_Module("", (FILES / name).read_text(encoding="utf-8")) for name in ("check.py", "models.py"))
     wanted = _Wanted({name: "files" for name in (*frame.definitions, *models.definitions)})

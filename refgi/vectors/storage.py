@@ -111,14 +111,9 @@ class Depth(NamedTuple):
 
 
 def depth_from(text: str) -> tuple[str, Depth]:
-    """Return an array's name or its beginning, "" for all, and how its depth is stored.
+    """Return an array's name or its beginning, "" for all, and how its depth is stored; InputError if it says neither.
 
     From a text such as "ndc:0.1:100" or "rsm.map_surface=linear:0:50:16".
-
-    Raises
-    ------
-    InputError
-        If it says something else.
     """
     start, _, said = text.rpartition("=")
     encoding, *numbers = said.split(":")

@@ -20,10 +20,16 @@ from refgi.vectors.check import Asked, Kit, check_output
 from refgi.vectors.export import export_kit
 from refgi.vectors.manifest import CASE, SCHEMAS, VERSION, CaseManifest, KitManifest, read_model, schema_text
 from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Bug, Spec, expected_of
+from refgi.vectors.spec import Bug, Spec, axes_of, expected_of, kind_of
 from tests.vectors import kit_hashes
 
 LARGEST = 20e6  # bytes of the quick kit
+UNITS = {"m": "position depth vertices origin place near far delta side radius ball point z_avg scene_far",
+         "m^2": "area footprints", "sr": "solid_angle", "rad": "half_angles", "W": "flux lobe_flux importance",
+         "W/m^2": "irradiance light direct_irradiance parts shadowed gather_samples upsample blur disc_sum all_maps",
+         "W/m^2/sr": "radiance emission leaving_radiance",
+         "1": "normal vertex_normals facing albedo diffuse specular exponent lobe_exponent lobe_axis axis axes frame "
+              "weight region texel row column level pixel faces of"}  # of arrays, by the ends of their names
 
 
 def test_every_file_is_what_its_schema_says_and_the_schemas_lie_beside_them(kit):
@@ -172,6 +178,21 @@ def test_manifests_speak_plainly(kit):
         assert "refgi." not in text
         assert "lambda" not in text
     assert CASE in {file.name for file in kit.folder.rglob("*.json")}
+
+
+def test_every_array_has_a_sentence_names_of_its_axes_and_its_unit(kit):
+    units = {leaf: unit for unit, leaves in UNITS.items() for leaf in leaves.split()}
+    faults, judged = [], set()
+    for case in kit.cases(Asked()):
+        for name, entry in case.arrays.items():
+            leaf = kind_of(name).rpartition(".")[2]
+            axes = axes_of(entry.axes) if entry.shape else []
+            if entry.what in ("", name, leaf) or len(axes) != len(entry.shape) or any(
+                    re.match(r"axis \d", one) for one in axes) or units.get(leaf, entry.unit) != entry.unit:
+                faults.append((case.id, name, entry.what, entry.axes, entry.unit))
+            judged |= {leaf} & units.keys()
+    assert not faults
+    assert units.keys() == judged
 
 
 def test_stages_without_libm_have_the_recorded_bytes(kit):

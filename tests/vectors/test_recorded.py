@@ -1,18 +1,22 @@
 """Stage data of any scene and settings: own arrays pass, a wrong one fails at its stage."""
 
+import inspect
+import re
 from functools import cache
 
 import numpy as np
 import pytest
 
+from refgi import stages
 from refgi.diagnostics import diagnosing
 from refgi.errors import InputError
-from refgi.methods import find_method
+from refgi.methods import find_method, render
 from refgi.scene import Camera, Material, Mesh, PointLight, Scene, SpotLight
 from refgi.scene.model import merge
 from refgi.settings import replaced
 from refgi.vectors.bounds import distance, large_value
 from refgi.vectors.check import Asked, check_output
+from refgi.vectors.docstrings import returned, taken
 from refgi.vectors.export import export_case
 from refgi.vectors.kit import Kit
 from refgi.vectors.recorded import leaves, recorded_case
@@ -100,8 +104,6 @@ def test_own_arrays_pass_and_a_flipped_one_fails_at_its_stage(kit_of, tmp_path, 
 
 
 def test_the_last_stage_is_the_picture_of_a_render(kit_of):
-    from refgi.methods import render
-
     kit = kit_of("sii")
     manifest, = kit.cases(Asked())
     with diagnosing(False):
@@ -149,6 +151,33 @@ def test_axes_and_units_are_those_of_docstrings_and_comments():
     assert (specs["lights.pixel_lights.flux"].axes, specs["lights.pixel_lights.flux"].unit) == ("rgb, light", "W")
     assert specs["rsm.surface.position"].unit == "m"
     assert specs["lights.pixel_lights.texel"].unit == "1"
+
+
+@pytest.mark.parametrize("method", SETTINGS)
+def test_arrays_have_the_shapes_and_types_that_docstrings_say(method, evidence):
+    """A letter or word of a shape is one number in each run of a stage."""
+    with diagnosing(False), stages.observe(record=True, steps=True) as log:
+        render(heap(), method, replaced(find_method(method).settings(), SETTINGS[method]), dtype=np.float64, **SIZE)
+    faults, count = set(), 0
+    for run in (one for one in log.runs if one.status == "ran"):
+        function, arguments = inspect.unwrap(stages.STAGES[run.name]), run.arguments
+        told, made = taken(function), returned(function)
+        value = run.value if isinstance(run.value, tuple) and len(made) == len(run.value) else (run.value,)
+        said = [(name, told[name].kind, array) for name, array in arguments.items() if name in told]
+        said += [(f"-> {name}", kind, array) for (name, (kind, _)), array in zip(made.items(), value, strict=False)]
+        sizes = {}
+        for name, kind, array in said:
+            shape = re.match(r"\(([^()]*[^()., ]),?\)", kind)
+            if isinstance(array, np.ndarray) and shape:
+                count, axes = count + 1, shape[1].split(", ")
+                fitting = [int(axis) if axis.isdigit() else sizes.setdefault(axis, size)
+                           for axis, size in zip(axes, array.shape, strict=False)]
+                letter = "b" if "bool" in kind else "iu" if re.search(r"\bu?int", kind) else "f"
+                if (*fitting, len(axes)) != (*array.shape, array.ndim) or array.dtype.kind not in letter:
+                    faults.add((run.name, name, kind, array.shape, str(array.dtype)))
+    assert not faults
+    evidence(f"{method}: {count} arrays have the shapes and types that docstrings say")
+    assert count > 20
 
 
 def test_likely_bugs_and_the_search_know_stages_that_have_a_literal_form(kit_of, tmp_path):

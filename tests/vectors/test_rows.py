@@ -2,15 +2,19 @@
 
 import ast
 import dataclasses
+import importlib
 import inspect
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from refgi import literal
 from refgi.literal import pairs
 from refgi.vectors import edits, rows
 
-MODULES = rows.literal_modules()
+MODULES = tuple(importlib.import_module(f"refgi.literal.{file.stem}")
+                for file in sorted(Path(literal.__file__).parent.glob("*.bugs")))
 KNOWN = ("numpy", "functools", "math", "typing", "collections.abc", "itertools")
 
 

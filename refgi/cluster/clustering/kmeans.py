@@ -48,23 +48,11 @@ def clusters_of(
 ) -> Clustering:
     """Group lights by k-means as settings say (VAL Sec. 5.1).
 
-    Parameters
-    ----------
-    position : (3, N) ndarray
-        Lights, m.
-    normal : (3, N) ndarray
-        Their normals.
-    count : int
-        M; no more than N are made.
-    settings : KMeansSettings
-        Distance, weights and rounds.
-    illuminated : Extent
-        Box of what reflects direct light, in shares of whose diagonal distances are.
-
-    Returns
-    -------
-    Clustering
-        As of `cluster`.
+    position (3, light): Lights, m.
+    normal (3, light): Their normals.
+    count: M; no more than N are made.
+    illuminated: Box of what reflects direct light, in shares of whose diagonal distances are.
+    -> Clustering: As of `cluster`.
     """
     return cluster(position, normal, count, distance=settings.distance,
                    weights=(settings.position_weight, settings.normal_weight), diagonal=illuminated.diagonal,

@@ -108,22 +108,9 @@ def area_lights(
 ) -> AreaLights:
     """Return the rectangle that stands for each cluster.
 
-    Parameters
-    ----------
-    lights : PixelLights
-        N lights.
-    clusters : Clustering
-        Their clusters.
-    settings : AreaLightSettings
-        Axes, extent, correction for sampling, and what a single light is.
-    footprint : (N,) ndarray, optional
-        Surface area of each light, m^2; for single lights that are their footprint.
-
-    Returns
-    -------
-    AreaLights
-        M rectangles around the projections of their lights. A cluster of no lights, of one that is a point, or of
-        lights in one place has sides of 0; one of lights in a row along an axis has one side of 0.
+    footprint (light,): Surface area of each light, m^2; for single lights that are their footprint.
+    -> AreaLights: M rectangles around the projections of their lights. A cluster of no lights, of one that is a point,
+        or of lights in one place has sides of 0; one of lights in a row along an axis has one side of 0.
 
     Raises
     ------

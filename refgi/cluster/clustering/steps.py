@@ -1,4 +1,9 @@
-"""Area lights one step after the other: the first rounds of k-means, the rest of them, rectangles (VAL Sec. 5.1, 6)."""
+"""Area lights one step after the other: the first rounds of k-means, the rest of them, rectangles (VAL Sec. 5.1, 6).
+
+- position (3, light): Places of the lights, m.
+- normal (3, light): Their unit normals.
+- axis (3, cluster): Their unit normals.
+"""
 
 from typing import Any
 
@@ -22,21 +27,9 @@ ROUNDS = 2  # of k-means that are shown one by one
 def kmeans_start(position: Array, normal: Array, count: int) -> tuple[Array, Array]:
     """Begin cluster k at light floor(k N / M) (VAL Sec. 5.1; docs/methods/val).
 
-    Parameters
-    ----------
-    position : (3, light) ndarray
-        Places of the lights, m.
-    normal : (3, light) ndarray
-        Their unit normals.
-    count : int
-        Clusters, M.
-
-    Returns
-    -------
-    center : (3, cluster) ndarray
-        Centres at which clusters begin, m.
-    axis : (3, cluster) ndarray
-        Their unit normals.
+    count: Clusters, M.
+    -> center (3, cluster): Centres at which clusters begin, m.
+    -> axis (3, cluster): Their unit normals.
     """
     first = first_lights(position.shape[1], count)
     return position[:, first], normal[:, first]
@@ -49,29 +42,12 @@ def kmeans_assign(
 ) -> tuple[Array, Array]:
     """Find each light's nearest cluster, the lowest index of equally near ones (VAL Sec. 5.1, E-VAL-11).
 
-    Parameters
-    ----------
-    position : (3, light) ndarray
-        Places of the lights, m.
-    normal : (3, light) ndarray
-        Their unit normals.
-    illuminated : Extent
-        Box of what reflects direct light, in shares of whose diagonal distances are.
-    center : (3, cluster) ndarray
-        Centres, m.
-    axis : (3, cluster) ndarray
-        Their unit normals.
-    distance : {"normalised", "raw", "squared"}
-        d = w_x dx / diagonal + w_a angle / pi; in metres and radians; by squares.
-    w_x, w_a : float
-        Weights of distance and of angle.
-
-    Returns
-    -------
-    of : (light,) int ndarray
-        Nearest cluster.
-    distance : (light,) ndarray
-        Its distance d.
+    illuminated: Box of what reflects direct light, in shares of whose diagonal distances are.
+    center (3, cluster): Centres, m.
+    distance: d = w_x dx / diagonal + w_a angle / pi; in metres and radians; by squares.
+    w_x, w_a: Weights of distance and of angle.
+    -> of (light,) int: Nearest cluster.
+    -> distance (light,): Its distance d.
     """
     return assigned(position, normal, center, axis, distance, (w_x, w_a), _diagonal(illuminated))
 
@@ -80,25 +56,10 @@ def kmeans_assign(
 def kmeans_means(position: Array, normal: Array, of: Array, center: Array, axis: Array) -> tuple[Array, Array]:
     """Move clusters to the means of their lights; without lights a cluster stays (VAL Sec. 5.1; docs/methods/val).
 
-    Parameters
-    ----------
-    position : (3, light) ndarray
-        Places of the lights, m.
-    normal : (3, light) ndarray
-        Their unit normals.
-    of : (light,) int ndarray
-        C(i): cluster of each light.
-    center : (3, cluster) ndarray
-        Centres before, m.
-    axis : (3, cluster) ndarray
-        Their unit normals.
-
-    Returns
-    -------
-    center : (3, cluster) ndarray
-        Means of the lights' places, m.
-    axis : (3, cluster) ndarray
-        Mean directions of their normals, unit vectors.
+    of (light,) int: C(i): cluster of each light.
+    center (3, cluster): Centres before, m.
+    -> center (3, cluster): Means of the lights' places, m.
+    -> axis (3, cluster): Mean directions of their normals, unit vectors.
     """
     return moved(position, normal, of, center, axis)
 
@@ -110,33 +71,14 @@ def kmeans_rounds(
 ) -> tuple[Array, Array, Array]:
     """Run further rounds until no light changes its cluster (VAL Sec. 5.1; docs/methods/val).
 
-    Parameters
-    ----------
-    position : (3, light) ndarray
-        Places of the lights, m.
-    normal : (3, light) ndarray
-        Their unit normals.
-    illuminated : Extent
-        Box of what reflects direct light.
-    center : (3, cluster) ndarray
-        Centres before, m.
-    axis : (3, cluster) ndarray
-        Their unit normals.
-    distance : {"normalised", "raw", "squared"}
-        As in the rounds before.
-    w_x, w_a : float
-        Weights of distance and of angle.
-    rounds : int
-        Most of them.
-
-    Returns
-    -------
-    center : (3, cluster) ndarray
-        Mean of each cluster's lights, m.
-    normal : (3, cluster) ndarray
-        Mean direction of their normals, unit vectors.
-    of : (light,) int ndarray
-        C(i): cluster of each light.
+    illuminated: Box of what reflects direct light.
+    center (3, cluster): Centres before, m.
+    distance: As in the rounds before.
+    w_x, w_a: Weights of distance and of angle.
+    rounds: Most of them.
+    -> center (3, cluster): Mean of each cluster's lights, m.
+    -> normal (3, cluster): Mean direction of their normals, unit vectors.
+    -> of (light,) int: C(i): cluster of each light.
     """
     count, total = center.shape[1], position.shape[1]
     start = Clustering(np.asarray(center, np.float64), np.asarray(axis, np.float64), np.zeros(count, np.int64),
@@ -150,21 +92,9 @@ def kmeans_rounds(
 def kmeans_each(position: Array, normal: Array) -> tuple[Array, Array, Array]:
     """Let each light be a cluster, coincident ones too, where as many are asked for as there are (VAL Sec. 5.1).
 
-    Parameters
-    ----------
-    position : (3, light) ndarray
-        Places of the lights, m.
-    normal : (3, light) ndarray
-        Their normals.
-
-    Returns
-    -------
-    center : (3, cluster) ndarray
-        Place of each cluster's light, m.
-    normal : (3, cluster) ndarray
-        Its unit normal.
-    of : (light,) int ndarray
-        C(i): cluster of each light.
+    -> center (3, cluster): Place of each cluster's light, m.
+    -> normal (3, cluster): Its unit normal.
+    -> of (light,) int: C(i): cluster of each light.
     """
     made = cluster(position, normal, position.shape[1], diagonal=1.0)
     return made.center, made.normal, made.of
@@ -195,41 +125,20 @@ def areas(
 ) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
     """Bound each cluster's lights by a rectangle in its plane (VAL Sec. 6, E-VAL-10).
 
-    Parameters
-    ----------
-    position : (3, light) ndarray
-        Places of the lights, m.
-    center : (3, cluster) ndarray
-        Centres, m.
-    normal : (3, cluster) ndarray
-        Their unit normals.
-    of : (light,) int ndarray
-        C(i): cluster of each light.
-    axes : {"fixed", "pca", "min_area"}
-        Axes of the rectangle: the map's, of the lights' spread, of least area.
-    extent : {"root", "longer", "shorter"}
-        Delta: root of the area, longer or shorter side.
-    unbiased : bool
-        Whether sides grow by (n + 1) / (n - 1), n lights.
-    footprint : (light,) ndarray, optional
-        Surface each light stands for, m^2, where a cluster of one light is a square of that area.
-
-    Returns
-    -------
-    frame : (cluster, right down forward, 3) ndarray
-        Axes of the map, unit vectors.
-    axes : (cluster, side, 3) ndarray
-        Axes of the rectangle, unit vectors, the first at most a quarter turn from right.
-    side : (side, cluster) ndarray
-        How long it is along its axes, m.
-    offset : (side, cluster) ndarray
-        Its middle from the centre, along its axes, m.
-    delta : (cluster,) ndarray
-        Delta, its size, m; 0: a point.
-    radius : (cluster,) ndarray
-        From the centre to its farthest light, m.
-    members : (cluster,) int ndarray
-        How many lights it has.
+    center (3, cluster): Centres, m.
+    normal (3, cluster): Their unit normals.
+    of (light,) int: C(i): cluster of each light.
+    axes: Axes of the rectangle: the map's, of the lights' spread, of least area.
+    extent: Delta: root of the area, longer or shorter side.
+    unbiased: Whether sides grow by (n + 1) / (n - 1), n lights.
+    footprint (light,): Surface each light stands for, m^2, where a cluster of one light is a square of that area.
+    -> frame (cluster, right down forward, 3): Axes of the map, unit vectors.
+    -> axes (cluster, side, 3): Axes of the rectangle, unit vectors, the first at most a quarter turn from right.
+    -> side (side, cluster): How long it is along its axes, m.
+    -> offset (side, cluster): Its middle from the centre, along its axes, m.
+    -> delta (cluster,): Delta, its size, m; 0: a point.
+    -> radius (cluster,): From the centre to its farthest light, m.
+    -> members (cluster,) int: How many lights it has.
     """
     x, c, n = (np.asarray(one, np.float64) for one in (position, center, normal))
     clusters = Clustering(c, n, np.bincount(of, minlength=c.shape[1]), of, 0, np.zeros(1))

@@ -1,6 +1,11 @@
 """Filters of convolution shadow maps one step after the other: depths, basis, mip levels, means (VAL Sec. 4.1, 6).
 
 A texel's channels are sin(c_k t) for all k, cos(c_k t), t sin(c_k t), t cos(c_k t), then t, its depth.
+
+- terms: M.
+- pending (area light, h, w) bool: Who asks.
+- region (area light, s t radius, h, w): Discs of the map, in units of half its side.
+- weighed: All channels, else the first 2 M.
 """
 
 from collections.abc import Mapping
@@ -25,25 +30,13 @@ Array = npt.NDArray[Any]
 def map_depths(depth: Array, origin: Array, slope: Array, end: Array, logarithmic: bool, mirrored: bool) -> Array:
     """Turn distances into depths of the series: log2(z / origin) slope or (z - origin) slope, 0 to the end (E-VAL-05).
 
-    Parameters
-    ----------
-    depth : (area light, row, column) ndarray
-        Distances, m; inf where nothing is.
-    origin : (area light,) ndarray
-        Distance of depth 0, m.
-    slope : (area light,) ndarray
-        Depths per octave or metre; 0 on empty maps.
-    end : (one,) ndarray
-        Depth of what is farthest, and of nothing.
-    logarithmic : bool
-        By octaves, else by metres.
-    mirrored : bool
-        Whether texels beyond the disc hold what the texel at (s, t) min(1 / r, 1 - 1.5 / n) / r does.
-
-    Returns
-    -------
-    (area light, row, column) ndarray
-        Depth t; the end where nothing is; 0 on empty maps.
+    depth (area light, row, column): Distances, m; inf where nothing is.
+    origin (area light,): Distance of depth 0, m.
+    slope (area light,): Depths per octave or metre; 0 on empty maps.
+    end (one,): Depth of what is farthest, and of nothing.
+    logarithmic: By octaves, else by metres.
+    mirrored: Whether texels beyond the disc hold what the texel at (s, t) min(1 / r, 1 - 1.5 / n) / r does.
+    -> (area light, row, column): Depth t; the end where nothing is; 0 on empty maps.
     """
     made = np.zeros_like(depth)
     for k in np.flatnonzero(slope > 0):
@@ -57,19 +50,9 @@ def map_depths(depth: Array, origin: Array, slope: Array, end: Array, logarithmi
 def basis(t: Array, terms: int, in_bytes: bool) -> Array:
     """Fill sines and cosines of each texel's depth, and the same times the depth (VAL Sec. 4.1, 6, E-VAL-02).
 
-    Parameters
-    ----------
-    t : (area light, row, column) ndarray
-        Depths of the series.
-    terms : int
-        M.
-    in_bytes : bool
-        Whether they are kept in 8 bits, those times the depth in half floats.
-
-    Returns
-    -------
-    (area light, channel, row, column) ndarray
-        S_1.., C_1.., t S_1.., t C_1.., t; 0 on empty maps.
+    t (area light, row, column): Depths of the series.
+    in_bytes: Whether they are kept in 8 bits, those times the depth in half floats.
+    -> (area light, channel, row, column): S_1.., C_1.., t S_1.., t C_1.., t; 0 on empty maps.
     """
     made = np.zeros((len(t), 4 * terms + 1, *t.shape[1:]), t.dtype)
     for k in np.flatnonzero(t.any(axis=(1, 2))):
@@ -83,17 +66,9 @@ def basis(t: Array, terms: int, in_bytes: bool) -> Array:
 def mip_levels(basis: Array, in_bytes: bool) -> dict[str, Array]:
     """Halve each level by means of 2 x 2 texels down to one; of an odd side the last counts twice (VAL Sec. 6).
 
-    Parameters
-    ----------
-    basis : (area light, channel, row, column) ndarray
-        Level 0.
-    in_bytes : bool
-        Whether levels are kept in 8 bits and half floats.
-
-    Returns
-    -------
-    (area light, channel, row, column) ndarray
-        Means over the texels of the map that lie below one of this level.
+    basis (area light, channel, row, column): Level 0.
+    in_bytes: Whether levels are kept in 8 bits and half floats.
+    -> (area light, channel, row, column): Means over the texels of the map that lie below one of this level.
     """
     levels: dict[str, Array] = {}
     level = basis
@@ -131,27 +106,10 @@ def mip_means(
 ) -> Array:
     """Read means of the channels over discs by 8 texels of two levels (VAL Sec. 6).
 
-    Parameters
-    ----------
-    pending : (area light, h, w) bool ndarray
-        Who asks.
-    region : (area light, s t radius, h, w) ndarray
-        Discs of the map, in units of half its side.
-    basis : (area light, channel, row, column) ndarray
-        Level 0.
-    levels : mapping of str to ndarray
-        Levels from 1 on.
-    t : (area light, row, column) ndarray or None
-        Depths of the series where the basis is kept in 8 bits, of which level 0 is made anew.
-    terms : int
-        M.
-    weighed : bool
-        All channels, else the first 2 M.
-
-    Returns
-    -------
-    (area light, channel, h, w) ndarray
-        Means of the channels over the disc; 0 where none is asked for.
+    basis (area light, channel, row, column): Level 0.
+    levels mapping of str to (area light, channel, row, column): Levels from 1 on.
+    t (area light, row, column): Depths of the series where the basis is kept in 8 bits, of which level 0 is made anew.
+    -> (area light, channel, h, w): Means of the channels over the disc; 0 where none is asked for.
     """
     size, count = basis.shape[2], 2 * terms
 
@@ -172,23 +130,8 @@ def mip_means(
 def disc_means(pending: Array, region: Array, basis: Array, terms: int, weighed: bool) -> Array:
     """Average the texels with their centre in a disc and in the hemisphere, or that of its middle (VAL Sec. 6).
 
-    Parameters
-    ----------
-    pending : (area light, h, w) bool ndarray
-        Who asks.
-    region : (area light, s t radius, h, w) ndarray
-        Discs of the map, in units of half its side.
-    basis : (area light, channel, row, column) ndarray
-        Channels of each texel.
-    terms : int
-        M.
-    weighed : bool
-        All channels, else the first 2 M.
-
-    Returns
-    -------
-    (area light, channel, h, w) ndarray
-        Means of the channels over the disc; 0 where none is asked for.
+    basis (area light, channel, row, column): Channels of each texel.
+    -> (area light, channel, h, w): Means of the channels over the disc; 0 where none is asked for.
     """
     return _brute(pending, region, basis, terms, weighed, box=False)
 
@@ -197,23 +140,8 @@ def disc_means(pending: Array, region: Array, basis: Array, terms: int, weighed:
 def box_means(pending: Array, region: Array, basis: Array, terms: int, weighed: bool) -> Array:
     """Average texels over the squares around discs, at least a texel wide, by area (VAL Sec. 6).
 
-    Parameters
-    ----------
-    pending : (area light, h, w) bool ndarray
-        Who asks.
-    region : (area light, s t radius, h, w) ndarray
-        Discs of the map, in units of half its side.
-    basis : (area light, channel, row, column) ndarray
-        Channels of each texel.
-    terms : int
-        M.
-    weighed : bool
-        All channels, else the first 2 M.
-
-    Returns
-    -------
-    (area light, channel, h, w) ndarray
-        Means of the channels over the square; 0 where none is asked for.
+    basis (area light, channel, row, column): Channels of each texel.
+    -> (area light, channel, h, w): Means of the channels over the square; 0 where none is asked for.
     """
     return _brute(pending, region, basis, terms, weighed, box=True)
 

@@ -38,23 +38,12 @@ def blur(
 ) -> Array:
     """Average irradiance over n x n pixels of a surface, each subset once (VAL Sec. 6, E-VAL-13; docs/methods/val).
 
-    Parameters
-    ----------
-    irradiance : (3, h, w) ndarray
-        W/m^2.
-    receivers : Receivers
-        Receivers; their dtype is that of the result.
-    size : int
-        n, 1 to 64: pixels along a side of the window.
-    settings : BoxBlur or GeometryBlur
-        How far apart points of one surface may be and how their normals may differ; a box asks neither.
-    visible : Extent
-        Box of what the camera sees, of whose diagonal distances are shares.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        W/m^2; 0 where there is no surface. Equal irradiance stays as it is, to the bit.
+    irradiance (3, h, w): W/m^2.
+    receivers: Receivers; their dtype is that of the result.
+    size: n, 1 to 64: pixels along a side of the window.
+    settings: How far apart points of one surface may be and how their normals may differ; a box asks neither.
+    visible: Box of what the camera sees, of whose diagonal distances are shares.
+    -> (3, h, w): W/m^2; 0 where there is no surface. Equal irradiance stays as it is, to the bit.
 
     Raises
     ------

@@ -69,34 +69,16 @@ def clustered_irradiance(
 ) -> Array:
     """Sum the irradiance of every pixel light under the visibility of its area light.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        Receivers; their dtype is that of the result.
-    facing : (3, h, w) ndarray
-        Normals of the triangles that the points lie on; the receivers' own array where nothing is interpolated.
-    lights : PixelLights
-        N lights.
-    areas : AreaLights
-        The area lights; `of` says which is whose.
-    maps : ShadowMaps or None
-        Their shadow maps; not read without visibility or where `visibility_of` is there.
-    settings : ValSettings
-        How one light lights one receiver, and how visibility is found.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-    visibility_of : callable, optional
-        V from elsewhere, a `VisibilityFunction`: (m, points (3, n), facing (3, n)) -> (n,). One with a parameter
-        `shading` is given the receivers' normals as well where they are not the faces'.
-    interleaving : int
-        n: each pixel of n x n sums its own lights, n^2 times; 1: all.
-    rays : Tracer, optional
-        The scene's triangles, for points behind an area light; needed for ``behind == "raytrace"`` alone.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2, linear RGB; 0 where there is no surface. Excludes the receiver's albedo/pi.
+    receivers: Receivers; their dtype is that of the result.
+    facing (3, h, w): Normals of the triangles that the points lie on; the receivers' own array where nothing is
+        interpolated.
+    areas: The area lights; `of` says which is whose.
+    maps: Their shadow maps; not read without visibility or where `visibility_of` is there.
+    visibility_of: V from elsewhere, a `VisibilityFunction`: (m, points (3, n), facing (3, n)) -> (n,). One with a
+        parameter `shading` is given the receivers' normals as well where they are not the faces'.
+    interleaving: n: each pixel of n x n sums its own lights, n^2 times; 1: all.
+    rays: The scene's triangles, for points behind an area light; needed for ``behind == "raytrace"`` alone.
+    -> (3, h, w): Irradiance, W/m^2, linear RGB; 0 where there is no surface. Excludes the receiver's albedo/pi.
 
     Raises
     ------

@@ -35,33 +35,14 @@ def clustered_radiance(
 ) -> Array:
     """Sum the radiance that lobes make of every pixel light under the visibility of its area light.
 
-    Parameters
-    ----------
-    points : GlossyPoints
-        The n receivers; their dtype is that of the result.
-    facing : (3, n) ndarray
-        Normals of the triangles that the points lie on; the points' own array where nothing is interpolated.
-    lights : PixelLights
-        N lights.
-    areas : AreaLights
-        The area lights; `of` says which is whose.
-    maps : ShadowMaps or None
-        Their shadow maps; not read without visibility or where `visibility_of` is there.
-    settings : ValSettings
-        How one light lights one receiver, and how visibility is found.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-    visibility_of : callable, optional
-        As for `clustered_irradiance`.
-    rays : Tracer, optional
-        As for `clustered_irradiance`.
-    width : int
-        Of the picture that the points are pixels of; 0: neighbours follow each other already.
-
-    Returns
-    -------
-    (3, n) ndarray
-        W/m^2/sr, linear RGB.
+    points: The n receivers; their dtype is that of the result.
+    facing (3, n): Normals of the triangles that the points lie on; the points' own array where nothing is interpolated.
+    areas: The area lights; `of` says which is whose.
+    maps: Their shadow maps; not read without visibility or where `visibility_of` is there.
+    visibility_of: As for `clustered_irradiance`.
+    rays: As for `clustered_irradiance`.
+    width: Of the picture that the points are pixels of; 0: neighbours follow each other already.
+    -> (3, n): W/m^2/sr, linear RGB.
 
     Raises
     ------

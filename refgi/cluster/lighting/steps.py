@@ -37,19 +37,10 @@ Array = npt.NDArray[Any]
 def subset_of_lights(of: Array, side: int, assignment: Assignment) -> Array:
     """Deal lights out to n^2 subsets, of which a pixel sums (row mod n) n + column mod n (VAL Sec. 6, E-VAL-13).
 
-    Parameters
-    ----------
-    of : (light,) int ndarray
-        C(i): cluster of each light.
-    side : int
-        n, pixels along a side of a block.
-    assignment : {"index", "cluster"}
-        Every n^2-th light, or runs of lights by cluster.
-
-    Returns
-    -------
-    (light,) int ndarray
-        Subset of each light, 0 to n^2 - 1.
+    of (light,) int: C(i): cluster of each light.
+    side: n, pixels along a side of a block.
+    assignment: Every n^2-th light, or runs of lights by cluster.
+    -> (light,) int: Subset of each light, 0 to n^2 - 1.
     """
     return assigned_subsets(of, side, assignment)
 
@@ -62,39 +53,15 @@ def parts(
 ) -> Array:
     """Sum the light of each area light's members, n^2 times those of a pixel's subset (VAL Sec. 4, E-VAL-01, 13).
 
-    Parameters
-    ----------
-    receivers : Receivers
-        Pixels.
-    light_position : (3, light) ndarray
-        Places of the lights, m.
-    light_normal : (3, light) ndarray
-        Their unit normals.
-    flux : (3, light) ndarray
-        Flux that the diffuse part reflects, W.
-    of : (light,) int ndarray
-        C(i): cluster of each light.
-    center : (3, area light) ndarray
-        Centres of clusters, of which their number alone counts, m.
-    subset : (light,) int ndarray or None
-        Subset of each light; None: every pixel sums all.
-    side : int
-        n, pixels along a side of a block.
-    pairs : PairSettings
-        How one light lights one receiver.
-    lobe_flux : (3, light) ndarray, optional
-        Flux that the lobe reflects, W.
-    lobe_axis : (3, light) ndarray, optional
-        Unit vectors.
-    lobe_exponent : (light,) ndarray, optional
-        Phong exponents.
-    area : (light,) ndarray, optional
-        Surface that each light stands for, m^2.
-
-    Returns
-    -------
-    (area light, 3, h, w) ndarray
-        Irradiance of the cluster's lights without visibility, W/m^2.
+    flux (3, light): Flux that the diffuse part reflects, W.
+    of (light,) int: C(i): cluster of each light.
+    center (3, area light): Centres of clusters, of which their number alone counts, m.
+    subset (light,) int: Subset of each light; None: every pixel sums all.
+    side: n, pixels along a side of a block.
+    lobe_flux (3, light): Flux that the lobe reflects, W.
+    lobe_axis (3, light): Unit vectors.
+    area (light,): Surface that each light stands for, m^2.
+    -> (area light, 3, h, w): Irradiance of the cluster's lights without visibility, W/m^2.
     """
     lights = PixelLights(light_position, light_normal, flux, lobe_flux, lobe_axis, lobe_exponent, len(of))
     packed, count, real = checked(receivers, lights, pairs, area), center.shape[1], receivers.position.dtype
@@ -116,17 +83,9 @@ def parts(
 def shadowed(irradiance: Array, share: Array | None) -> Array:
     """Add up the light of area lights under their visibility: E = sum V_m E_m (VAL Sec. 4).
 
-    Parameters
-    ----------
-    irradiance : (area light, 3, h, w) ndarray
-        Light of each one's members, W/m^2.
-    share : (area light, h, w) ndarray or None
-        V; None: all is seen.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Indirect irradiance, W/m^2; of interleaved pixels not blurred.
+    irradiance (area light, 3, h, w): Light of each one's members, W/m^2.
+    share (area light, h, w): V; None: all is seen.
+    -> (3, h, w): Indirect irradiance, W/m^2; of interleaved pixels not blurred.
     """
     made = np.zeros(irradiance.shape[1:], irradiance.dtype)
     for m, part in enumerate(irradiance):
@@ -141,27 +100,10 @@ def traced_share(
 ) -> Array:
     """Find V of each area light by rays, or by what is no test of a map's texels alone (docs/methods/val_visibility).
 
-    Parameters
-    ----------
-    receivers : Receivers
-        Pixels.
-    facing : (3, h, w) ndarray
-        Unit normals of the triangles that pixels see.
-    areas : AreaLights
-        The area lights.
-    maps : mapping of str to ndarray or None
-        Their maps, where they are read.
-    settings : ValSettings
-        How visibility is found.
-    visibility_of : callable or None
-        V from elsewhere.
-    rays : Tracer or None
-        The scene's triangles, for points behind an area light.
-
-    Returns
-    -------
-    (area light, h, w) ndarray
-        V, 0 hidden to 1 seen; 1 without surface.
+    maps mapping of str to (area light, ...): Maps of the area lights, where they are read.
+    visibility_of: V from elsewhere.
+    rays: The scene's triangles, for points behind an area light.
+    -> (area light, h, w): V, 0 hidden to 1 seen; 1 without surface.
     """
     visible_from = visibility_by(areas, None if maps is None else _shadow_maps(maps), settings, visibility_of, rays)
     covered = np.asarray(receivers.covered, np.bool_).reshape(-1)

@@ -85,17 +85,7 @@ def ends_of(frame: "Frame", lights: "PixelLights") -> Ends:
 def seen_vertices(geometry: Geometry, triangle_id: Array) -> Array:
     """Gather the vertices of the triangles that pixels see (docs/methods/val_visibility).
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    triangle_id : (h, w) int ndarray
-        Which triangle a pixel sees; -1 for none.
-
-    Returns
-    -------
-    (seen vertex, 3) ndarray
-        Places, m: each vertex once, in their order.
+    -> (seen vertex, 3): Places, m: each vertex once, in their order.
     """
     used = np.zeros(len(geometry.vertices), np.bool_)
     _flag_corners(triangle_id, geometry.faces, used)
@@ -113,21 +103,11 @@ def everywhere(geometry: Geometry) -> Ends:
 def occluders(geometry: Geometry, ends: Ends | None = None, touching: bool = False) -> Array:
     """Find the triangles that may lie between two ends of light: some on either side (docs/methods/val_visibility).
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    ends : Ends, optional
-        What the points lie within; absent: anywhere in the scene.
-    touching : bool
-        Count those on the hull of the points as well.
-
-    Returns
-    -------
-    (triangle,) bool ndarray
-        Whether it may lie between. False on or outside of the convex hull: a segment between two points meets it only
-        where one of its ends lies in their plane, to 1e-6 of the extent's diagonal. Triangles without area are False,
-        and all are where there is no point.
+    ends: What the points lie within; absent: anywhere in the scene.
+    touching: Count those on the hull of the points as well.
+    -> (triangle,) bool: Whether it may lie between. False on or outside of the convex hull: a segment between two
+        points meets it only where one of its ends lies in their plane, to 1e-6 of the extent's diagonal. Triangles
+        without area are False, and all are where there is no point.
     """
     faces = np.ascontiguousarray(geometry.faces)
     border = np.zeros(len(faces), np.bool_)
@@ -168,17 +148,8 @@ def blockers(geometry: Geometry, alone: bool, ends: Ends | None = None) -> Block
 def selected_blockers(geometry: Geometry, chosen: Array) -> Blockers:
     """Return some triangles as maps are drawn from.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    chosen : (m,) ndarray of bool
-        Which of them.
-
-    Returns
-    -------
-    Blockers
-        The triangles, in mesh order.
+    chosen (m,) bool: Which of them.
+    -> Blockers: The triangles, in mesh order.
     """
     selected = geometry.faces[chosen]
     used = _used(len(geometry.vertices), selected)

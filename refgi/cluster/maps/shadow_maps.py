@@ -112,25 +112,11 @@ def shadow_maps(
 ) -> ShadowMaps:
     """Draw a paraboloid map of distances for every area light that something may occlude.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    areas : AreaLights
-        M area lights.
-    settings : ShadowMapSettings
-        Size and kind of the maps, and what is left out of them.
-    dtype : dtype
-        Float32 or float64.
-    tracer : Tracer, optional
-        Rays against `geometry`, for ``renderer == "rays"``; made where it is needed and absent.
-    ends : Ends, optional
-        Where light begins and ends; absent: anywhere in the scene.
-
-    Returns
-    -------
-    ShadowMaps
-        At most M maps. An area light without lights, or with nothing in the hemispheres that its maps show, has none.
+    settings: Size and kind of the maps, and what is left out of them.
+    tracer: Rays against `geometry`, for ``renderer == "rays"``; made where it is needed and absent.
+    ends: Where light begins and ends; absent: anywhere in the scene.
+    -> ShadowMaps: At most M maps. An area light without lights, or with nothing in the hemispheres that its maps show,
+        has none.
 
     Raises
     ------
@@ -217,31 +203,13 @@ def draw_maps(
 ) -> tuple[Array, Array, Array]:
     """Measure distances on paraboloid maps, as settings ask for.
 
-    Parameters
-    ----------
-    drawn : Blockers
-        The triangles.
-    center : (k, 3) ndarray
-        Where maps look from, m.
-    frame : (k, 3, 3) ndarray
-        Rows right, down, forward of each.
-    radius : (k,) ndarray
-        What is nearer to a centre counts as the settings say, m.
-    settings : ShadowMapSettings
-        Size and kind of the maps.
-    dtype : dtype
-        Float32 or float64.
-    tracer : Tracer or None
-        Rays against the same triangles.
-
-    Returns
-    -------
-    distance : (k, n, n) ndarray
-        Distance, m; inf where the map is empty and outside the disc.
-    nearest : (k,) ndarray
-        Float64: smallest distance on each map, m; inf where nothing is.
-    left_out : (k,) ndarray
-        Int64: triangles that reach into each map's hemisphere and are ignored.
+    center (k, 3): Where maps look from, m.
+    frame (k, 3, 3): Rows right, down, forward of each.
+    radius (k,): What is nearer to a centre counts as the settings say, m.
+    tracer: Rays against the same triangles.
+    -> distance (k, n, n): Distance, m; inf where the map is empty and outside the disc.
+    -> nearest (k,) float64: Smallest distance on each map, m; inf where nothing is.
+    -> left_out (k,) int64: Triangles that reach into each map's hemisphere and are ignored.
     """
     n = settings.resolution
     projection = Projection(PARABOLOID, n, n, center, np.ascontiguousarray(frame), np.ones(2), np.inf)

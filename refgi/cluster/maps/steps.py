@@ -28,29 +28,15 @@ def map_views(
 ) -> tuple[Array, Array, Array]:
     """Place maps, with a ball around each within which nothing blocks (VAL Sec. 5.1, E-VAL-12).
 
-    Parameters
-    ----------
-    visible : Extent
-        Box of what the camera sees.
-    illuminated : Extent
-        Box of what reflects direct light.
-    center : (3, area light) ndarray
-        Centres of clusters, m.
-    normal : (3, area light) ndarray
-        Their unit normals.
-    radius : (area light,) ndarray
-        From the centre to the cluster's farthest light, m.
-    near_distance : float
-        Radius of the ball, as a share of the cluster's.
-
-    Returns
-    -------
-    center : (area light, 3) ndarray
-        Centre of the map, a little off the surface, m.
-    ball : (area light,) ndarray
-        What is nearer to the centre blocks nothing, m.
-    scene_far : (area light,) ndarray
-        To the farthest corner of the boxes' common box, m.
+    visible: Box of what the camera sees.
+    illuminated: Box of what reflects direct light.
+    center (3, area light): Centres of clusters, m.
+    normal (3, area light): Their unit normals.
+    radius (area light,): From the centre to the cluster's farthest light, m.
+    near_distance: Radius of the ball, as a share of the cluster's.
+    -> center (area light, 3): Centre of the map, a little off the surface, m.
+    -> ball (area light,): What is nearer to the centre blocks nothing, m.
+    -> scene_far (area light,): To the farthest corner of the boxes' common box, m.
     """
     place = np.ascontiguousarray(map_centers(center, normal, illuminated))
     return place, near_distance * radius, farthest_corner(joined(visible, illuminated), place)
@@ -60,15 +46,8 @@ def map_views(
 def frames_behind(frame: Array) -> Array:
     """Turn maps to the hemisphere behind the light: right and forward are turned round (VAL Sec. 4.2, E-VAL-12).
 
-    Parameters
-    ----------
-    frame : (area light, right down forward, 3) ndarray
-        Axes of the map, unit vectors.
-
-    Returns
-    -------
-    (area light, right down forward, 3) ndarray
-        Axes of the map behind, unit vectors.
+    frame (area light, right down forward, 3): Axes of the map, unit vectors.
+    -> (area light, right down forward, 3): Axes of the map behind, unit vectors.
     """
     return np.asarray(BACKWARD.astype(frame.dtype) @ frame)
 
@@ -80,34 +59,18 @@ def depth_maps(
 ) -> Array:
     """Measure the distance from each map's centre to the nearest blocker (VAL Sec. 4.2, E-VAL-06, E-VAL-12).
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    blocks : (triangle,) bool ndarray
-        Which of them may block.
-    center : (area light, 3) ndarray
-        Where maps look from, m.
-    frame : (area light, right down forward, 3) ndarray
-        Axes of the map, unit vectors.
-    ball : (area light,) ndarray
-        What is nearer to the centre counts as `near_geometry` says, m.
-    members : (area light,) int ndarray
-        Lights of the cluster; without any its map is empty.
-    texels : int
-        Along a side.
-    renderer : {"raster", "rays"}
-        What finds the distances.
-    near_geometry : {"ball", "planes", "keep"}
-        What is left out: hits within the ball, triangles whose planes reach into it, nothing.
-    tracer : Tracer, optional
-        Rays against all triangles.
-
-    Returns
-    -------
-    (area light, row, column) ndarray
-        Distance along the texel's direction (2s, 2t, 1 - q) / (1 + q), q = s^2 + t^2, m; inf without blocker, outside
-        of the disc, without lights.
+    blocks (triangle,) bool: Which of them may block.
+    center (area light, 3): Where maps look from, m.
+    frame (area light, right down forward, 3): Axes of the map, unit vectors.
+    ball (area light,): What is nearer to the centre counts as `near_geometry` says, m.
+    members (area light,) int: Lights of the cluster; without any its map is empty.
+    texels: Along a side.
+    renderer {"raster", "rays"}: What finds the distances.
+    near_geometry {"ball", "planes", "keep"}: What is left out: hits within the ball, triangles whose planes reach into
+        it, nothing.
+    tracer: Rays against all triangles.
+    -> (area light, row, column): Distance along the texel's direction (2s, 2t, 1 - q) / (1 + q), q = s^2 + t^2, m; inf
+        without blocker, outside of the disc, without lights.
     """
     chosen = ShadowMapSettings(texels, renderer, near_geometry)
     drawn = selected_blockers(geometry, blocks)
@@ -121,17 +84,9 @@ def depth_maps(
 def map_ranges(depth: Array) -> tuple[Array, Array]:
     """Find the nearest and the farthest distance on each map (E-VAL-05).
 
-    Parameters
-    ----------
-    depth : (area light, row, column) ndarray
-        Distances, m.
-
-    Returns
-    -------
-    near : (area light,) ndarray
-        Least distance, m; inf on an empty map.
-    far : (area light,) ndarray
-        Greatest finite distance, m; 0 on an empty map.
+    depth (area light, row, column): Distances, m.
+    -> near (area light,): Least distance, m; inf on an empty map.
+    -> far (area light,): Greatest finite distance, m; 0 on an empty map.
     """
     return depth.min(axis=(1, 2)), farthest(depth)
 

@@ -20,32 +20,15 @@ def back_projection(
 ) -> Array:
     """Project texels back onto the rectangle: V is the share of cells that none hides (docs/methods/val_visibility).
 
-    Parameters
-    ----------
-    places : Places
-        Pixels and maps.
-    facing : (3, h, w) ndarray
-        Unit normals of the triangles that pixels see.
-    depth : (area light, row, column) ndarray
-        Distances to the nearest blocker, m.
-    axes : (area light, side, 3) ndarray
-        Axes of the rectangles, unit vectors.
-    side : (side, area light) ndarray
-        How long they are, m.
-    offset : (side, area light) ndarray
-        Their middles from the centres, m.
-    center : (3, area light) ndarray
-        Centres of clusters, m.
-    normal : (3, area light) ndarray
-        Their unit normals.
-    scene_far : (area light,) ndarray
-        To the farthest place there is, m.
-
-    Returns
-    -------
-    (area light, h, w) ndarray
-        V of the cells above the pixel's plane, 0 hidden to 1 seen; 1 behind the light's plane, on empty maps, without
-        surface.
+    depth (area light, row, column): Distances to the nearest blocker, m.
+    axes (area light, side, 3): Axes of the rectangles, unit vectors.
+    side (side, area light): How long they are, m.
+    offset (side, area light): Their middles from the centres, m.
+    center (3, area light): Centres of clusters, m.
+    normal (3, area light): Their unit normals.
+    scene_far (area light,): To the farthest place there is, m.
+    -> (area light, h, w): V of the cells above the pixel's plane, 0 hidden to 1 seen; 1 behind the light's plane, on
+        empty maps, without surface.
     """
     areas: Any = SimpleNamespace(**{name: np.asarray(one, np.float64) for name, one in (
         ("axes", axes), ("side", side), ("offset", offset), ("center", center), ("normal", normal))})

@@ -23,25 +23,13 @@ Array = npt.NDArray[Any]
 def series(terms: int, attenuation: float, rescale: Any, fixed: float | None) -> tuple[Array, Array, Array]:
     """Return weights and biases of f_M, and the far end of its depths (VAL Sec. 4.1, E-VAL-02, 03, 05).
 
-    Parameters
-    ----------
-    terms : int
-        M.
-    attenuation : float
-        A of the terms' attenuation.
-    rescale : {"none", "scale2", "plateau"}
-        What undoes it.
-    fixed : float or None
-        Both biases; None: where f_M is 1 for the first time.
-
-    Returns
-    -------
-    weight : (term,) ndarray
-        w_k = 2 / c_k, c_k = (2k - 1) pi.
-    bias : (search comparison,) ndarray
-        b* of the search and of the comparison, where f_M is 1 for the first time.
-    end : (one,) ndarray
-        1 - 2 b*, the depth of what is farthest.
+    terms: M.
+    attenuation: A of the terms' attenuation.
+    rescale {"none", "scale2", "plateau"}: What undoes it.
+    fixed: Both biases; None: where f_M is 1 for the first time.
+    -> weight (term,): w_k = 2 / c_k, c_k = (2k - 1) pi.
+    -> bias (search comparison,): b* of the search and of the comparison, where f_M is 1 for the first time.
+    -> end (one,): 1 - 2 b*, the depth of what is farthest.
     """
     chain = series_of(Csm(terms, bias=fixed, attenuation=attenuation, rescale=rescale))
     return np.array(chain.weight), np.array([chain.search_bias, chain.bias]), np.array([chain.range])
@@ -53,25 +41,13 @@ def depth_scale(
 ) -> tuple[Array, Array]:
     """Find the scale on which the depths of each map are compared (E-VAL-05).
 
-    Parameters
-    ----------
-    near : (area light,) ndarray
-        Least distance on each map, m; inf on an empty one.
-    far : (area light,) ndarray
-        Greatest one, m.
-    scene_far : (area light,) ndarray
-        To the farthest place there is, m.
-    end : (one,) ndarray
-        Depth of what is farthest.
-    kind : {"log_map", "map", "scene"}
-        Octaves or metres between what a map holds; metres up to the scene's end.
-
-    Returns
-    -------
-    origin : (area light,) ndarray
-        Distance of depth 0, m; 0 for empty maps.
-    slope : (area light,) ndarray
-        Depths per octave of distance or per metre; 0 on empty maps.
+    near (area light,): Least distance on each map, m; inf on an empty one.
+    far (area light,): Greatest one, m.
+    scene_far (area light,): To the farthest place there is, m.
+    end (one,): Depth of what is farthest.
+    kind: Octaves or metres between what a map holds; metres up to the scene's end.
+    -> origin (area light,): Distance of depth 0, m; 0 for empty maps.
+    -> slope (area light,): Depths per octave of distance or per metre; 0 on empty maps.
     """
     none = DepthScale(False, 0.0, 0.0, 0.0)
     scales = [scale_of_map(kind, float(a), float(b), float(c), float(end[0])) if np.isfinite(a) else none
@@ -86,39 +62,19 @@ def csm_penumbra(
 ) -> tuple[Array, Array, Array, Array]:
     """Find blockers' mean depth in the search disc, and the penumbra's disc (VAL Sec. 4.1, E-VAL-02, 04, 07).
 
-    Parameters
-    ----------
-    places : Places
-        Pixels and maps.
-    origin, slope : (area light,) ndarray
-        Scale of the series on each map.
-    end : (one,) ndarray
-        Depth of what is farthest.
-    weight : (term,) ndarray
-        w_k.
-    bias : (search comparison,) ndarray
-        b*.
-    pending : (area light, h, w) bool ndarray
-        Who searches.
-    means : (area light, channel, h, w) ndarray
-        Means of the channels over the search disc.
-    logarithmic : bool
-        Whether depths are octaves.
-    alpha : bool
-        The angle of the penumbra as printed.
-    squares, foreshortened : bool
-        As for the search.
-
-    Returns
-    -------
-    shaded : (area light, h, w) bool ndarray
-        Whether there are blockers; V is 1 elsewhere.
-    z_avg : (area light, h, w) ndarray
-        Mean distance of the blockers, m; 0 where not shaded.
-    region : (area light, s t radius, h, w) ndarray
-        Disc of the penumbra, [-1, 1] units; 0 where none.
-    t : (area light, h, w) ndarray
-        Depth of the pixel on the series' scale.
+    origin, slope (area light,): Scale of the series on each map.
+    end (one,): Depth of what is farthest.
+    weight (term,): w_k.
+    bias (search comparison,): b*.
+    pending (area light, h, w) bool: Who searches.
+    means (area light, channel, h, w): Means of the channels over the search disc.
+    logarithmic: Whether depths are octaves.
+    alpha: The angle of the penumbra as printed.
+    squares, foreshortened: As for the search.
+    -> shaded (area light, h, w) bool: Whether there are blockers; V is 1 elsewhere.
+    -> z_avg (area light, h, w): Mean distance of the blockers, m; 0 where not shaded.
+    -> region (area light, s t radius, h, w): Disc of the penumbra, [-1, 1] units; 0 where none.
+    -> t (area light, h, w): Depth of the pixel on the series' scale.
     """
     shaded, z_avg, region, t = planes(places, kind=np.bool_), planes(places), planes(places, 3), planes(places)
     sizing = FilterSizing(alpha, squares, False, foreshortened, False)
@@ -140,27 +96,14 @@ def csm(
 ) -> Array:
     """Compare depths: V = gain (1/2 + sum w_k (cos(c_k d') S_k - sin(c_k d') C_k)) (VAL Sec. 4.1, E-VAL-02).
 
-    Parameters
-    ----------
-    shaded : (area light, h, w) bool ndarray
-        Whether there are blockers.
-    t : (area light, h, w) ndarray
-        Depth of the pixel on the series' scale; d' = t - b.
-    means : (area light, channel, h, w) ndarray
-        Means S, C over the penumbra's disc.
-    weight : (term,) ndarray
-        w_k.
-    bias : (search comparison,) ndarray
-        b*.
-    gain : float
-        2 where a damped series is doubled.
-    hard : (area light, h, w) ndarray or None
-        V of area lights without extent, where there are some.
-
-    Returns
-    -------
-    (area light, h, w) ndarray
-        V, 0 hidden to 1 seen; 1 behind the light's plane, on empty maps, without surface.
+    shaded (area light, h, w) bool: Whether there are blockers.
+    t (area light, h, w): Depth of the pixel on the series' scale; d' = t - b.
+    means (area light, channel, h, w): Means S, C over the penumbra's disc.
+    weight (term,): w_k.
+    bias (search comparison,): b*.
+    gain: 2 where a damped series is doubled.
+    hard (area light, h, w): V of area lights without extent, where there are some.
+    -> (area light, h, w): V, 0 hidden to 1 seen; 1 behind the light's plane, on empty maps, without surface.
     """
     made = np.ones(shaded.shape, t.dtype) if hard is None else np.array(hard)
     constants = np.zeros(CONSTANTS, t.dtype)

@@ -31,29 +31,14 @@ def visibility(
 ) -> Array:
     """Return how much of one area light each point sees.
 
-    Parameters
-    ----------
-    maps : ShadowMaps
-        The maps.
-    areas : AreaLights
-        The area lights that the maps were drawn for.
-    m : int
-        Which area light.
-    points : (3, n) ndarray
-        World space, m.
-    facing : (3, n) ndarray
-        Normals of their faces; on the lit side for rays, else on either.
-    settings : ValSettings
-        `visibility` is one of `BY_MAPS` or None; `maps.behind` says what points behind the area light see.
-    tracer : Tracer, optional
-        Rays against the scene, for points behind the area light and ``maps.behind == "raytrace"``.
-    shading : (3, n) ndarray, optional
-        Normals that cosines are taken with, for the same; the faces' where absent.
-
-    Returns
-    -------
-    (n,) ndarray
-        V, 0 to 1, in the dtype of the maps.
+    areas: The area lights that the maps were drawn for.
+    m: Which area light.
+    points (3, n): World space, m.
+    facing (3, n): Normals of their faces; on the lit side for rays, else on either.
+    settings: `visibility` is one of `BY_MAPS` or None; `maps.behind` says what points behind the area light see.
+    tracer: Rays against the scene, for points behind the area light and ``maps.behind == "raytrace"``.
+    shading (3, n): Normals that cosines are taken with, for the same; the faces' where absent.
+    -> (n,): V, 0 to 1, in the dtype of the maps.
 
     Raises
     ------

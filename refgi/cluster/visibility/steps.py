@@ -1,6 +1,8 @@
 """Visibility of all area lights at all pixels by their maps, one step after the other (VAL Sec. 4.1, 4.2).
 
 Regions are discs of a map's units, [-1, 1]. What is not asked for is 0, V of it 1.
+
+- depth (area light, row, column): Distances to the nearest blocker, m.
 """
 
 from collections.abc import Iterator
@@ -89,27 +91,14 @@ def search(
 ) -> tuple[Array, Array, Array]:
     """Find each pixel's search disc: tan a = Delta (d - near) / (2 d near) (VAL Sec. 4.2, E-VAL-08, 09).
 
-    Parameters
-    ----------
-    places : Places
-        Pixels and maps.
-    solid_angle : bool
-        Blockers half-way, as printed.
-    squares : bool
-        Squares of side alpha / pi, as printed.
-    foreshortened : bool
-        Delta as the pixel sees it.
-    axial : bool
-        All directions in which a blocker at the nearest distance may lie.
-
-    Returns
-    -------
-    pending : (area light, h, w) bool ndarray
-        Whether the pixel lies before the light's plane and farther than the nearest distance; no others are shadowed.
-    region : (area light, s t radius, h, w) ndarray
-        Disc of the map, [-1, 1] units; 0 where none.
-    distance : (area light, h, w) ndarray
-        d, from the map's centre, m; 0 where not pending.
+    solid_angle: Blockers half-way, as printed.
+    squares: Squares of side alpha / pi, as printed.
+    foreshortened: Delta as the pixel sees it.
+    axial: All directions in which a blocker at the nearest distance may lie.
+    -> pending (area light, h, w) bool: Whether the pixel lies before the light's plane and farther than the nearest
+        distance; no others are shadowed.
+    -> region (area light, s t radius, h, w): Disc of the map, [-1, 1] units; 0 where none.
+    -> distance (area light, h, w): d, from the map's centre, m; 0 where not pending.
     """
     pending, region, distance = planes(places, kind=np.bool_), planes(places, 3), planes(places)
     for lane in lanes(places, FilterSizing(False, squares, solid_angle, foreshortened, axial)):
@@ -124,23 +113,9 @@ def search(
 def depth_tests(places: Places, facing: Array, depth: Array, texels: int, points_only: bool) -> Array:
     """Find the share of texels around a pixel's own that do not hide it (E-VAL-14; docs/methods/val_visibility).
 
-    Parameters
-    ----------
-    places : Places
-        Pixels and maps.
-    facing : (3, h, w) ndarray
-        Unit normals of the triangles that pixels see.
-    depth : (area light, row, column) ndarray
-        Distances to the nearest blocker, m.
-    texels : int
-        Side of the square of texels; 1 for lights without extent.
-    points_only : bool
-        Whether area lights with an extent are left out, V being 1.
-
-    Returns
-    -------
-    (area light, h, w) ndarray
-        V, 0 hidden to 1 seen; 1 behind the light's plane, on empty maps, without surface.
+    texels: Side of the square of texels; 1 for lights without extent.
+    points_only: Whether area lights with an extent are left out, V being 1.
+    -> (area light, h, w): V, 0 hidden to 1 seen; 1 behind the light's plane, on empty maps, without surface.
     """
     maps, made = maps_of(places, depth), planes(places, fill=1)
     points, normals, covered = _flat(places.position), _flat(facing), places.covered.reshape(-1)
@@ -158,33 +133,14 @@ def pcss_penumbra(
 ) -> tuple[Array, Array, Array]:
     """Average the blockers before the pixel's plane, in the cone to the light; size the penumbra (E-VAL-14).
 
-    Parameters
-    ----------
-    places : Places
-        Pixels and maps.
-    facing : (3, h, w) ndarray
-        Unit normals of the triangles that pixels see.
-    depth : (area light, row, column) ndarray
-        Distances to the nearest blocker, m.
-    pending : (area light, h, w) bool ndarray
-        Who searches.
-    region : (area light, s t radius, h, w) ndarray
-        In which disc.
-    alpha : bool
-        The angle of the penumbra as printed.
-    squares, foreshortened, axial : bool
-        As for the search.
-    cone : bool
-        Blockers within the cone from the pixel to the light alone.
-
-    Returns
-    -------
-    shaded : (area light, h, w) bool ndarray
-        Whether there are blockers; V is 1 elsewhere.
-    z_avg : (area light, h, w) ndarray
-        Mean distance of the blockers, m; 0 where not shaded.
-    region : (area light, s t radius, h, w) ndarray
-        Disc of the penumbra, [-1, 1] units; 0 where none.
+    pending (area light, h, w) bool: Who searches.
+    region (area light, s t radius, h, w): In which disc.
+    alpha: The angle of the penumbra as printed.
+    squares, foreshortened, axial: As for the search.
+    cone: Blockers within the cone from the pixel to the light alone.
+    -> shaded (area light, h, w) bool: Whether there are blockers; V is 1 elsewhere.
+    -> z_avg (area light, h, w): Mean distance of the blockers, m; 0 where not shaded.
+    -> region (area light, s t radius, h, w): Disc of the penumbra, [-1, 1] units; 0 where none.
     """
     shaded, z_avg, final = planes(places, kind=np.bool_), planes(places), planes(places, 3)
     sizing, normals = FilterSizing(alpha, squares, False, foreshortened, axial), _flat(facing)
@@ -212,25 +168,10 @@ def pcss(
 ) -> Array:
     """Find the share of the texels of the penumbra's disc that do not hide the pixel, where shaded (E-VAL-14).
 
-    Parameters
-    ----------
-    places : Places
-        Pixels and maps.
-    facing : (3, h, w) ndarray
-        Unit normals of the triangles that pixels see.
-    depth : (area light, row, column) ndarray
-        Distances to the nearest blocker, m.
-    shaded : (area light, h, w) bool ndarray
-        Whether there are blockers.
-    region : (area light, s t radius, h, w) ndarray
-        Disc of the penumbra.
-    hard : (area light, h, w) ndarray or None
-        V of area lights without extent, where there are some.
-
-    Returns
-    -------
-    (area light, h, w) ndarray
-        V, 0 hidden to 1 seen; 1 behind the light's plane, on empty maps, without surface.
+    shaded (area light, h, w) bool: Whether there are blockers.
+    region (area light, s t radius, h, w): Disc of the penumbra.
+    hard (area light, h, w): V of area lights without extent, where there are some.
+    -> (area light, h, w): V, 0 hidden to 1 seen; 1 behind the light's plane, on empty maps, without surface.
     """
     made = planes(places, fill=1) if hard is None else np.array(hard)
     sizing, normals = FilterSizing(False, False, False, False, False), _flat(facing)
@@ -247,15 +188,8 @@ def pcss(
 def of_both(ahead: Array, behind: Array) -> Array:
     """Take V of the map ahead and of that of the hemisphere behind: the less of both (VAL Sec. 4.2, E-VAL-12).
 
-    Parameters
-    ----------
-    ahead, behind : (area light, h, w) ndarray
-        V by either map, 1 outside of its hemisphere.
-
-    Returns
-    -------
-    (area light, h, w) ndarray
-        V, 0 hidden to 1 seen.
+    ahead, behind (area light, h, w): V by either map, 1 outside of its hemisphere.
+    -> (area light, h, w): V, 0 hidden to 1 seen.
     """
     return np.minimum(ahead, behind)
 

@@ -61,20 +61,10 @@ class Halves(NamedTuple):
 def add_cuts(position: Array, normal: Array, tree: LightTree, irradiance: Array) -> None:
     """Sum the irradiance of a tree's lights at receivers, by clusters where their bounds allow it.
 
-    Parameters
-    ----------
-    position, normal : (3, n) ndarray
-        Receivers, world space; m and unit vectors. Neighbours should follow each other.
-    tree : LightTree
-        The lights.
-    irradiance : (3, n) ndarray
-        Filled with W/m^2. The sum over channels of its errors is at most `tree.error` times the sum of the full sum's
-        channels, at every receiver, but for rounding.
-
-    Returns
-    -------
-    None
-        `irradiance` holds the sums.
+    position, normal (3, n): Receivers, world space; m and unit vectors. Neighbours should follow each other.
+    irradiance (3, n): Filled with W/m^2. The sum over channels of its errors is at most `tree.error` times the sum of
+        the full sum's channels, at every receiver, but for rounding.
+    -> None: `irradiance` holds the sums.
     """
     order, starts = group_receivers(position, normal)
     pairs = np.zeros(len(starts) - 1, np.int64)

@@ -51,19 +51,9 @@ class LightTree(NamedTuple):
 def light_tree(lights: Array, clamp: Clamp | None, error: float) -> LightTree:
     """Build the light tree of packed diffuse lights.
 
-    Parameters
-    ----------
-    lights : (9, M + 1) ndarray
-        Packed lights: position, reversed normal, flux / pi >= 0; the last one is black.
-    clamp : Clamp or None
-        Their clamp.
-    error : float
-        Largest error of a sum.
-
-    Returns
-    -------
-    LightTree
-        Of as many levels as leave at most FAN nodes on the highest.
+    lights (9, M + 1): Packed lights: position, reversed normal, flux / pi >= 0; the last one is black.
+    error: Largest error of a sum.
+    -> LightTree: Of as many levels as leave at most FAN nodes on the highest.
     """
     count = lights.shape[1] - 1
     starts = level_starts(count)

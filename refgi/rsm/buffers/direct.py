@@ -61,25 +61,12 @@ def shadow_map_visibility(
 ) -> Array:
     """Return which receivers a light reaches: the shadow-map test, one look-up at the nearest texel.
 
-    Parameters
-    ----------
-    position, normal : (3, h, w) ndarray
-        Receivers, world space, and the unit normals of their faces.
-    covered : (h, w) ndarray of bool
-        Where there is a receiver.
-    rsm : Rsm
-        The light's map.
-    bias : float, optional
-        A receiver is visible up to this far behind the stored depth, m: the published test. By default it is in
+    normal (3, h, w): Unit normals of the pixels' faces.
+    bias: A receiver is visible up to this far behind the stored depth, m: the published test. By default it is in
         shadow where the stored point lies above the receiver's own plane by more than a fraction of a texel.
-    interpolated : bool
-        Whether cosines are those of interpolated normals. These may face a light that the face is turned away from:
-        such receivers are in shadow then, as they are for rays.
-
-    Returns
-    -------
-    (h, w) ndarray of bool
-        True where the light arrives; false outside the map, which encloses all that the light reaches.
+    interpolated: Whether cosines are those of interpolated normals. These may face a light that the face is turned away
+        from: such receivers are in shadow then, as they are for rays.
+    -> (h, w) bool: True where the light arrives; false outside the map, which encloses all that the light reaches.
 
     Raises
     ------
@@ -248,21 +235,8 @@ def irradiance_of_lamps(
 ) -> Array:
     """Sum the direct irradiance of all lamps: E = I(w) cos / d^2 (HSS Sec. 4; docs/radiometry).
 
-    Parameters
-    ----------
-    position, normal : (3, h, w) ndarray
-        Receivers, world space, m, and unit normals.
-    covered : (h, w) ndarray of bool
-        Where there is a receiver.
-    visible : list of (h, w) ndarray of bool
-        Where each lamp arrives.
-    lamps : list of Lamp
-        The lamps.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2, linear RGB. Excludes albedo/pi; zero where there is no surface.
+    visible list of (h, w) bool: Where each lamp arrives.
+    -> (3, h, w): Irradiance, W/m^2, linear RGB. Excludes albedo/pi; zero where there is no surface.
     """
     parts = [lamp_irradiance(position, normal, covered, light_of(lamp), reached)
              for lamp, reached in zip(lamps, visible, strict=True)]
@@ -275,21 +249,8 @@ def lamp_irradiance(
 ) -> Array:
     """Compute the irradiance that a light gives directly: E = I(w) cos / d^2.
 
-    Parameters
-    ----------
-    position, normal : (3, h, w) ndarray
-        Receivers, world space, m, and unit normals.
-    covered : (h, w) ndarray of bool
-        Where there is a receiver.
-    light : Light
-        The light.
-    visible : (h, w) ndarray of bool, optional
-        Where the light arrives; everywhere where absent.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2, linear RGB. Excludes albedo/pi; zero where there is no surface.
+    visible (h, w) bool: Where the light arrives; everywhere where absent.
+    -> (3, h, w): Irradiance, W/m^2, linear RGB. Excludes albedo/pi; zero where there is no surface.
 
     Notes
     -----

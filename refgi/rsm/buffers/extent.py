@@ -57,15 +57,7 @@ def _visible_steps(buffer: GBuffer) -> Extent:
 def visible_extent(buffer: GBuffer) -> Extent:
     """Return the bounding box of the visible surfaces.
 
-    Parameters
-    ----------
-    buffer : GBuffer
-        Its view.
-
-    Returns
-    -------
-    Extent
-        Empty where it sees nothing.
+    -> Extent: Empty where it sees nothing.
     """
     return bounds_of(*buffer.resolve("position", "covered"))
 
@@ -88,15 +80,7 @@ def _illuminated_steps(rsms: Sequence[Rsm]) -> Extent:
 def illuminated_extent(rsms: Sequence[Rsm]) -> Extent:
     """Return the bounding box of surfaces that reflect direct light, from a grid of each map's texels.
 
-    Parameters
-    ----------
-    rsms : sequence of Rsm
-        What each light sees.
-
-    Returns
-    -------
-    Extent
-        Empty where nothing reflects light.
+    -> Extent: Empty where nothing reflects light.
     """
     parts = (_reflecting_positions(rsm) for rsm in rsms)
     positions = np.concatenate([np.zeros((3, 0)), *parts], axis=1, dtype=np.float64)

@@ -15,19 +15,9 @@ Array = npt.NDArray[Any]
 def visible_extent(position: Array, covered: Array) -> tuple[Array, Array]:
     """Bound what the camera sees (docs/methods/val).
 
-    Parameters
-    ----------
-    position : (3, h, w) ndarray
-        Surface points of pixels, m.
-    covered : (h, w) bool ndarray
-        Whether there is a surface.
-
-    Returns
-    -------
-    low : (3,) ndarray
-        Least coordinates of the pixels' surface points, m.
-    high : (3,) ndarray
-        Greatest ones, m.
+    position (3, h, w): Surface points of pixels, m.
+    -> low (3,): Least coordinates of the pixels' surface points, m.
+    -> high (3,): Greatest ones, m.
     """
     low, high = bounds_of(position, covered)
     return low, high
@@ -39,21 +29,11 @@ def illuminated_extent(
 ) -> tuple[Array, Array]:
     """Bound what reflects direct light, of all lamps, by a grid of 96 x 96 texels of each map (docs/methods/val).
 
-    Parameters
-    ----------
-    map_positions : tuple of (3, h, w) ndarray
-        Surface points of each lamp's map, m.
-    map_fluxes : tuple of (3, h, w) ndarray
-        Flux that diffuse surfaces reflect, W.
-    map_lobe_fluxes : tuple of (3, h, w) ndarray
-        Flux that lobes reflect, W; none where no material has one.
-
-    Returns
-    -------
-    low : (3,) ndarray
-        Least coordinates of texels with flux, m.
-    high : (3,) ndarray
-        Greatest ones, m.
+    map_positions tuple of (3, h, w): Surface points of each lamp's map, m.
+    map_fluxes tuple of (3, h, w): Flux that diffuse surfaces reflect, W.
+    map_lobe_fluxes tuple of (3, h, w): Flux that lobes reflect, W; none where no material has one.
+    -> low (3,): Least coordinates of texels with flux, m.
+    -> high (3,): Greatest ones, m.
     """
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for position, flux, lobe_flux in zip(map_positions, map_fluxes, map_lobe_fluxes, strict=True):

@@ -18,19 +18,8 @@ Array = npt.NDArray[Any]
 def facing_normals(geometry: Geometry, triangle_id: Array, normal: Array) -> Array:
     """Return the normal of each pixel's triangle on the side of its shading normal (docs/conventions).
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    triangle_id : (h, w) ndarray of int32
-        Which triangle a pixel sees; -1 for none.
-    normal : (3, h, w) ndarray
-        Shading normals; their dtype is that of the result.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Unit vectors; 0 where there is no surface. The very array `normal` where nothing is interpolated.
+    normal (3, h, w): Shading normals; their dtype is that of the result.
+    -> (3, h, w): Unit vectors; 0 where there is no surface. The very array `normal` where nothing is interpolated.
     """
     if geometry.vertex_normals is None:
         return normal
@@ -43,21 +32,10 @@ def facing_normals(geometry: Geometry, triangle_id: Array, normal: Array) -> Arr
 def share_of_backs(geometry: Geometry, one_sided: Array, eye: tuple[float, float, float], triangle_id: Array) -> float:
     """Return the share of pixels with a surface that show the back of one that its file leaves out.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles; fronts are counter-clockwise.
-    one_sided : (k,) ndarray of bool
-        Which materials have no back.
-    eye : tuple of 3 floats
-        Where the camera is, m.
-    triangle_id : (h, w) ndarray of int32
-        Which triangle a pixel sees; -1 for none.
-
-    Returns
-    -------
-    float
-        From 0 to 1.
+    geometry: The triangles; fronts are counter-clockwise.
+    one_sided (k,) bool: Which materials have no back.
+    eye: Where the camera is, m.
+    -> float: From 0 to 1.
     """
     pixels = np.bincount(triangle_id[triangle_id >= 0], minlength=1)
     seen = np.flatnonzero(pixels)

@@ -213,23 +213,8 @@ def gbuffer(
 ) -> GBuffer:
     """Rasterize triangles for a camera.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    materials : MaterialTable
-        Their materials.
-    camera : Camera
-        The view.
-    width, height : int, optional
-        Size in pixels; the camera's own where absent.
-    dtype : dtype
-        Float32 or float64.
-
-    Returns
-    -------
-    GBuffer
-        Its visibility is known, its channels are resolved when asked for.
+    width, height: Size in pixels; the camera's own where absent.
+    -> GBuffer: Its visibility is known, its channels are resolved when asked for.
 
     Raises
     ------
@@ -252,25 +237,10 @@ def _resolve(
 ) -> dict[str, Array]:
     """Compute channels of the visible surface in one pass.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    materials : MaterialTable
-        Their materials.
-    projection : Projection
-        The view.
-    triangle_id : (h, w) ndarray of int32
-        Visible triangle of each texel, -1 for none.
-    dtype : dtype
-        Of the channels.
-    names : tuple of str
-        Channels to compute.
-
-    Returns
-    -------
-    dict of str to (h, w) or (3, h, w) ndarray
-        The channels by name, units as `GBuffer` states them.
+    triangle_id (h, w) int32: Visible triangle of each texel, -1 for none.
+    dtype: Of the channels.
+    names: Channels to compute.
+    -> dict of str to (h, w) or (3, h, w): The channels by name, units as `GBuffer` states them.
     """
     planes = _planes(names, triangle_id.shape, dtype)
     channels = ChannelMask(*(name in names for name in ChannelMask._fields))

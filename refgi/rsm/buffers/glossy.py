@@ -62,19 +62,8 @@ def _any_glossy(glossy: Array, material_of_face: Array, triangle_id: Array) -> b
 def glossy_points(buffer: GBuffer, materials: MaterialTable, eye: npt.ArrayLike) -> GlossyPoints:
     """Return the pixels whose surface reflects by a lobe towards the eye.
 
-    Parameters
-    ----------
-    buffer : GBuffer
-        What the camera sees.
-    materials : MaterialTable
-        The scene's materials.
-    eye : (3,) array_like
-        Where the camera is, m.
-
-    Returns
-    -------
-    GlossyPoints
-        Without points whose normal faces away from the eye, as interpolated normals may.
+    eye (3,): Where the camera is, m.
+    -> GlossyPoints: Without points whose normal faces away from the eye, as interpolated normals may.
     """
     material_id, position, normal = buffer.resolve("material_id", "position", "normal")
     glossy = np.append(glossy_materials(materials), False)  # the last one stands for no surface, -1
@@ -104,19 +93,8 @@ def _mirror(position: Array, normal: Array, eye: Array, mirror: Array, faces_eye
 def direct_lobes(points: GlossyPoints, light: Light, visible: Array) -> Array:
     """Return the radiance towards the eye that receivers' lobes make of a light: f_s I(w) cos / d^2.
 
-    Parameters
-    ----------
-    points : GlossyPoints
-        The n receivers.
-    light : Light
-        The light.
-    visible : (h, w) ndarray of bool
-        Where the light arrives.
-
-    Returns
-    -------
-    (3, n) ndarray
-        W/m^2/sr. Computed in float64 from the receivers as they are stored, and rounded once.
+    visible (h, w) bool: Where the light arrives.
+    -> (3, n): W/m^2/sr. Computed in float64 from the receivers as they are stored, and rounded once.
     """
     radiance = np.zeros_like(points.position)
     _add_direct(light_table((light,)), points, np.ascontiguousarray(visible).reshape(-1), radiance)
@@ -143,19 +121,9 @@ def _add_direct(lights: LightTable, points: GlossyPoints, visible: Array, radian
 def spread_over_picture(points: GlossyPoints, radiance: Array, shape: tuple[int, int]) -> Array:
     """Return radiance of glossy receivers as a picture.
 
-    Parameters
-    ----------
-    points : GlossyPoints
-        The n receivers.
-    radiance : (3, n) ndarray
-        W/m^2/sr.
-    shape : tuple of 2 ints
-        Height and width of the picture.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        0 elsewhere.
+    radiance (3, n): W/m^2/sr.
+    shape: Height and width of the picture.
+    -> (3, h, w): 0 elsewhere.
     """
     picture = np.zeros((3, *shape), points.position.dtype)
     picture.reshape(3, -1)[:, points.pixel] = radiance

@@ -53,19 +53,9 @@ def leaving_radiance(irradiance: Array, extra: Array | None, buffer: GBuffer, ma
 def emission_of(triangle_id: Array, material_of_face: Array, emission: Array) -> Array:
     """Find what each pixel's surface emits (docs/radiometry).
 
-    Parameters
-    ----------
-    triangle_id : (h, w) ndarray of int32
-        Nearest triangle, -1 for none.
-    material_of_face : (triangle,) ndarray of int32
-        Material of each triangle.
-    emission : (material, rgb) ndarray
-        Radiance of each, W/m^2/sr.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Radiance, W/m^2/sr; 0 without surface.
+    material_of_face (triangle,) int32: Material of each triangle.
+    emission (material, rgb): Radiance of each, W/m^2/sr.
+    -> (3, h, w): Radiance, W/m^2/sr; 0 without surface.
     """
     radiance = np.zeros((3, *triangle_id.shape), emission.dtype)
     _emit(emission, np.where(triangle_id >= 0, material_of_face[triangle_id], np.int32(-1)), radiance)
@@ -76,21 +66,10 @@ def emission_of(triangle_id: Array, material_of_face: Array, emission: Array) ->
 def radiance_of(irradiance: Array, extra: Array | None, albedo: Array, emission: Array | None) -> Array:
     """Compute what the camera receives of diffuse surfaces: L = L_e + albedo/pi (E + extra) (docs/radiometry).
 
-    Parameters
-    ----------
-    irradiance : (3, h, w) ndarray
-        Direct irradiance E, W/m^2.
-    extra : (3, h, w) ndarray, optional
-        Indirect irradiance, W/m^2.
-    albedo : (3, h, w) ndarray
-        Diffuse reflectance.
-    emission : (3, h, w) ndarray, optional
-        Radiance that surfaces emit, W/m^2/sr.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Radiance, W/m^2/sr, linear RGB; 0 without surface.
+    irradiance (3, h, w): Direct irradiance E, W/m^2.
+    extra (3, h, w): Indirect irradiance, W/m^2.
+    emission (3, h, w): Radiance that surfaces emit, W/m^2/sr.
+    -> (3, h, w): Radiance, W/m^2/sr, linear RGB; 0 without surface.
     """
     radiance = np.empty_like(irradiance)
     _reflect(irradiance, irradiance if extra is None else extra, extra is not None, albedo, radiance)

@@ -220,27 +220,11 @@ def reflective_shadow_map(
 ) -> Rsm:
     """Rasterize the scene from a light; channels of flux are computed on first use.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    materials : MaterialTable
-        Their materials.
-    light : Light
-        The light source.
-    resolution : int
-        Texels along a side of one map.
-    dtype : dtype
-        Float32 or float64.
-    projection : {"auto", "perspective", "cube", "paraboloid", "orthographic"}
-        Shape of the map. "auto": spot one perspective map around the cone, or one paraboloid map where the half-angle
-        is over 75 degrees; point a cube; directional orthographic around the scene. "cube" suits spots too,
+    resolution: Texels along a side of one map.
+    projection: Shape of the map. "auto": spot one perspective map around the cone, or one paraboloid map where the
+        half-angle is over 75 degrees; point a cube; directional orthographic around the scene. "cube" suits spots too,
         "paraboloid" is one map for a spot and two for a point light.
-
-    Returns
-    -------
-    Rsm
-        Its visibility is known, its channels are computed when asked for.
+    -> Rsm: Its visibility is known, its channels are computed when asked for.
 
     Raises
     ------

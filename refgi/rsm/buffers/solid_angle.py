@@ -127,17 +127,8 @@ def _stacked(projection: Projection, one: Array) -> Array:
 def _texel_integrals(projection: Projection, spot: Circles) -> Array:
     """Integrate solid angle, or a spot's falloff over it, over every texel of a map.
 
-    Parameters
-    ----------
-    projection : Projection
-        The map.
-    spot : Circles
-        The spot's cones; without falloff for plain solid angles.
-
-    Returns
-    -------
-    (h, w) ndarray of float64
-        Integral over each texel, sr.
+    spot: The spot's cones; without falloff for plain solid angles.
+    -> (h, w) float64: Integral over each texel, sr.
     """
     height, width = projection.height, projection.width
     quadrant = np.zeros(((height + 1) // 2, (width + 1) // 2))

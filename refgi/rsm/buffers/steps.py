@@ -22,17 +22,8 @@ Array = npt.NDArray[Any]
 def _visible_triangles(geometry: Geometry, projection: Projection) -> Array:
     """Find the nearest triangle at each texel's centre (docs/rasterizer).
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    projection : Projection
-        The view: one map, or several stacked.
-
-    Returns
-    -------
-    (h, w) ndarray of int32
-        Nearest triangle, -1 for none.
+    projection: The view: one map, or several stacked.
+    -> (h, w) int32: Nearest triangle, -1 for none.
     """
     return rasterize(geometry, projection).triangle_id
 
@@ -42,29 +33,10 @@ def _surface(
 ) -> tuple[Array, Array, Array, Array]:
     """Compute what each texel sees (SII Sec. 3.1).
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    materials : MaterialTable
-        Their materials.
-    projection : Projection
-        The view.
-    triangle_id : (h, w) ndarray of int32
-        Nearest triangle, -1 for none.
-    dtype : dtype
-        Float32 or float64.
-
-    Returns
-    -------
-    depth : (h, w) ndarray
-        Depth along the view's axis, m; inf without surface.
-    position : (3, h, w) ndarray
-        Surface point, m; 0 without surface.
-    normal : (3, h, w) ndarray
-        Unit normal on the side that is seen; 0 without surface.
-    albedo : (3, h, w) ndarray
-        Diffuse reflectance; 0 without surface.
+    -> depth (h, w): Depth along the view's axis, m; inf without surface.
+    -> position (3, h, w): Surface point, m; 0 without surface.
+    -> normal (3, h, w): Unit normal on the side that is seen; 0 without surface.
+    -> albedo (3, h, w): Diffuse reflectance; 0 without surface.
     """
     depth, position, normal, albedo = _view(geometry, materials, projection, triangle_id, dtype).resolve(
         "depth", "position", "normal", "albedo")
@@ -84,33 +56,12 @@ def reflected_flux(
 ) -> tuple[Array, Array, Array | None, Array | None, Array | None]:
     """Compute the flux that each texel of a lamp's map reflects (SII Sec. 3.1; docs/radiometry).
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    materials : MaterialTable
-        Their materials.
-    projection : Projection
-        The lamp's view: one map, or several stacked.
-    lamp : Lamp
-        The lamp.
-    triangle_id : (h, w) ndarray of int32
-        Nearest triangle, -1 for none.
-    dtype : dtype
-        Float32 or float64.
-
-    Returns
-    -------
-    solid_angle : (h, w) ndarray
-        Solid angle of the whole texel, sr; of a directional lamp its area across the light, m^2.
-    flux : (3, h, w) ndarray
-        Flux that the diffuse part of the surface reflects, W: Phi_t = albedo int_t I dw.
-    lobe_flux : (3, h, w) ndarray
-        Flux that the lobe reflects, W; absent without glossy materials.
-    lobe_axis : (3, h, w) ndarray
-        Mirror direction r = d - 2 (n . d) n, a unit vector; 0 without lobe or light.
-    lobe_exponent : (h, w) ndarray
-        Phong exponent; 0 without lobe or light.
+    projection: The lamp's view: one map, or several stacked.
+    -> solid_angle (h, w): Solid angle of the whole texel, sr; of a directional lamp its area across the light, m^2.
+    -> flux (3, h, w): Flux that the diffuse part of the surface reflects, W: Phi_t = albedo int_t I dw.
+    -> lobe_flux (3, h, w): Flux that the lobe reflects, W; absent without glossy materials.
+    -> lobe_axis (3, h, w): Mirror direction r = d - 2 (n . d) n, a unit vector; 0 without lobe or light.
+    -> lobe_exponent (h, w): Phong exponent; 0 without lobe or light.
     """
     rsm = Rsm(light_of(lamp), _view(geometry, materials, projection, triangle_id, dtype), materials)
     return rsm.solid_angle, rsm.flux, rsm.lobe_flux, rsm.lobe_axis, rsm.lobe_exponent
@@ -123,29 +74,13 @@ def shadow_map(
 ) -> Array:
     """Test where a lamp arrives: the nearest texel's point does not lie above the receiver's plane (docs/rasterizer).
 
-    Parameters
-    ----------
-    position, normal : (3, h, w) ndarray
-        Receivers, world space, m, and the unit normals of their faces.
-    covered : (h, w) ndarray of bool
-        Where there is a receiver.
-    projection : Projection
-        The lamp's view.
-    depth : (H, W) ndarray
-        Depth that the lamp sees, m.
-    map_position : (3, H, W) ndarray
-        Points that it sees, m.
-    lamp : Lamp
-        The lamp.
-    bias : float or None
-        A constant bias in place of the plane's, m.
-    interpolated : bool
-        Whether receivers whose faces are turned away from the lamp may have normals that face it; they are in shadow.
-
-    Returns
-    -------
-    (h, w) ndarray of bool
-        Whether the lamp reaches the receiver; false without surface.
+    normal (3, h, w): Unit normals of the pixels' faces.
+    depth (H, W): Depth that the lamp sees, m.
+    map_position (3, H, W): Points that it sees, m.
+    bias: A constant bias in place of the plane's, m.
+    interpolated: Whether receivers whose faces are turned away from the lamp may have normals that face it; they are in
+        shadow.
+    -> (h, w) bool: Whether the lamp reaches the receiver; false without surface.
     """
     seen = ShadowMap(depth, map_position, -1.0 if bias is None else bias)
     return looked_up(SurfacePoints(position, normal, covered), projection, seen, light_of(lamp), interpolated)

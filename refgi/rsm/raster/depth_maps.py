@@ -23,21 +23,9 @@ def paraboloid_depth_maps(
 ) -> Array:
     """Measure the distance to the nearest surface from many points, on a hemisphere each.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    centers, axes : (k, 3) ndarray
-        Where each map looks from (m) and to (any length).
-    size : int
-        Texels along a side.
-    dtype : dtype
-        Float32 or float64.
-
-    Returns
-    -------
-    (k, n, n) ndarray
-        Distance, m; inf without surface and outside the disc. Map m's frame is
+    centers, axes (k, 3): Where each map looks from (m) and to (any length).
+    size: Texels along a side.
+    -> (k, n, n): Distance, m; inf without surface and outside the disc. Map m's frame is
         ``refgi.rsm.raster.projection.paraboloid_projection(centers, axes, size).frame[m]``.
 
     Raises

@@ -71,19 +71,9 @@ class Scratch(NamedTuple):
 def rasterize(geometry: Geometry, projection: Projection, *, band_rows: int | None = None) -> Visibility:
     """Find the nearest triangle at every texel centre.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles; those without area are passed over.
-    projection : Projection
-        The maps.
-    band_rows : int, optional
-        Height of a band of one map, in rows; the result does not depend on it.
-
-    Returns
-    -------
-    Visibility
-        Triangle and nearness at each texel of the stacked maps.
+    geometry: The triangles; those without area are passed over.
+    band_rows: Height of a band of one map, in rows; the result does not depend on it.
+    -> Visibility: Triangle and nearness at each texel of the stacked maps.
 
     Notes
     -----

@@ -135,27 +135,11 @@ def gather_coarsely(
 ) -> tuple[Array, int]:
     """Sum at coarse pixels and at those that are not like them; interpolate between the coarse ones elsewhere.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        All pixels.
-    shown : (h, w) ndarray of bool
-        Those that are computed.
-    rsms : sequence of Rsm
-        Reflective shadow maps, one a light.
-    disc : DiscSettings
-        Disc and samples.
-    coarsely : Interpolation
-        The grid of coarse pixels.
-    extent : Extent
-        Box of the visible surfaces, m.
-
-    Returns
-    -------
-    irradiance : (3, h, w) ndarray
-        Irradiance, W/m^2, linear RGB.
-    evaluated : int
-        Pixels that ran the sum.
+    shown (h, w) bool: Pixels that are computed.
+    coarsely: The grid of coarse pixels.
+    extent: Box of the visible surfaces, m.
+    -> irradiance (3, h, w): Irradiance, W/m^2, linear RGB.
+    -> evaluated int: Pixels that ran the sum.
     """
     coarse = coarse_pixels(shown.shape[0], shown.shape[1], coarsely.grid)
     first = np.zeros_like(shown)
@@ -179,19 +163,8 @@ def _steps(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSettings) -> A
 def gather_irradiance(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSettings) -> Array:
     """Sum the irradiance of the texels in each receiver's disc.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        Points to light.
-    rsms : sequence of Rsm
-        Reflective shadow maps, one a light; of glossy materials only the diffuse part is gathered.
-    disc : DiscSettings
-        Disc and samples.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2, linear RGB; 0 where there is no surface. Excludes the receiver's albedo/pi.
+    rsms: Reflective shadow maps, one a light; of glossy materials only the diffuse part is gathered.
+    -> (3, h, w): Irradiance, W/m^2, linear RGB; 0 where there is no surface. Excludes the receiver's albedo/pi.
 
     Notes
     -----
@@ -215,19 +188,7 @@ def gather_irradiance(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSet
 def gather_sampling_error(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSettings) -> SamplingError | None:
     """Return how much the light of a picture depends on where the samples of its discs lie, from two halves of them.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        The picture's points.
-    rsms : sequence of Rsm
-        Reflective shadow maps, one a light.
-    disc : DiscSettings
-        Disc and samples.
-
-    Returns
-    -------
-    SamplingError or None
-        Of the light within the discs, at sampled pixels; None where there is none.
+    -> SamplingError: Of the light within the discs, at sampled pixels; None where there is none.
     """
     sample = sample_pixels(receivers, LEAST_SAMPLED)
     halves = np.zeros((2, *sample.position.shape), sample.position.dtype)

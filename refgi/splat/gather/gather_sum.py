@@ -146,21 +146,10 @@ def centers(maps: "Projection", points: Array) -> Array:
 def disc_loss(receivers: Receivers, rsms: "Sequence[Rsm]", radius: float, offset: float = 0.0) -> float:
     """Return the share of the light that comes from texels outside the pixels' discs.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        The picture's points.
-    rsms : sequence of Rsm
-        Reflective shadow maps, one a light.
-    radius : float
-        Of the discs, map widths.
-    offset : float
-        By which texels are moved back along their normals, m.
-
-    Returns
-    -------
-    float
-        Of the diffuse light without visibility, at sampled pixels by sampled texels; 0 where a disc is the whole map.
+    radius: Of the discs, map widths.
+    offset: By which texels are moved back along their normals, m.
+    -> float: Of the diffuse light without visibility, at sampled pixels by sampled texels; 0 where a disc is the whole
+        map.
     """
     if radius >= CORNER and all(rsm.projection.maps == 1 for rsm in rsms):
         return 0.0

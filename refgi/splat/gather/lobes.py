@@ -34,19 +34,8 @@ def gather_lobes(frame: "Frame", settings: GatherSettings) -> Array:
 def gather_glossy(points: GlossyPoints, rsms: "tuple[Rsm, ...]", disc: DiscSettings) -> Array:
     """Sum the radiance that lobes make of the texels in each receiver's disc.
 
-    Parameters
-    ----------
-    points : GlossyPoints
-        The n receivers.
-    rsms : tuple of Rsm
-        Reflective shadow maps, one a light; of glossy materials only the diffuse part is gathered.
-    disc : DiscSettings
-        Disc and samples.
-
-    Returns
-    -------
-    (3, n) ndarray
-        W/m^2/sr, linear RGB: the terms of `gather_irradiance`, each times f_s.
+    rsms: Reflective shadow maps, one a light; of glossy materials only the diffuse part is gathered.
+    -> (3, n): W/m^2/sr, linear RGB: the terms of `gather_irradiance`, each times f_s.
     """
     total = np.zeros_like(points.position)
     for rsm in rsms:

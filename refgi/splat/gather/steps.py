@@ -26,19 +26,10 @@ Array = npt.NDArray[Any]
 def pattern(xi: Array, weight_squared: bool) -> tuple[Array, Array]:
     """Spread samples over a disc of radius 1 (RSM 2005, Sec. 4; docs/methods/gather).
 
-    Parameters
-    ----------
-    xi : (sample, xi1 and xi2) ndarray
-        Numbers in [0, 1): radius and angle of samples.
-    weight_squared : bool
-        Weights 3 pi xi1^2, as is often done, not 2 pi xi1; the mean of both is the disc's area, pi.
-
-    Returns
-    -------
-    offset : (sample, down and right) ndarray
-        Offsets xi1 (cos, sin)(2 pi xi2), radii.
-    weight : (sample) ndarray
-        Weights; the density of samples is 1 / (2 pi xi1).
+    xi (sample, xi1 and xi2): Numbers in [0, 1): radius and angle of samples.
+    weight_squared: Weights 3 pi xi1^2, as is often done, not 2 pi xi1; the mean of both is the disc's area, pi.
+    -> offset (sample, down and right): Offsets xi1 (cos, sin)(2 pi xi2), radii.
+    -> weight (sample): Weights; the density of samples is 1 / (2 pi xi1).
     """
     made = disc_offsets(xi, weight_squared)
     return np.ascontiguousarray(made[:, :2]), np.ascontiguousarray(made[:, 2])
@@ -48,23 +39,11 @@ def pattern(xi: Array, weight_squared: bool) -> tuple[Array, Array]:
 def centers(position: Array, covered: Array, projection: Projection) -> tuple[Array, Array]:
     """Find where on a map each pixel's surface point lies (RSM 2005, Sec. 4; docs/methods/gather).
 
-    Parameters
-    ----------
-    position : (3, h, w) ndarray
-        Surface points, m.
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    projection : Projection
-        The map: one, or several stacked.
-
-    Returns
-    -------
-    center : (row and column, h, w) ndarray
-        Place on the stacked maps, texel centres at + 1/2; outside: where the straight way to the middle of the first
-        map meets its border, behind the lamp as far out as can be; 0 without surface.
-    depth : (h, w) ndarray
-        Depth along the axis of the map it lies on, whose border is part of it, m; inf outside of all and without
-        surface.
+    projection: The map: one, or several stacked.
+    -> center (row and column, h, w): Place on the stacked maps, texel centres at + 1/2; outside: where the straight way
+        to the middle of the first map meets its border, behind the lamp as far out as can be; 0 without surface.
+    -> depth (h, w): Depth along the axis of the map it lies on, whose border is part of it, m; inf outside of all and
+        without surface.
     """
     shown = covered.reshape(-1)
     points = np.ascontiguousarray(position.reshape(3, -1)[:, shown])
@@ -82,23 +61,11 @@ def disc_texels(
 ) -> Array:
     """Find the texel that each sample of each pixel's disc falls on (RSM 2005, Sec. 4; docs/methods/gather).
 
-    Parameters
-    ----------
-    center : (2, h, w) ndarray
-        Row and column of each pixel's place on the stacked maps.
-    offset : (S, 2) ndarray
-        Offsets of samples in a disc of radius 1.
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    radius : float
-        Of discs, widths of a map.
-    maps, rows, columns : int
-        How many maps are stacked, and the texels of one.
-
-    Returns
-    -------
-    (sample, h, w) ndarray of int32
-        Row * columns + column over the stacked maps; -1 outside and without surface.
+    center (2, h, w): Row and column of each pixel's place on the stacked maps.
+    offset (S, 2): Offsets of samples in a disc of radius 1.
+    radius: Of discs, widths of a map.
+    maps, rows, columns: How many maps are stacked, and the texels of one.
+    -> (sample, h, w) int32: Row * columns + column over the stacked maps; -1 outside and without surface.
     """
     shown, side = covered.reshape(-1), np.array([rows, columns])
     places = np.ascontiguousarray(center.reshape(2, -1)[:, shown])
@@ -114,31 +81,15 @@ def disc_sum(
 ) -> Array:
     """Sum the irradiance of the texels in each pixel's disc (RSM 2005, Sec. 4; docs/methods/gather).
 
-    Parameters
-    ----------
-    position, normal : (3, h, w) ndarray
-        Surface points, m, and unit normals.
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    texel : (S, h, w) ndarray of int32
-        Texels of the samples.
-    weight : (S,) ndarray
-        Weights of samples.
-    surface, surface_normal : (3, H, W) ndarray
-        The map's surface, m, and its unit normals.
-    flux : (3, H, W) ndarray
-        Reflected flux of its diffuse part, W.
-    radius : float
-        R, widths of a map.
-    texels : int
-        T, of one map.
-    offset : float
-        How far the surface is moved back along its normals, m.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        R^2 T / S sum of weight E_t, S samples, E_t the light of one texel by Eq. 2, W/m^2; without albedo/pi.
+    texel (S, h, w) int32: Texels of the samples.
+    weight (S,): Weights of samples.
+    surface (3, H, W): The map's surface, m.
+    surface_normal (3, H, W): Its unit normals.
+    flux (3, H, W): Reflected flux of its diffuse part, W.
+    radius: R, widths of a map.
+    texels: T, of one map.
+    offset: How far the surface is moved back along its normals, m.
+    -> (3, h, w): R^2 T / S sum of weight E_t, S samples, E_t the light of one texel by Eq. 2, W/m^2; without albedo/pi.
     """
     real, shown = position.dtype.type, covered.reshape(-1)
     points, normals = (np.ascontiguousarray(one.reshape(3, -1)[:, shown]) for one in (position, normal))
@@ -156,15 +107,8 @@ def disc_sum(
 def all_maps(irradiance: tuple[Array, ...]) -> Array:
     """Add the light of all maps (RSM 2005, Sec. 4).
 
-    Parameters
-    ----------
-    irradiance : tuple of (3, h, w) ndarray
-        That of each map, W/m^2.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Gathered irradiance where every pixel runs the sum, W/m^2.
+    irradiance tuple of (3, h, w): Light of each map, W/m^2.
+    -> (3, h, w): Gathered irradiance where every pixel runs the sum, W/m^2.
     """
     total = np.zeros_like(irradiance[0])
     for one in irradiance:
@@ -179,29 +123,13 @@ def interpolate(
 ) -> tuple[Array, Array]:
     """Interpolate between coarse pixels where three of four around a pixel are similar (RSM 2005, Sec. 4; SII Fig. 12).
 
-    Parameters
-    ----------
-    position, normal : (3, h, w) ndarray
-        Surface points, m, and unit normals.
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    irradiance : (3, h, w) ndarray
-        Sum of each pixel, W/m^2.
-    extent : Extent
-        Box of the visible surfaces, m.
-    grid : int
-        Coarse pixels along each side: the middles of grid x grid cells.
-    least_cosine : float
-        Least cosine between normals of similar pixels.
-    reach : float
-        Largest distance of similar pixels, diagonals of the box.
-
-    Returns
-    -------
-    interpolated : (h, w) ndarray of bool
-        True where light is interpolated, and at coarse pixels.
-    irradiance : (3, h, w) ndarray
-        Indirect irradiance, W/m^2: interpolated, else the pixel's sum.
+    irradiance (3, h, w): Sum of each pixel, W/m^2.
+    extent: Box of the visible surfaces, m.
+    grid: Coarse pixels along each side: the middles of grid x grid cells.
+    least_cosine: Least cosine between normals of similar pixels.
+    reach: Largest distance of similar pixels, diagonals of the box.
+    -> interpolated (h, w) bool: True where light is interpolated, and at coarse pixels.
+    -> irradiance (3, h, w): Indirect irradiance, W/m^2: interpolated, else the pixel's sum.
     """
     limits = SimilarityLimits(least_cosine, reach * extent.diagonal)
     coarse = coarse_pixels(covered.shape[0], covered.shape[1], grid)

@@ -22,17 +22,7 @@ Array = npt.NDArray[Any]
 def multires_ledger(frame: "Frame", settings: MultiresSettings) -> Ledger:
     """Account for the power of the lights under `multires`.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its buffers.
-    settings : MultiresSettings
-        Those of `multires`.
-
-    Returns
-    -------
-    Ledger
-        Its lines sum to `emitted` but for the rounding of the frame's dtype.
+    -> Ledger: Its lines sum to `emitted` but for the rounding of the frame's dtype.
 
     Notes
     -----

@@ -175,19 +175,11 @@ def doubled(frame: "Frame") -> "GBuffer":
 def halved(irradiance: Array, fine: Array, covered: Array) -> Array:
     """Shrink a picture of twice the width and height to means over what shows a surface (AMS Sec. 4).
 
-    Parameters
-    ----------
-    irradiance : (3, 2 h, 2 w) ndarray
-        Indirect irradiance of the larger picture, W/m^2.
-    fine : (2 h, 2 w) ndarray of bool
-        Its pixels that show a surface.
-    covered : (h, w) ndarray of bool
-        Pixels of the picture itself that show a surface.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Indirect irradiance, W/m^2; where none of four shows a surface but the pixel does, the mean of pixels around it.
+    irradiance (3, 2 h, 2 w): Indirect irradiance of the larger picture, W/m^2.
+    fine (2 h, 2 w) bool: Its pixels that show a surface.
+    covered (h, w) bool: Pixels of the picture itself that show a surface.
+    -> (3, h, w): Indirect irradiance, W/m^2; where none of four shows a surface but the pixel does, the mean of pixels
+        around it.
     """
     height, width = covered.shape
     four = (3, height, 2, width, 2)

@@ -34,19 +34,9 @@ def half_resolution(
 ) -> Array:
     """Evaluate light at a quarter of the pixels and interpolate it to all.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        All pixels.
-    evaluate : callable
-        Gives the irradiance (3, h', w') of receivers of any height and width.
-    joint : bool
-        Weight blocks by position and normal; else by place on the screen only.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2; 0 where there is no surface.
+    evaluate: Gives the irradiance (3, h', w') of receivers of any height and width.
+    joint: Weight blocks by position and normal; else by place on the screen only.
+    -> (3, h, w): Irradiance, W/m^2; 0 where there is no surface.
 
     Notes
     -----

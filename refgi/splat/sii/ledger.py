@@ -24,17 +24,7 @@ Array = npt.NDArray[Any]
 def sii_ledger(frame: "Frame", settings: SiiSettings) -> Ledger:
     """Account for the power of the lights under `sii`.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene and its buffers.
-    settings : SiiSettings
-        Those of `sii`.
-
-    Returns
-    -------
-    Ledger
-        Its lines sum to `emitted` but for the rounding of the frame's dtype.
+    -> Ledger: Its lines sum to `emitted` but for the rounding of the frame's dtype.
 
     Notes
     -----

@@ -50,23 +50,9 @@ def glossy_in_range(
 ) -> Array:
     """Sum the radiance that lobes make of the pairs with B >= I_low (SII Sec. 3.4).
 
-    Parameters
-    ----------
-    points : GlossyPoints
-        The n receivers.
-    lights : PixelLights
-        Lights to sum.
-    settings : SiiSettings
-        The parts `reach`, with its reference length, and `pairs`; the bound does not matter.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-    width : int
-        As for `glossy_radiance`.
-
-    Returns
-    -------
-    (3, n) ndarray
-        W/m^2/sr, linear RGB.
+    settings: The parts `reach`, with its reference length, and `pairs`; the bound does not matter.
+    width: As for `glossy_radiance`.
+    -> (3, n): W/m^2/sr, linear RGB.
     """
     packed = checked(as_receivers(points), lights, settings.pairs, footprint)
     if settings.reach.on_screen:  # receivers come as a list, not as a picture

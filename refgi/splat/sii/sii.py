@@ -122,23 +122,9 @@ def _splat(
 ) -> Array:
     """Sum the irradiance of the pairs within range (SII Eq. 2, Sec. 3.4).
 
-    Parameters
-    ----------
-    receivers : Receivers
-        Points (3, h, w), world space, m, and unit normals.
-    lights : PixelLights
-        N lights.
-    settings : SiiSettings
-        Cut, bound, and how one light lights one receiver.
-    footprint : (N,) ndarray or None
-        Surface area of each light, m^2.
-    projection : Projection or None
-        The map the receivers are seen on.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2, linear RGB, without albedo/pi and visibility.
+    receivers: Points (3, h, w), world space, m, and unit normals.
+    projection: The map the receivers are seen on.
+    -> (3, h, w): Irradiance, W/m^2, linear RGB, without albedo/pi and visibility.
     """
     return sum_in_range(receivers, lights, settings, footprint, projection)
 
@@ -149,22 +135,9 @@ def cut_irradiance(
 ) -> Array:
     """Sum the irradiance of the pairs that `splat` leaves out.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        Points to light.
-    lights : PixelLights
-        Lights.
-    settings : SiiSettings
-        As for `splat`; the bound does not matter.
-    footprint : (N,) ndarray, optional
-        As for `splat`.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2, linear RGB: with that of `splat` it makes the full sum, but for rounding. With a random
-        range it is the full sum less the weighted one, and may be below 0.
+    settings: As for `splat`; the bound does not matter.
+    -> (3, h, w): Irradiance, W/m^2, linear RGB: with that of `splat` it makes the full sum, but for rounding. With a
+        random range it is the full sum less the weighted one, and may be below 0.
     """
     if settings.reach.cut is None:
         return np.zeros_like(np.asarray(receivers.position))

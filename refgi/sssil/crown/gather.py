@@ -40,21 +40,10 @@ def _steps(*arguments: Any, **named: Any) -> Array:
 def gather(level: Level, index: int, settings: HssilSettings, senders: Level | None = None) -> Array:
     """Sum the light of the samples around each texel of a level (Eq. 1).
 
-    Parameters
-    ----------
-    level : Level
-        Receivers, and senders unless those are given.
-    index : int
-        0 for the first level, whose inner disc is sampled as well.
-    settings : HssilSettings
-        Sampling and form factor.
-    senders : Level, optional
-        The same level with other surface points, as senders.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi and visibility.
+    level: Receivers, and senders unless those are given.
+    index: 0 for the first level, whose inner disc is sampled as well.
+    senders: The same level with other surface points, as senders.
+    -> (3, h, w): Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi and visibility.
     """
     rows, columns = level.shape
     sampling, senders = settings.sampling, level if senders is None else senders

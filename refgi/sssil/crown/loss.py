@@ -37,19 +37,10 @@ LEAST_LOSS = 0.05  # share below which a loss gives no warning: at so few texels
 def sample_loss(levels: Sequence[Level], senders: Sequence[Level], settings: HssilSettings) -> float:
     """Return the share of the light that the settings' number of samples loses against `ENOUGH`; below 0 for a gain.
 
-    Parameters
-    ----------
-    levels : sequence of Level
-        Receivers, the first level first.
-    senders : sequence of Level
-        The same levels as senders.
-    settings : HssilSettings
-        Sampling and form factor. Samples of each pixel's own are taken as interleaved ones.
-
-    Returns
-    -------
-    float
-        Of the light without visibility.
+    levels: Receivers, the first level first.
+    senders: The same levels as senders.
+    settings: Sampling and form factor. Samples of each pixel's own are taken as interleaved ones.
+    -> float: Of the light without visibility.
     """
     own = settings.sampling
     own = replaced(own, {"pattern": "interleaved"}) if own.pattern == "pixel" else own

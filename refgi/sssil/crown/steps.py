@@ -27,27 +27,15 @@ BELOW_1 = 1.0 - 2.0**-24  # largest number below 1 that float32 holds
 def points_and_shifts(start: Array, inner: int, crown: int, rows: int, columns: int) -> tuple[Array, Array]:
     """Shift the points of the sequence for each texel of a tile, in double precision (HSS Sec. 3.2).
 
-    Parameters
-    ----------
-    start : (uv,) ndarray
-        Random numbers: shift of the tile's first texel.
-    inner : int
-        Points of the disc, which come first.
-    crown : int
-        Points of the crown.
-    rows : int
-        Rows of the tile.
-    columns : int
-        Columns of the tile.
-
-    Returns
-    -------
-    points : (n, 3) ndarray
-        Points that all texels share, (u, cos 2 pi v, sin 2 pi v): j steps from 1/2, the disc's, then the crown's, each
-        from j = 0; modulo 1.
-    shifts : (rows, columns, 2) ndarray
-        What each texel of a tile adds to u and v, modulo 1: texel n, row by row, n times the crown's number of steps
-        more than the first.
+    start (uv,): Random numbers: shift of the tile's first texel.
+    inner: Points of the disc, which come first.
+    crown: Points of the crown.
+    rows: Rows of the tile.
+    columns: Columns of the tile.
+    -> points (n, 3): Points that all texels share, (u, cos 2 pi v, sin 2 pi v): j steps from 1/2, the disc's, then the
+        crown's, each from j = 0; modulo 1.
+    -> shifts (rows, columns, 2): What each texel of a tile adds to u and v, modulo 1: texel n, row by row, n times the
+        crown's number of steps more than the first.
     """
     return points_of(inner, crown), np.minimum(tile_shifts(start.astype(np.float64), (rows, columns), crown), BELOW_1)
 
@@ -56,18 +44,10 @@ def points_and_shifts(start: Array, inner: int, crown: int, rows: int, columns: 
 def sample_points(inner: int, crown: int) -> Array:
     """List the points of the sequence, in double precision (HSS Sec. 3.2).
 
-    Parameters
-    ----------
-    inner : int
-        Points of the disc, which come first.
-    crown : int
-        Points of the crown.
-
-    Returns
-    -------
-    (n, 3) ndarray
-        Points that all texels share, (u, cos 2 pi v, sin 2 pi v): j steps from 1/2, the disc's, then the crown's, each
-        from j = 0; modulo 1.
+    inner: Points of the disc, which come first.
+    crown: Points of the crown.
+    -> (n, 3): Points that all texels share, (u, cos 2 pi v, sin 2 pi v): j steps from 1/2, the disc's, then the
+        crown's, each from j = 0; modulo 1.
     """
     return points_of(inner, crown)
 
@@ -76,25 +56,14 @@ def sample_points(inner: int, crown: int) -> Array:
 def crown_samples(points: Array, shifts: Array, inner: int, radius: float, density: Density) -> tuple[Array, Array]:
     """Place samples: from r to 2 r around a receiver, at the first level in the disc as well (HSS Sec. 3.2, E-HSS-06).
 
-    Parameters
-    ----------
-    points : (n, 3) ndarray
-        Points that all texels share.
-    shifts : (row, column, uv) ndarray
-        Random numbers: what each texel adds to u and v, modulo 1.
-    inner : int
-        How many points lie in the disc; they come first.
-    radius : float
-        r, texels.
-    density : {"uniform", "inverse_distance"}
-        Samples per texel, by the distance from the receiver.
-
-    Returns
-    -------
-    offsets : (rows, columns, n, 2) ndarray of int32
-        Texels (right, down) from the receiver to the sample, the disc's first.
-    weight : (rows, columns, n) ndarray
-        Texels of this level that a sample stands for; an axis of length 1 where all are alike.
+    points (n, 3): Points that all texels share.
+    shifts (row, column, uv): Random numbers: what each texel adds to u and v, modulo 1.
+    inner: How many points lie in the disc; they come first.
+    radius: r, texels.
+    density: Samples per texel, by the distance from the receiver.
+    -> offsets (rows, columns, n, 2) int32: Texels (right, down) from the receiver to the sample, the disc's first.
+    -> weight (rows, columns, n): Texels of this level that a sample stands for; an axis of length 1 where all are
+        alike.
     """
     return tile_offsets(points, inner, shifts, radius, density)
 
@@ -105,26 +74,14 @@ def mirrored_samples(start: Array, inner: int, crown: int, radius: float, densit
 
     Half of the points, shifted, lie at angles pi (v - 1/2), to the right of the receiver.
 
-    Parameters
-    ----------
-    start : (uv,) ndarray
-        Random numbers: shift of all points.
-    inner : int
-        Samples of the disc.
-    crown : int
-        Samples of the crown.
-    radius : float
-        r, texels.
-    density : {"uniform", "inverse_distance"}
-        Samples per texel, by the distance from the receiver.
-
-    Returns
-    -------
-    offsets : (rows, columns, n, 2) ndarray of int32
-        Texels from the receiver to the sample: pairs of the disc, of the crown, then the odd point of each, straight
-        above or below.
-    weight : (rows, columns, n) ndarray
-        Texels of this level that a sample stands for.
+    start (uv,): Random numbers: shift of all points.
+    inner: Samples of the disc.
+    crown: Samples of the crown.
+    radius: r, texels.
+    density: Samples per texel, by the distance from the receiver.
+    -> offsets (rows, columns, n, 2) int32: Texels from the receiver to the sample: pairs of the disc, of the crown,
+        then the odd point of each, straight above or below.
+    -> weight (rows, columns, n): Texels of this level that a sample stands for.
     """
     offsets, weight = mirrored_offsets(inner, crown, start.astype(np.float64), radius, density)
     return offsets[None, None], weight[None, None]
@@ -134,20 +91,11 @@ def mirrored_samples(start: Array, inner: int, crown: int, radius: float, densit
 def all_texels(low: float, high: float) -> tuple[Array, Array]:
     """List every texel at a distance of `low` to less than `high` texels as a sample, once (HSS Sec. 3.2).
 
-    Parameters
-    ----------
-    low : float
-        Least distance, texels.
-    high : float
-        Largest distance, texels; not reached.
-
-    Returns
-    -------
-    offsets : (rows, columns, n, 2) ndarray of int32
-        Row by row those to the right, nearest first, each followed by its mirror image to the left; then those straight
-        above and below.
-    weight : (rows, columns, n) ndarray
-        Texels of this level that a sample stands for: 1.
+    low: Least distance, texels.
+    high: Largest distance, texels; not reached.
+    -> offsets (rows, columns, n, 2) int32: Row by row those to the right, nearest first, each followed by its mirror
+        image to the left; then those straight above and below.
+    -> weight (rows, columns, n): Texels of this level that a sample stands for: 1.
     """
     offsets = every_texel(low, high)
     return offsets[None, None], np.ones((1, 1, len(offsets)))
@@ -162,39 +110,19 @@ def gather_samples(
 
     Samples outside the picture, on nothing or on the texel itself send none.
 
-    Parameters
-    ----------
-    position : (3, h, w) ndarray
-        Receivers: surface points of the level's texels, from the eye, m.
-    normal : (3, h, w) ndarray
-        Their unit normals.
-    sender_position : (3, h, w) ndarray
-        Senders: surface points of the same texels, m.
-    sender_normal : (3, h, w) ndarray
-        Their unit normals.
-    radiance : (3, h, w) ndarray
-        Their radiance, W/m^2/sr.
-    area : (h, w) ndarray
-        Surface that a texel stands for, m^2.
-    offsets : (rows, columns, n, 2) ndarray of int32
-        Texels from the receiver to the sample.
-    weight : (rows, columns, n) ndarray
-        Texels that a sample stands for.
-    form_factor : {"disc", "texel", "point"}
-        Form factor of a sample.
-    share : float
-        Share of what a sample stands for that its disc covers, at least one texel.
-    factor : float
-        Factor of the sum: 1 but for forms used as printed.
-    inner : int
-        How many samples lie in the disc; they come first.
-    index : int
-        Position of the level, 0 for the first; areas are its own.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance by this level, W/m^2; 0 without surface.
+    position (3, h, w): Receivers: surface points of the level's texels, from the eye, m.
+    sender_position (3, h, w): Senders: surface points of the same texels, m.
+    sender_normal (3, h, w): Their unit normals.
+    radiance (3, h, w): Their radiance, W/m^2/sr.
+    area (h, w): Surface that a texel stands for, m^2.
+    offsets (rows, columns, n, 2) int32: Texels from the receiver to the sample.
+    weight (rows, columns, n): Texels that a sample stands for.
+    form_factor {"disc", "texel", "point"}: Form factor of a sample.
+    share: Share of what a sample stands for that its disc covers, at least one texel.
+    factor: Factor of the sum: 1 but for forms used as printed.
+    inner: How many samples lie in the disc; they come first.
+    index: Position of the level, 0 for the first; areas are its own.
+    -> (3, h, w): Irradiance by this level, W/m^2; 0 without surface.
     """
     none = np.zeros_like(area)
     to, by = (Level(0, at, none, up, radiance, area, none) for at, up in (

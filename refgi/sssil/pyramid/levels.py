@@ -97,29 +97,14 @@ def levels(
 ) -> tuple[Level, ...]:
     """Return levels of a picture, the first from its pixels, each further one from that before.
 
-    Parameters
-    ----------
-    depth : (H, W) ndarray
-        Along the view direction, m; inf where there is no surface.
-    normal : (3, H, W) ndarray
-        Unit vectors on the visible side, world space.
-    albedo : (3, H, W) ndarray
-        Diffuse reflectance.
-    direct : (3, H, W) ndarray
-        Direct irradiance, W/m^2.
-    projection : Projection
-        The camera's map.
-    first, count : int
-        Number of the first level, and how many.
-    downsample : {"closest", "average", "closest_average"}
-        How texels become one.
-    as_published : frozenset of str
-        "hss_tan_f": sample areas with the tangents of Eq. 3 as printed.
-
-    Returns
-    -------
-    tuple of Level
-        Finest first.
+    depth (H, W): Along the view direction, m; inf where there is no surface.
+    normal (3, H, W): Unit vectors on the visible side, world space.
+    albedo (3, H, W): Diffuse reflectance.
+    direct (3, H, W): Direct irradiance, W/m^2.
+    first, count: Number of the first level, and how many.
+    downsample {"closest", "average", "closest_average"}: How texels become one.
+    as_published: "hss_tan_f": sample areas with the tangents of Eq. 3 as printed.
+    -> tuple of Level: Finest first.
 
     Raises
     ------
@@ -151,29 +136,15 @@ def drawn_senders(
 ) -> tuple[Level, ...]:
     """Return levels whose texels stand where one of four does, drawn in proportion to flux, and send the flux of all.
 
-    Parameters
-    ----------
-    depth : (H, W) ndarray
-        Along the view direction, m; inf where there is no surface.
-    normal : (3, H, W) ndarray
-        Unit vectors on the visible side, world space.
-    albedo : (3, H, W) ndarray
-        Diffuse reflectance.
-    direct : (3, H, W) ndarray
-        Direct irradiance, W/m^2.
-    projection : Projection
-        The camera's map.
-    closest : tuple of Level
-        Levels of the closest texels: those that a texel which sends nothing is like.
-    seed : int
-        Seed of the draws.
-    as_published : frozenset of str
-        "hss_tan_f": sample areas with the tangents of Eq. 3 as printed.
-
-    Returns
-    -------
-    tuple of Level
-        Area is the sum over pixels, radiance times area the flux over pi, to rounding. `depth` is that of `closest`.
+    depth (H, W): Along the view direction, m; inf where there is no surface.
+    normal (3, H, W): Unit vectors on the visible side, world space.
+    albedo (3, H, W): Diffuse reflectance.
+    direct (3, H, W): Direct irradiance, W/m^2.
+    closest: Levels of the closest texels: those that a texel which sends nothing is like.
+    seed: Seed of the draws.
+    as_published: "hss_tan_f": sample areas with the tangents of Eq. 3 as printed.
+    -> tuple of Level: Area is the sum over pixels, radiance times area the flux over pi, to rounding. `depth` is that
+        of `closest`.
 
     Raises
     ------

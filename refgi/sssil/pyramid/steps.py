@@ -1,6 +1,13 @@
 """Levels of what a camera sees one after the other: the first of pixels, each further one of the finer one's texels.
 
 Of each texel's pixels the closest is kept, or all are averaged, or radiance alone is.
+
+- depth (h, w): Depth along the view direction of the picture's pixels, m; inf without surface.
+- normal (3, h, w): Their unit normals on the side that is seen.
+- irradiance (3, h, w): Their direct irradiance, W/m^2.
+- number: Level k: a texel covers 2^k x 2^k pixels or, at the rim, those that there are.
+- as_published: "hss_tan_f": sample areas as printed.
+- size: Rows and columns of the picture.
 """
 
 from typing import Any
@@ -31,40 +38,15 @@ def first_level(
 ) -> Closest:
     """Keep the nearest surface to each texel, what it reflects and the surface it stands for (HSS Sec. 4, E-HSS-09).
 
-    Parameters
-    ----------
-    depth : (h, w) ndarray
-        Depth along the view direction of the picture's pixels, m; inf without surface.
-    normal : (3, h, w) ndarray
-        Their unit normals on the side that is seen.
-    albedo : (3, h, w) ndarray
-        Their diffuse reflectance.
-    irradiance : (3, h, w) ndarray
-        Their direct irradiance, W/m^2.
-    projection : Projection
-        The camera's map.
-    number : int
-        Level k: a texel covers 2^k x 2^k pixels or, at the rim, those that there are.
-    as_published : frozenset of str
-        "hss_tan_f": sample areas as printed.
-
-    Returns
-    -------
-    position : (3, h, w) ndarray
-        Surface point from the eye, along the axes of the world, m: depth times the ray of depth 1 through the pixel's
-        centre (E-HSS-10); 0 without surface.
-    depth : (h, w) ndarray
-        Depth along the view direction, m; inf without surface.
-    normal : (3, h, w) ndarray
-        Its unit normal on the side that is seen; 0 without surface.
-    radiance : (3, h, w) ndarray
-        Diffusely reflected direct light, albedo/pi E, W/m^2/sr; 0 without surface.
-    area : (h, w) ndarray
-        Surface ds that the texel stands for, Eq. 2 with tan(f / 2) (E-HSS-03) and dP = 4^k pixels (E-HSS-06), m^2; 0
-        without surface.
-    pixel : (h, w) ndarray of int32
-        Pixel that was kept, row * columns + column; of equally near ones that nearest to the vertical centre line, then
-        the upper, then the left; -1 without surface.
+    -> position (3, h_l, w_l): Surface point from the eye, along the axes of the world, m: depth times the ray of depth
+        1 through the pixel's centre (E-HSS-10); 0 without surface.
+    -> depth (h_l, w_l): Depth along the view direction, m; inf without surface.
+    -> normal (3, h_l, w_l): Its unit normal on the side that is seen; 0 without surface.
+    -> radiance (3, h_l, w_l): Diffusely reflected direct light, albedo/pi E, W/m^2/sr; 0 without surface.
+    -> area (h_l, w_l): Surface ds that the texel stands for, Eq. 2 with tan(f / 2) (E-HSS-03) and dP = 4^k pixels
+        (E-HSS-06), m^2; 0 without surface.
+    -> pixel (h_l, w_l) int32: Pixel that was kept, row * columns + column; of equally near ones that nearest to the
+        vertical centre line, then the upper, then the left; -1 without surface.
     """
     level = empty_level(number, depth.shape, depth.dtype)
     fill_first_level(Picture(depth, normal, albedo, irradiance), view_of(projection, as_published), level)
@@ -77,40 +59,19 @@ def coarser_level(
 ) -> Closest:
     """Keep the nearest of four texels of the finer level, or of the two or one that there are (HSS Sec. 4, E-HSS-09).
 
-    Parameters
-    ----------
-    position : (3, h, w) ndarray
-        Surface points of the finer level, from the eye, m.
-    depth : (h, w) ndarray
-        Their depth, m; inf without surface.
-    normal : (3, h, w) ndarray
-        Their unit normals.
-    radiance : (3, h, w) ndarray
-        Their radiance, W/m^2/sr.
-    area : (h, w) ndarray
-        What they stand for, m^2.
-    pixel : (h, w) ndarray of int32
-        Pixels that they show.
-    number : int
-        Level k, the coarser one.
-    size : tuple of 2 ints
-        Rows and columns of the picture.
-
-    Returns
-    -------
-    position : (3, h, w) ndarray
-        Surface point from the eye, along the axes of the world, m; 0 without surface.
-    depth : (h, w) ndarray
-        Depth along the view direction, m; inf without surface.
-    normal : (3, h, w) ndarray
-        Its unit normal; 0 without surface.
-    radiance : (3, h, w) ndarray
-        Diffusely reflected direct light, W/m^2/sr; 0 without surface.
-    area : (h, w) ndarray
-        Surface that the texel stands for: as often its own as it covers more pixels (E-HSS-06), m^2.
-    pixel : (h, w) ndarray of int32
-        Pixel that was kept, row * columns + column; of equally near ones that nearest to the vertical centre line, then
-        the upper, then the left; -1 without surface.
+    position (3, h, w): Surface points of the finer level, from the eye, m.
+    depth (h, w): Their depth, m; inf without surface.
+    radiance (3, h, w): Their radiance, W/m^2/sr.
+    area (h, w): What they stand for, m^2.
+    pixel (h, w) int32: Pixels that they show.
+    number: Level k, the coarser one.
+    -> position (3, h_l, w_l): Surface point from the eye, along the axes of the world, m; 0 without surface.
+    -> depth (h_l, w_l): Depth along the view direction, m; inf without surface.
+    -> normal (3, h_l, w_l): Its unit normal; 0 without surface.
+    -> radiance (3, h_l, w_l): Diffusely reflected direct light, W/m^2/sr; 0 without surface.
+    -> area (h_l, w_l): Surface that the texel stands for: as often its own as it covers more pixels (E-HSS-06), m^2.
+    -> pixel (h_l, w_l) int32: Pixel that was kept, row * columns + column; of equally near ones that nearest to the
+        vertical centre line, then the upper, then the left; -1 without surface.
     """
     return _next(Level(number - 1, position, depth, normal, radiance, area, pixel), size)[1:]
 
@@ -122,35 +83,11 @@ def first_mean(
 ) -> Means:
     """Average the pixels of each texel by area, add their areas, make normals unit vectors (HSS Sec. 4: average).
 
-    Parameters
-    ----------
-    depth : (h, w) ndarray
-        Depth along the view direction of the picture's pixels, m; inf without surface.
-    normal : (3, h, w) ndarray
-        Their unit normals on the side that is seen.
-    albedo : (3, h, w) ndarray
-        Their diffuse reflectance.
-    irradiance : (3, h, w) ndarray
-        Their direct irradiance, W/m^2.
-    projection : Projection
-        The camera's map.
-    number : int
-        Level k: a texel covers 2^k x 2^k pixels or, at the rim, those that there are.
-    as_published : frozenset of str
-        "hss_tan_f": sample areas as printed.
-
-    Returns
-    -------
-    position : (3, h, w) ndarray
-        Mean surface point from the eye, along the axes of the world, m; 0 without surface.
-    depth : (h, w) ndarray
-        Mean depth along the view direction, m; inf without surface.
-    normal : (3, h, w) ndarray
-        Mean normal, a unit vector again; 0 without surface.
-    radiance : (3, h, w) ndarray
-        Mean of diffusely reflected direct light, albedo/pi E, W/m^2/sr; 0 without surface.
-    area : (h, w) ndarray
-        Sum of the pixels' surface ds, Eq. 2 with tan(f / 2) (E-HSS-03), m^2.
+    -> position (3, h_l, w_l): Mean surface point from the eye, along the axes of the world, m; 0 without surface.
+    -> depth (h_l, w_l): Mean depth along the view direction, m; inf without surface.
+    -> normal (3, h_l, w_l): Mean normal, a unit vector again; 0 without surface.
+    -> radiance (3, h_l, w_l): Mean of diffusely reflected direct light, albedo/pi E, W/m^2/sr; 0 without surface.
+    -> area (h_l, w_l): Sum of the pixels' surface ds, Eq. 2 with tan(f / 2) (E-HSS-03), m^2.
     """
     picture, view = Picture(depth, normal, albedo, irradiance), view_of(projection, as_published)
     return _averaged_pixels(picture, view, number, by_surface=True)[0][1:6]
@@ -162,35 +99,16 @@ def level_of_means(
 ) -> Means:
     """Average four finer texels, or those that there are, by area, and add their areas (HSS Sec. 4: average).
 
-    Parameters
-    ----------
-    position : (3, h, w) ndarray
-        Mean surface points of the finer level, from the eye, m.
-    depth : (h, w) ndarray
-        Their depth, m; inf without surface.
-    normal : (3, h, w) ndarray
-        Their unit normals.
-    radiance : (3, h, w) ndarray
-        Their radiance, W/m^2/sr.
-    area : (h, w) ndarray
-        Their surface, m^2.
-    number : int
-        Level k, the coarser one.
-    size : tuple of 2 ints
-        Rows and columns of the picture.
-
-    Returns
-    -------
-    position : (3, h, w) ndarray
-        Mean surface point from the eye, m; 0 without surface.
-    depth : (h, w) ndarray
-        Mean depth along the view direction, m; inf without surface.
-    normal : (3, h, w) ndarray
-        Mean normal, a unit vector again; 0 without surface.
-    radiance : (3, h, w) ndarray
-        Mean radiance, W/m^2/sr; 0 without surface.
-    area : (h, w) ndarray
-        Sum of areas, m^2.
+    position (3, h, w): Mean surface points of the finer level, from the eye, m.
+    depth (h, w): Their depth, m; inf without surface.
+    radiance (3, h, w): Their radiance, W/m^2/sr.
+    area (h, w): Their surface, m^2.
+    number: Level k, the coarser one.
+    -> position (3, h_l, w_l): Mean surface point from the eye, m; 0 without surface.
+    -> depth (h_l, w_l): Mean depth along the view direction, m; inf without surface.
+    -> normal (3, h_l, w_l): Mean normal, a unit vector again; 0 without surface.
+    -> radiance (3, h_l, w_l): Mean radiance, W/m^2/sr; 0 without surface.
+    -> area (h_l, w_l): Sum of areas, m^2.
     """
     fine = Level(number - 1, position, depth, normal, radiance, area, np.zeros(depth.shape, np.int32))
     coarse = _next(fine, size)
@@ -205,39 +123,13 @@ def first_mean_radiance(
 ) -> Counted:
     """Keep the nearest surface to each texel, with the mean radiance of all its pixels (HSS Sec. 4: average).
 
-    Parameters
-    ----------
-    depth : (h, w) ndarray
-        Depth along the view direction of the picture's pixels, m; inf without surface.
-    normal : (3, h, w) ndarray
-        Their unit normals on the side that is seen.
-    albedo : (3, h, w) ndarray
-        Their diffuse reflectance.
-    irradiance : (3, h, w) ndarray
-        Their direct irradiance, W/m^2.
-    projection : Projection
-        The camera's map.
-    number : int
-        Level k: a texel covers 2^k x 2^k pixels or, at the rim, those that there are.
-    as_published : frozenset of str
-        "hss_tan_f": sample areas as printed.
-
-    Returns
-    -------
-    position : (3, h, w) ndarray
-        Surface point from the eye, along the axes of the world, m; 0 without surface.
-    depth : (h, w) ndarray
-        Depth along the view direction, m; inf without surface.
-    normal : (3, h, w) ndarray
-        Its unit normal; 0 without surface.
-    radiance : (3, h, w) ndarray
-        Mean over the texel's pixels with a surface of albedo/pi E, W/m^2/sr.
-    area : (h, w) ndarray
-        Surface ds that the texel stands for, m^2; 0 without surface.
-    pixel : (h, w) ndarray of int32
-        Pixel that was kept, row * columns + column; -1 without surface.
-    count : (h, w) ndarray of int32
-        Pixels with a surface that the texel covers.
+    -> position (3, h_l, w_l): Surface point from the eye, along the axes of the world, m; 0 without surface.
+    -> depth (h_l, w_l): Depth along the view direction, m; inf without surface.
+    -> normal (3, h_l, w_l): Its unit normal; 0 without surface.
+    -> radiance (3, h_l, w_l): Mean over the texel's pixels with a surface of albedo/pi E, W/m^2/sr.
+    -> area (h_l, w_l): Surface ds that the texel stands for, m^2; 0 without surface.
+    -> pixel (h_l, w_l) int32: Pixel that was kept, row * columns + column; -1 without surface.
+    -> count (h_l, w_l) int32: Pixels with a surface that the texel covers.
     """
     picture, view = Picture(depth, normal, albedo, irradiance), view_of(projection, as_published)
     level, count = _averaged_pixels(picture, view, number, by_surface=False)
@@ -251,43 +143,20 @@ def coarser_mean_radiance(
 ) -> Counted:
     """Keep the nearest of four finer texels, with the mean radiance of all their pixels (HSS Sec. 4: average).
 
-    Parameters
-    ----------
-    position : (3, h, w) ndarray
-        Surface points of the finer level, from the eye, m.
-    depth : (h, w) ndarray
-        Their depth, m; inf without surface.
-    normal : (3, h, w) ndarray
-        Their unit normals.
-    radiance : (3, h, w) ndarray
-        Mean radiance of their pixels, W/m^2/sr.
-    area : (h, w) ndarray
-        What they stand for, m^2.
-    pixel : (h, w) ndarray of int32
-        Pixels that they show.
-    count : (h, w) ndarray of int32
-        Their pixels with a surface.
-    number : int
-        Level k, the coarser one.
-    size : tuple of 2 ints
-        Rows and columns of the picture.
-
-    Returns
-    -------
-    position : (3, h, w) ndarray
-        Surface point from the eye, m; 0 without surface.
-    depth : (h, w) ndarray
-        Depth along the view direction, m; inf without surface.
-    normal : (3, h, w) ndarray
-        Its unit normal; 0 without surface.
-    radiance : (3, h, w) ndarray
-        Mean over all pixels with a surface, W/m^2/sr.
-    area : (h, w) ndarray
-        Surface that the texel stands for, m^2; 0 without surface.
-    pixel : (h, w) ndarray of int32
-        Pixel that was kept, row * columns + column; -1 without surface.
-    count : (h, w) ndarray of int32
-        Pixels with a surface that the texel covers.
+    position (3, h, w): Surface points of the finer level, from the eye, m.
+    depth (h, w): Their depth, m; inf without surface.
+    radiance (3, h, w): Mean radiance of their pixels, W/m^2/sr.
+    area (h, w): What they stand for, m^2.
+    pixel (h, w) int32: Pixels that they show.
+    count (h, w) int32: Their pixels with a surface.
+    number: Level k, the coarser one.
+    -> position (3, h_l, w_l): Surface point from the eye, m; 0 without surface.
+    -> depth (h_l, w_l): Depth along the view direction, m; inf without surface.
+    -> normal (3, h_l, w_l): Its unit normal; 0 without surface.
+    -> radiance (3, h_l, w_l): Mean over all pixels with a surface, W/m^2/sr.
+    -> area (h_l, w_l): Surface that the texel stands for, m^2; 0 without surface.
+    -> pixel (h_l, w_l) int32: Pixel that was kept, row * columns + column; -1 without surface.
+    -> count (h_l, w_l) int32: Pixels with a surface that the texel covers.
     """
     fine = Level(number - 1, position, depth, normal, radiance, area, pixel)
     coarse, pixels = _next(fine, size), plane(empty_level(number, size, depth.dtype).shape, depth.dtype)

@@ -90,23 +90,8 @@ def temporal_filter(
 ) -> Filtered:
     """Blend the light of a frame with that of the frame before.
 
-    Parameters
-    ----------
-    irradiance : (3, h, w) ndarray
-        I_i, light as computed, W/m^2.
-    frame : Frame
-        The frame.
-    geometry : Geometry
-        Its scene's triangles as the scene holds them.
-    history : History
-        State of the frame before.
-    settings : TemporalSettings
-        Share of the frame before, and the disocclusion test.
-
-    Returns
-    -------
-    Filtered
-        F_i and the share of pixels that are not disoccluded.
+    irradiance (3, h, w): I_i, light as computed, W/m^2.
+    -> Filtered: F_i and the share of pixels that are not disoccluded.
 
     Raises
     ------

@@ -43,31 +43,12 @@ def motion(
 ) -> PreviousPoints:
     """Move surface points back to where they were a frame earlier: the same mean of their corners (HSS Sec. 4).
 
-    Parameters
-    ----------
-    position : (3, h, w) ndarray
-        Surface points of the picture, m.
-    normal : (3, h, w) ndarray
-        Their unit normals.
-    triangle_id : (h, w) ndarray of int32
-        Their triangles, -1 for none.
-    faces : (triangle, corner) ndarray of int32
-        Vertices of the triangles.
-    vertices : (vertex, 3) ndarray
-        Where the corners are, m.
-    before : (vertex, 3) ndarray
-        Where the corners were a frame earlier, m.
-    projection : Projection
-        This frame's camera.
-    vertex_normals : (vertex, 3) ndarray, optional
-        Normals of smooth triangles.
-    normals_before : (vertex, 3) ndarray, optional
-        The same a frame earlier.
-
-    Returns
-    -------
-    PreviousPoints
-        Points of triangles that did not move have the same position and normal to the bit.
+    position (3, h, w): Surface points of the picture, m.
+    vertices (vertex, 3): Where the corners are, m.
+    before (vertex, 3): Where the corners were a frame earlier, m.
+    vertex_normals (vertex, 3): Normals of smooth triangles.
+    normals_before (vertex, 3): The same a frame earlier.
+    -> PreviousPoints: Points of triangles that did not move have the same position and normal to the bit.
 
     Notes
     -----

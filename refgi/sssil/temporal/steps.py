@@ -29,39 +29,19 @@ def reprojection(
 ) -> tuple[Array, Array, Array | None]:
     """Fetch light of the frame before where it shows the same surface, by depth and normal (HSS Sec. 3.3, E-HSS-11).
 
-    Parameters
-    ----------
-    position : (3, h, w) ndarray
-        Where the picture's surface points were in the frame before, m.
-    normal : (3, h, w) ndarray
-        Their unit normals then.
-    triangle_id : (h, w) ndarray of int32
-        Their triangles, -1 for none.
-    projection : Projection
-        The camera of the frame before.
-    depth : (h, w) ndarray
-        Depth in the frame before, m; inf without surface.
-    normal_before : (3, h, w) ndarray
-        Unit normals in the frame before.
-    irradiance : (3, h, w) ndarray
-        Filtered light of the frame before, W/m^2.
-    depth_tolerance : float
-        Largest difference of depths, a share of the point's.
-    normal_cosine : float
-        Least cosine between normals.
-    fetch : {"bilinear", "nearest"}
-        From the four texels around the point, or from the one it falls in.
-    frames : (h, w) ndarray, optional
-        Frames in which the pixel's surface was found.
-
-    Returns
-    -------
-    light : (3, h, w) ndarray
-        Mean over the texels around that show the same surface, W/m^2; 0 where none does.
-    weight : (h, w) ndarray
-        Share of the bilinear weights that those texels have; 0: disoccluded or outside.
-    count : (h, w) ndarray
-        Mean of the frames in which their surface was found.
+    position (3, h, w): Where the picture's surface points were in the frame before, m.
+    normal (3, h, w): Their unit normals then.
+    projection: The camera of the frame before.
+    depth (h, w): Depth in the frame before, m; inf without surface.
+    normal_before (3, h, w): Unit normals in the frame before.
+    irradiance (3, h, w): Filtered light of the frame before, W/m^2.
+    depth_tolerance: Largest difference of depths, a share of the point's.
+    normal_cosine: Least cosine between normals.
+    fetch: From the four texels around the point, or from the one it falls in.
+    frames (h, w): Frames in which the pixel's surface was found.
+    -> light (3, h, w): Mean over the texels around that show the same surface, W/m^2; 0 where none does.
+    -> weight (h, w): Share of the bilinear weights that those texels have; 0: disoccluded or outside.
+    -> count (h, w): Mean of the frames in which their surface was found.
     """
     values = irradiance if frames is None else np.concatenate([irradiance, frames[None]])
     mean, weight = fetched(values, SourceView(projection, depth, normal_before), position, normal, triangle_id >= 0,
@@ -76,31 +56,15 @@ def entering(
 ) -> tuple[Array, Array]:
     """Give points that lay outside the earlier picture the light at its edge, the less the farther off (HSS Sec. 3.3).
 
-    Parameters
-    ----------
-    light : (3, h, w) ndarray
-        Light as reprojected, W/m^2.
-    weight : (h, w) ndarray
-        0 where none was found.
-    position : (3, h, w) ndarray
-        Where the picture's surface points were in the frame before, m.
-    triangle_id : (h, w) ndarray of int32
-        Their triangles, -1 for none.
-    projection : Projection
-        The camera of the frame before.
-    depth : (h, w) ndarray
-        Depth in the frame before, m; inf without surface.
-    irradiance : (3, h, w) ndarray
-        Filtered light of the frame before, W/m^2.
-    speed : float
-        Speed at which the share falls to 1 / e, pixels a frame.
-
-    Returns
-    -------
-    made : (3, h, w) ndarray
-        Light as reprojected, with the edge's light, W/m^2.
-    share : (h, w) ndarray
-        exp(-v / speed), v pixels from the edge to where the point was; 0 but for points that entered.
+    light (3, h, w): Light as reprojected, W/m^2.
+    weight (h, w): 0 where none was found.
+    position (3, h, w): Where the picture's surface points were in the frame before, m.
+    projection: The camera of the frame before.
+    depth (h, w): Depth in the frame before, m; inf without surface.
+    irradiance (3, h, w): Filtered light of the frame before, W/m^2.
+    speed: Speed at which the share falls to 1 / e, pixels a frame.
+    -> made (3, h, w): Light as reprojected, with the edge's light, W/m^2.
+    -> share (h, w): exp(-v / speed), v pixels from the edge to where the point was; 0 but for points that entered.
     """
     made = light.copy()
     share = fetch_entering(irradiance, SourceView(projection, depth, irradiance), position, triangle_id >= 0, weight,
@@ -112,23 +76,12 @@ def entering(
 def clamp(earlier: Array, new: Array, triangle_id: Array, deviations: float, radius: int) -> Array:
     """Clamp earlier light to the mean of the new light around, by standard deviations (docs/methods/hssil).
 
-    Parameters
-    ----------
-    earlier : (3, h, w) ndarray
-        Light of the frame before at this frame's points, W/m^2.
-    new : (3, h, w) ndarray
-        Light of this frame as computed, W/m^2.
-    triangle_id : (h, w) ndarray of int32
-        Triangle that each pixel sees, -1 for none: such pixels do not count.
-    deviations : float
-        Half the width of the bounds, standard deviations.
-    radius : int
-        The square has 2 radius + 1 pixels along a side.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Earlier light, clamped, W/m^2.
+    earlier (3, h, w): Light of the frame before at this frame's points, W/m^2.
+    new (3, h, w): Light of this frame as computed, W/m^2.
+    triangle_id (h, w) int32: Triangle that each pixel sees, -1 for none: such pixels do not count.
+    deviations: Half the width of the bounds, standard deviations.
+    radius: The square has 2 radius + 1 pixels along a side.
+    -> (3, h, w): Earlier light, clamped, W/m^2.
     """
     made = earlier.copy()
     clamp_to_neighbourhood(new, triangle_id >= 0, deviations, radius, made)
@@ -142,33 +95,17 @@ def blend(
 ) -> tuple[Array, Array, Array | None]:
     """Blend light of this frame and of those before: F_i = a W(F_{i-1}) + (1 - a) I_i (HSS Sec. 3.3, E-HSS-11).
 
-    Parameters
-    ----------
-    new : (3, h, w) ndarray
-        I_i, light of this frame as computed, W/m^2.
-    earlier : (3, h, w) ndarray
-        W(F_{i-1}), light of the frame before at this frame's points, W/m^2.
-    weight : (h, w) ndarray
-        0 where the frame before does not show the surface: a is 0 there.
-    a : float
-        Share of the frame before; of a surface found in n frames before at most n / (n + 1), where these are counted.
-    falloff : float
-        Speed at which a falls to a / e, pixels a frame.
-    frames : (h, w) ndarray, optional
-        n.
-    entering_share : (h, w) ndarray, optional
-        Share of a of points that entered.
-    speed : (h, w) ndarray, optional
-        How far surfaces moved, pixels a frame.
-
-    Returns
-    -------
-    irradiance : (3, h, w) ndarray
-        F_i, W/m^2; I_i where nothing was found.
-    share : (h, w) ndarray
-        a of each pixel.
-    count : (h, w) ndarray
-        Frames in which the pixel's surface was found, this one included.
+    new (3, h, w): I_i, light of this frame as computed, W/m^2.
+    earlier (3, h, w): W(F_{i-1}), light of the frame before at this frame's points, W/m^2.
+    weight (h, w): 0 where the frame before does not show the surface: a is 0 there.
+    a: Share of the frame before; of a surface found in n frames before at most n / (n + 1), where these are counted.
+    falloff: Speed at which a falls to a / e, pixels a frame.
+    frames (h, w): n.
+    entering_share (h, w): Share of a of points that entered.
+    speed (h, w): How far surfaces moved, pixels a frame.
+    -> irradiance (3, h, w): F_i, W/m^2; I_i where nothing was found.
+    -> share (h, w): a of each pixel.
+    -> count (h, w): Frames in which the pixel's surface was found, this one included.
     """
     made = earlier.copy() if frames is None else np.concatenate([earlier, frames[None]])
     share = weight.copy()

@@ -105,24 +105,13 @@ def upsample(
 ) -> Array:
     """Upsample irradiance to a finer level, joint bilateral, and add that level's own (HSS Sec. 3.2, E-HSS-12).
 
-    Parameters
-    ----------
-    coarse : (3, hc, wc) ndarray
-        Irradiance of the coarser level's texels, W/m^2; its dtype is that of the result.
-    coarse_guide : Guide
-        Depths and normals of those texels.
-    guide : Guide
-        Those of the finer level's texels, or of the pixels: (h, w) of them, hc = ceil(h / F) and wc = ceil(w / F) for F
-        one of 2, 4, .. 32.
-    settings : HssilSettings
-        Filter and its parameters; the downsampling, on which the place of a texel's depth depends.
-    added : (3, h, w) ndarray, optional
-        Irradiance to add, W/m^2.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2; 0 where there is no surface.
+    coarse (3, hc, wc): Irradiance of the coarser level's texels, W/m^2; its dtype is that of the result.
+    coarse_guide: Depths and normals of those texels.
+    guide: Those of the finer level's texels, or of the pixels: (h, w) of them, hc = ceil(h / F) and wc = ceil(w / F)
+        for F one of 2, 4, .. 32.
+    settings: Filter and its parameters; the downsampling, on which the place of a texel's depth depends.
+    added (3, h, w): Irradiance to add, W/m^2.
+    -> (3, h, w): Irradiance, W/m^2; 0 where there is no surface.
 
     Raises
     ------

@@ -48,23 +48,11 @@ def bitmask_gather(
 ) -> Array:
     """Sum the light of the samples around each texel of a level, times their visibility by a bitmask of the depth map.
 
-    Parameters
-    ----------
-    level : Level
-        Receivers, and senders unless those are given.
-    index : int
-        0 for the first level, whose inner disc is sampled as well.
-    settings : HssilSettings
-        Sampling, form factor, number of slices and thickness.
-    diagonal : float
-        Diagonal of the scene, m.
-    senders : Level, optional
-        The same level with other surface points, as senders and occluders.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi.
+    level: Receivers, and senders unless those are given.
+    index: 0 for the first level, whose inner disc is sampled as well.
+    diagonal: Diagonal of the scene, m.
+    senders: The same level with other surface points, as senders and occluders.
+    -> (3, h, w): Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi.
 
     Raises
     ------

@@ -61,25 +61,12 @@ def ray_gather(
 ) -> Array:
     """Sum the light of the samples around each texel of a level that no surface occludes.
 
-    Parameters
-    ----------
-    level : Level
-        Receivers, and senders unless those are given.
-    index : int
-        0 for the first level, whose inner disc is sampled as well.
-    settings : HssilSettings
-        Sampling and form factor.
-    frame : Frame
-        The scene whose view the level is.
-    senders : Level, optional
-        The same level with other surface points, as senders.
-    batch : int
-        Pairs in memory at a time; changes no bit of the result.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi.
+    level: Receivers, and senders unless those are given.
+    index: 0 for the first level, whose inner disc is sampled as well.
+    frame: The scene whose view the level is.
+    senders: The same level with other surface points, as senders.
+    batch: Pairs in memory at a time; changes no bit of the result.
+    -> (3, h, w): Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi.
     """
     senders = level if senders is None else senders
     surfels, samples = surfels_of(level, frame), _samples(level, index, settings.sampling)

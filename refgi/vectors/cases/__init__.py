@@ -13,10 +13,7 @@ MODULES = ("pairs", "sii", "sii_range", "multires", "gather", "vpl", "val", "hss
 def kit_cases(kit: str) -> dict[str, Callable[[], Case]]:
     """Return what makes the cases of the kit "quick" or "full", by id; the full kit holds the quick one.
 
-    Raises
-    ------
-    InputError
-        If there is no kit of that name.
+    InputError if there is no kit of that name.
     """
     if kit not in ("quick", "full"):
         raise InputError(f"kit: expected 'quick' or 'full', got {kit!r}", key="kit")

@@ -59,6 +59,15 @@ def form_of(
     return Form(function, reads, writes, numbers, adapt=adapt or {}, double=double)
 
 
+def alone(
+    function: Callable[..., Any], writes: tuple[str, ...] = ("",), exact: tuple[str, ...] = (), *,
+    lists: tuple[str, ...] | None = None, others: Mapping[str, Any] = {}, **more: Any,
+) -> Callable[[Arguments], Described]:
+    """Return what describes a stage by its literal function alone, with the rows of that function's name."""
+    rows = (function.__name__,) if lists is None else lists
+    return lambda arguments: Described(form_of(function, arguments, writes, others), own(*rows), exact, **more)
+
+
 def written(form: Form, *ways: Edits) -> tuple[Callable[[Run, Names, Names], Run], ...]:
     """Return other ways in which ports write a form in float32: legal edits of its text, float32 throughout."""
     def variant(edits: Edits, stage: Run, reads: Names, writes: Names) -> Run:  # noqa: ARG001

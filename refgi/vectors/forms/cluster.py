@@ -8,13 +8,13 @@ from refgi.cluster.settings import GeometryBlur
 from refgi.literal import val_areas, val_filters, val_maps
 from refgi.rsm.buffers.extent import SAMPLES
 from refgi.vectors.forms import visibility
-from refgi.vectors.forms.beside import Arguments, Described, form_of, ids, own, written
+from refgi.vectors.forms.beside import Arguments, Described, alone, form_of, ids, own, written
 from refgi.vectors.rows import Form
 
 MESH = {"vertices": "geometry.vertices", "faces": "geometry.faces"}
 BOXES = {name: (f"{name}.low", f"{name}.high") for name in ("visible", "illuminated")}
 LIT = {"illuminated": BOXES["illuminated"]}
-CLUSTERS = ("center", "normal", "of")
+CLUSTERS, AXES = ("center", "normal", "of"), ("center", "axis")
 AWAY = "st = along[k] @ away"  # lights and centre are projected, each for itself
 APART = (((AWAY, "st = along[k] @ position[:, of == k] - along[k] @ center[:, k, None]"),),
          ((AWAY, "st = along[k] @ position[:, of == k] - along[k, :, ::-1] @ center[::-1, k, None]"),))
@@ -38,35 +38,12 @@ def illuminated_extent(arguments: Arguments) -> Described:
     return Described(form, own("illuminated_extent", "box"))
 
 
-def kmeans_start(arguments: Arguments) -> Described:
-    """Return where clusters begin."""
-    return Described(form_of(val_areas.kmeans_start, arguments, ("center", "axis")), own("kmeans_start"),
-                     ("position", "normal"))
-
-
 def kmeans_assign(arguments: Arguments) -> Described:
     """Return the nearest clusters."""
     kind = arguments["distance"]
     others = (f"kmeans_assign/not {one}" for one in ("raw", "normalised", "squared") if one != kind)
     return Described(form_of(val_areas.kmeans_assign, arguments, ("of", "distance"), LIT),
                      own("kmeans_assign", f"kmeans_assign/{kind}", *others), ("position", "normal", "center", "axis"))
-
-
-def kmeans_means(arguments: Arguments) -> Described:
-    """Return means of clusters."""
-    return Described(form_of(val_areas.kmeans_means, arguments, ("center", "axis")), own("kmeans_means"),
-                     ("center", "axis"))
-
-
-def kmeans_rounds(arguments: Arguments) -> Described:
-    """Return the rest of the rounds."""
-    return Described(form_of(val_areas.kmeans_rounds, arguments, CLUSTERS, LIT), own("kmeans_rounds"),
-                     ("position", "normal", "center", "axis"))
-
-
-def kmeans_each(arguments: Arguments) -> Described:
-    """Return lights as their own clusters."""
-    return Described(form_of(val_areas.kmeans_each, arguments, CLUSTERS), own("kmeans_each"))
 
 
 def areas(arguments: Arguments) -> Described:
@@ -80,11 +57,6 @@ def areas(arguments: Arguments) -> Described:
         variants=written(form, *APART))
 
 
-def seen_vertices(arguments: Arguments) -> Described:
-    """Return the vertices of triangles that are seen."""
-    return Described(form_of(val_maps.seen_vertices, arguments, others=MESH))
-
-
 def occluders(arguments: Arguments) -> Described:
     """Return which triangles may block."""
     if arguments["ends"] is None or arguments["ends"].lights.size == 0:
@@ -95,17 +67,6 @@ def occluders(arguments: Arguments) -> Described:
     return Described(form, own("occluders"), facts={"tolerance, of the diagonal of the boxes' common box": 1e-6})
 
 
-def map_views(arguments: Arguments) -> Described:
-    """Return where maps look from."""
-    return Described(form_of(val_maps.map_views, arguments, ("center", "ball", "scene_far"), BOXES), own("map_views"),
-                     facts={"lift, of the illuminated box's largest coordinate": 4e-6})
-
-
-def frames_behind(arguments: Arguments) -> Described:
-    """Return axes of the maps behind."""
-    return Described(form_of(val_maps.frames_behind, arguments), own("frames_behind"))
-
-
 def depth_maps(arguments: Arguments) -> Described:
     """Return maps that are rasterized past a ball, of triangles without holes."""
     exact = ("geometry.vertices", "center", "frame")
@@ -114,11 +75,6 @@ def depth_maps(arguments: Arguments) -> Described:
         return Described(exact=exact)
     return Described(form_of(val_maps.depth_maps, arguments, others=MESH), own("depth_maps", "depth_maps/ahead"), exact,
                      facts={"projection": "paraboloid (x, y) / (1 + z)"})
-
-
-def map_ranges(arguments: Arguments) -> Described:
-    """Return nearest and farthest of maps."""
-    return Described(form_of(val_maps.map_ranges, arguments, ("near", "far")), own("map_ranges"))
 
 
 def interleaving(arguments: Arguments) -> Described:
@@ -141,12 +97,6 @@ def parts(arguments: Arguments) -> Described:
         adapt={"triangle_id": ids})
     dealt = () if arguments["subset"] is None else ("parts/interleaved",)
     return Described(form, own("parts", *dealt), exact, facts=facts)
-
-
-def sampled_pixels(arguments: Arguments) -> Described:
-    """Return pixels at which an error is estimated."""
-    form = form_of(val_areas.sampled_pixels, arguments, ("position", "normal", "triangle_id"))
-    return Described(form, own("sampled_pixels"), ("shifts",))
 
 
 def shadowed(arguments: Arguments) -> Described:
@@ -174,8 +124,16 @@ def blur(arguments: Arguments) -> Described:
 
 FORMS = {
     "rsm.visible_extent": visible_extent, "rsm.illuminated_extent": illuminated_extent,
-    "cluster.blur": blur,
     **{f"cluster.{one.__name__}": one for one in (
-        kmeans_start, kmeans_assign, kmeans_means, kmeans_rounds, kmeans_each, areas, seen_vertices, occluders,
-        map_views, frames_behind, depth_maps, map_ranges, interleaving, parts, sampled_pixels, shadowed)},
+        kmeans_assign, areas, occluders, depth_maps, interleaving, parts, shadowed, blur)},
+    "cluster.kmeans_start": alone(val_areas.kmeans_start, AXES, ("position", "normal")),
+    "cluster.kmeans_means": alone(val_areas.kmeans_means, AXES, AXES),
+    "cluster.kmeans_rounds": alone(val_areas.kmeans_rounds, CLUSTERS, ("position", "normal", *AXES), others=LIT),
+    "cluster.kmeans_each": alone(val_areas.kmeans_each, CLUSTERS),
+    "cluster.seen_vertices": alone(val_maps.seen_vertices, others=MESH, lists=()),
+    "cluster.map_views": alone(val_maps.map_views, ("center", "ball", "scene_far"), others=BOXES, facts={
+        "lift, of the illuminated box's largest coordinate": 4e-6}),
+    "cluster.frames_behind": alone(val_maps.frames_behind),
+    "cluster.map_ranges": alone(val_maps.map_ranges, ("near", "far")),
+    "cluster.sampled_pixels": alone(val_areas.sampled_pixels, ("position", "normal", "triangle_id"), ("shifts",)),
     **visibility.FORMS}

@@ -4,7 +4,7 @@ from typing import Any
 
 from refgi.literal import multires, multires_lights, multires_upsample
 from refgi.pairs.settings import PairSettings
-from refgi.vectors.forms.beside import Arguments, Described, Names, form_of, own
+from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, own
 from refgi.vectors.spec import Arrays, Run
 
 SINGLE = ("half of the lights", "last light", "largest light", "0.1 m", "lights shine backwards",
@@ -87,11 +87,6 @@ def one_row(arguments: Arguments) -> Described:
     return Described(form, own("points", "points/pixel"), ("position", "normal"))
 
 
-def of_row(arguments: Arguments) -> Described:
-    """Return the light of a picture of subsplats as a list."""
-    return Described(form_of(multires_lights.of_row, arguments))
-
-
 def representatives(arguments: Arguments) -> Described:
     """Return the pixels that stand for cells."""
     levels = tuple(map(str, range(arguments["top"] + 1)))
@@ -131,7 +126,8 @@ def sum_of_pictures(arguments: Arguments) -> Described:
 
 FORMS = {
     "multires.subsplat_facing": subsplat_facing, "multires.lights_seen": lights_seen,
-    "multires.seen_irradiance": seen_irradiance, "multires.one_row": one_row, "multires.of_row": of_row,
+    "multires.seen_irradiance": seen_irradiance, "multires.one_row": one_row,
+    "multires.of_row": alone(multires_lights.of_row, lists=()),
     "multires.subsplat_irradiance": subsplat_irradiance, "multires.representatives": representatives,
     "multires.samples": samples, "multires.splits": splits, "multires.lists": lists,
     "multires.sum_of_pictures": sum_of_pictures}

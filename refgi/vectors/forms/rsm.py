@@ -7,7 +7,7 @@ from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
 from refgi.scene.lamps import Lamp
 from refgi.scene.model import Light
 from refgi.vectors.bounds import ROUNDING
-from refgi.vectors.forms.beside import Arguments, Described, Names, form_of, ids, own, written
+from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, ids, own, written
 from refgi.vectors.recipe import writing
 from refgi.vectors.rows import Form
 from refgi.vectors.spec import Run
@@ -164,11 +164,6 @@ def leaving_radiance(arguments: Arguments) -> Described:
     return Described(form_of(direct.leaving_radiance, arguments), own("leaving", *(f"leaving/{one}" for one in lists)))
 
 
-def emission(arguments: Arguments) -> Described:
-    """Return what surfaces emit."""
-    return Described(form_of(direct.emission, arguments))
-
-
 def falloff_lists(lamps: Sequence[Light | Lamp]) -> tuple[str, ...]:
     """Return the lists of wrong falloffs of some lamps' spots: what is right for all of them is none."""
     kinds = {getattr(lamp, "falloff", None) for lamp in lamps} - {None}
@@ -179,4 +174,5 @@ def falloff_lists(lamps: Sequence[Light | Lamp]) -> tuple[str, ...]:
 FORMS = {"rsm.visible_triangles": visible_triangles, "rsm.surface": surface, "rsm.map_triangles": visible_triangles,
          "rsm.map_surface": surface, "rsm.reflected_flux": reflected_flux,
          "rsm.facing": facing, "rsm.shadow_map": shadow_map, "rays.shadow_rays": shadow_rays,
-         "rsm.direct_irradiance": direct_light, "rsm.leaving_radiance": leaving_radiance, "rsm.emission": emission}
+         "rsm.direct_irradiance": direct_light, "rsm.leaving_radiance": leaving_radiance,
+         "rsm.emission": alone(direct.emission, lists=())}

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from refgi.literal import val_back_projection, val_filters, val_maps, val_series, val_visibility
-from refgi.vectors.forms.beside import Arguments, Described, Names, form_of, ids, own
+from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, ids, own
 from refgi.vectors.spec import Arrays, Run
 
 PLACES = {"position": "places.position", "center": "places.center", "frame": "places.frame"}
@@ -78,16 +78,6 @@ def by_shares(stage: Run, reads: Names, writes: Names) -> Run:  # noqa: ARG001 a
     return run
 
 
-def disc_means(arguments: Arguments) -> Described:
-    """Return means over discs."""
-    return Described(form_of(val_filters.disc_means, arguments), own("means", "disc_means"))
-
-
-def box_means(arguments: Arguments) -> Described:
-    """Return means over squares."""
-    return Described(form_of(val_filters.box_means, arguments), own("means", "box_means"))
-
-
 def csm_penumbra(arguments: Arguments) -> Described:
     """Return penumbrae by the series."""
     form = form_of(val_series.csm_penumbra, arguments, ("shaded", "z_avg", "region", "t"), {**PLACES, **SIZES})
@@ -126,16 +116,6 @@ def pcss_penumbra(arguments: Arguments) -> Described:
                      facts=SLACK)
 
 
-def pcss(arguments: Arguments) -> Described:
-    """Return V texel by texel."""
-    return Described(form_of(val_visibility.pcss, arguments, others=PLACES), own("pcss"), facts=SLACK)
-
-
-def of_both(arguments: Arguments) -> Described:
-    """Return V of both maps."""
-    return Described(form_of(val_visibility.of_both, arguments), own("of_both"))
-
-
 def back_projection(arguments: Arguments) -> Described:
     """Return V by texels projected back."""
     form = form_of(val_back_projection.back_projection, arguments, others={
@@ -147,5 +127,9 @@ def back_projection(arguments: Arguments) -> Described:
 
 
 FORMS = {f"cluster.{one.__name__}": one for one in (
-    series, depth_scale, map_depths, basis, mip_levels, mip_means, disc_means, box_means, csm_penumbra, csm, search,
-    depth_tests, pcss_penumbra, pcss, of_both, back_projection)}
+    series, depth_scale, map_depths, basis, mip_levels, mip_means, csm_penumbra, csm, search, depth_tests,
+    pcss_penumbra, back_projection)} | {
+    "cluster.disc_means": alone(val_filters.disc_means, lists=("means", "disc_means")),
+    "cluster.box_means": alone(val_filters.box_means, lists=("means", "box_means")),
+    "cluster.pcss": alone(val_visibility.pcss, others=PLACES, facts=SLACK),
+    "cluster.of_both": alone(val_visibility.of_both)}

@@ -1,7 +1,7 @@
 """Literal forms of stages of pixel lights with visibility, by rays and by imperfect shadow maps."""
 
 from refgi.literal import imperfect, vpl
-from refgi.vectors.forms.beside import Arguments, Described, Names, form_of, own
+from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, own
 from refgi.vectors.spec import Array, Arrays, Run
 
 LIFT = 1e-3  # m: ports lift the ends of their rays off the surfaces by up to that; what it decides is masked
@@ -11,11 +11,6 @@ LIMITS = {"least cosine at the light": 1e-3, "farther by, and still of one surfa
           "least cosine of the bias's slope": 0.05}
 # what shows only where surfaces block the light, or never in these cases
 SHADOWED = ("clamped", "absolute", "at least", "largest light", "first half", "horizon")
-
-
-def facing(arguments: Arguments) -> Described:
-    """Return the normals of faces."""
-    return Described(form_of(vpl.facing, arguments), own("facing"), ("vertices",))
 
 
 def visible(arguments: Arguments) -> Described:
@@ -48,33 +43,12 @@ def shadowed_sum(arguments: Arguments) -> Described:
                      factors={"number of lights": float(arguments["flux"].shape[1])}, without=SHADOWED)
 
 
-def scattered_points(arguments: Arguments) -> Described:
-    """Return the points of maps."""
-    form = form_of(imperfect.scattered_points, arguments, ("point", "point_face", "radius"))
-    return Described(form, own("points"), ("shift",), paper=MAPS)
-
-
-def map_frames(arguments: Arguments) -> Described:
-    """Return the axes of maps."""
-    return Described(form_of(imperfect.map_frames, arguments), own("frames"), ("normal",), {
-        "": {"axes": "light, (right, down, forward), xyz"}}, "Duff et al. 2017")
-
-
-def depth_maps(arguments: Arguments) -> Described:
-    """Return the maps."""
-    return Described(form_of(imperfect.depth_maps, arguments), own("depth"), ("vertices",), paper=MAPS, facts=LIMITS)
-
-
-def filled(arguments: Arguments) -> Described:
-    """Return maps whose holes are filled."""
-    return Described(form_of(imperfect.filled, arguments), own("filled"), paper=MAPS, facts=LIMITS)
-
-
-def looked_up(arguments: Arguments) -> Described:
-    """Return visibility by maps."""
-    return Described(form_of(imperfect.looked_up, arguments), own("looked up"), ("depth",), paper=MAPS, facts=LIMITS)
-
-
-FORMS = {"vpl.facing": facing, "vpl.visible": visible, "vpl.shadowed_sum": shadowed_sum,
-         "vpl.scattered_points": scattered_points, "vpl.map_frames": map_frames, "vpl.depth_maps": depth_maps,
-         "vpl.filled": filled, "vpl.looked_up": looked_up}
+FORMS = {
+    "vpl.facing": alone(vpl.facing, exact=("vertices",)), "vpl.visible": visible, "vpl.shadowed_sum": shadowed_sum,
+    "vpl.scattered_points": alone(imperfect.scattered_points, ("point", "point_face", "radius"), ("shift",),
+                                  lists=("points",), paper=MAPS),
+    "vpl.map_frames": alone(imperfect.map_frames, exact=("normal",), lists=("frames",), paper="Duff et al. 2017",
+                            specs={"": {"axes": "light, (right, down, forward), xyz"}}),
+    "vpl.depth_maps": alone(imperfect.depth_maps, exact=("vertices",), lists=("depth",), paper=MAPS, facts=LIMITS),
+    "vpl.filled": alone(imperfect.filled, paper=MAPS, facts=LIMITS),
+    "vpl.looked_up": alone(imperfect.looked_up, exact=("depth",), lists=("looked up",), paper=MAPS, facts=LIMITS)}

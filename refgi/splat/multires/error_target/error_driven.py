@@ -158,30 +158,11 @@ def error_driven(
 ) -> ErrorDriven:
     """Evaluate a picture to a relative error, `settings.target`.
 
-    Parameters
-    ----------
-    buffer : GBuffer
-        The camera's G-buffer.
-    lights : PixelLights
-        The lights to sum.
-    settings : ByError
-        The target and the coarsest level.
-    pairs : PairSettings
-        Clamp, offset and lobes of a pair of light and receiver.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-    seed : int
-        Of the samples that estimate the error.
-    lightcuts : AutoLightcuts, Lightcuts or None
-        Whether lights may be summed by clusters: "auto" takes a share of the target for it where they are many; by
-        name, with an error of its own that counts against the target.
-    shadowed : PixelSum, optional
-        The same lights under their visibility, which are then never clustered.
-
-    Returns
-    -------
-    ErrorDriven
-        The picture, its subsplats, error and cost.
+    seed: Of the samples that estimate the error.
+    lightcuts: Whether lights may be summed by clusters: "auto" takes a share of the target for it where they are many;
+        by name, with an error of its own that counts against the target.
+    shadowed: The same lights under their visibility, which are then never clustered.
+    -> ErrorDriven: The picture, its subsplats, error and cost.
 
     Raises
     ------

@@ -98,15 +98,8 @@ class BlendWeights(NamedTuple):
 def blend_weights(levels: tuple[SurfaceLevel, ...]) -> tuple[BlendWeights, ...]:
     """Return the weights of the coarser neighbours of every cell.
 
-    Parameters
-    ----------
-    levels : tuple of SurfaceLevel
-        Surfaces, from level 0.
-
-    Returns
-    -------
-    tuple of BlendWeights
-        For every level but the coarsest. Weights of a cell sum to 1, or 0 where it is empty.
+    levels: Surfaces, from level 0.
+    -> tuple of BlendWeights: For every level but the coarsest. Weights of a cell sum to 1, or 0 where it is empty.
     """
     made: list[BlendWeights] = []
     for fine, coarse in itertools.pairwise(levels):

@@ -45,19 +45,9 @@ def near_irradiance_at(irradiance: Array, has_near: Array, c: int, row: int, col
 def near_light(receivers: Receivers, packed: Packed, most: float) -> NearLight:
     """Sum what single lights give each receiver beyond a bound, and by their lobes, at full resolution.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        The picture's points; contiguous.
-    packed : Packed
-        Lights, of `checked`.
-    most : float
-        The bound, W/m^2.
-
-    Returns
-    -------
-    NearLight
-        0 where every light keeps below the bound and none is glossy.
+    receivers: The picture's points; contiguous.
+    most: The bound, W/m^2.
+    -> NearLight: 0 where every light keeps below the bound and none is glossy.
 
     Notes
     -----

@@ -77,15 +77,8 @@ class Trials:
     def run(self, threshold: float) -> None:
         """Refine from the coarsest level down wherever stopping would cost more than a threshold.
 
-        Parameters
-        ----------
-        threshold : float
-            Root of the squared error that a cell may leave, W/m^2.
-
-        Returns
-        -------
-        None
-            `split` says which cells are refined.
+        threshold: Root of the squared error that a cell may leave, W/m^2.
+        -> None: `split` says which cells are refined.
         """
         for level in range(len(self._levels) - 2, 0, -1):
             here, blend, split = self._levels[level], self._blends[level], self.split[level + 1]
@@ -119,10 +112,7 @@ class Trials:
     def picture(self) -> Array:
         """Evaluate the pixels of the last split cells and join all levels.
 
-        Returns
-        -------
-        (3, h, w) ndarray
-            Irradiance, W/m^2, linear RGB.
+        -> (3, h, w): Irradiance, W/m^2, linear RGB.
         """
         self._exact.evaluate(self._exact.unlit(self.split[1], self._levels[0]))
         result, blend = np.empty_like(self._exact.irradiance), self._blends[0]

@@ -56,28 +56,10 @@ def per_light(
 ) -> Array:
     """Sum the irradiance of every light at every pixel, each from subsplats of its own.
 
-    Parameters
-    ----------
-    buffer : GBuffer
-        What the camera sees.
-    lights : PixelLights
-        Lights to sum, diffuse, glossy or both.
-    settings : ByIrradiance
-        Levels, threshold and upsampling.
-    pairs : PairSettings
-        Clamp, offset and lobes of a pair of light and receiver.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-    start : Subsplats, optional
-        A list for all lights, of the same picture and levels, that each one goes on to refine; the coarsest cells if
+    start: A list for all lights, of the same picture and levels, that each one goes on to refine; the coarsest cells if
         absent.
-    filter_all, corner_rule : bool
-        As for `upsample`.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2, linear RGB, without albedo/pi and visibility.
+    filter_all, corner_rule: As for `upsample`.
+    -> (3, h, w): Irradiance, W/m^2, linear RGB, without albedo/pi and visibility.
 
     Raises
     ------
@@ -111,29 +93,12 @@ def per_light_lobes(
 ) -> Array:
     """Sum what the lobes of glossy pixels reflect of every light, each light from subsplats of its own.
 
-    Parameters
-    ----------
-    points : GlossyPoints
-        The glossy pixels; of those that share a cell one stands for all, whatever their exponents.
-    shape : tuple of 2 ints
-        Height and width of the picture.
-    lights : PixelLights
-        Lights to sum, diffuse, glossy or both.
-    settings : ByIrradiance
-        Levels, threshold and upsampling; cells are of glossy pixels alone.
-    pairs : PairSettings
-        Clamp, offset and lobes of a pair of light and receiver.
-    footprint : (N,) ndarray, optional
-        As for `per_light`.
-    start : Subsplats, optional
-        As for `per_light`; `representative` is the pixel.
-    filter_all, corner_rule : bool
-        As for `upsample`.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Radiance towards the eye over the lobe's reflectance, W/m^2/sr; 0 where no pixel is glossy.
+    points: The glossy pixels; of those that share a cell one stands for all, whatever their exponents.
+    shape: Height and width of the picture.
+    settings: Levels, threshold and upsampling; cells are of glossy pixels alone.
+    start: As for `per_light`; `representative` is the pixel.
+    filter_all, corner_rule: As for `upsample`.
+    -> (3, h, w): Radiance towards the eye over the lobe's reflectance, W/m^2/sr; 0 where no pixel is glossy.
 
     Raises
     ------

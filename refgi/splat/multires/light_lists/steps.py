@@ -1,4 +1,7 @@
-"""Lists of each light's own one step after the other: samples at quadrants, cells that they split, lists, pictures."""
+"""Lists of each light's own one step after the other: samples at quadrants, cells that they split, lists, pictures.
+
+- pixels tuple of (h_l, w_l): Representative pixel of each cell of levels 0 to top, -1 without surface.
+"""
 
 import itertools
 from typing import TYPE_CHECKING, Any, Literal
@@ -35,33 +38,9 @@ def samples(
 ) -> dict[int, Array]:
     """Sum the irradiance of each light alone at every cell (AMS Eq. 2; E-AMS-02).
 
-    Parameters
-    ----------
-    position : (3, h, w) ndarray
-        Surface points, m.
-    normal : (3, h, w) ndarray
-        Unit normals.
-    pixels : tuple of (h_l, w_l) ndarray
-        Representative pixel of each cell of levels 0 to top, -1 without surface.
-    light_position : (3, N) ndarray
-        Pixel lights, m.
-    light_normal : (3, N) ndarray
-        Their unit normals.
-    flux : (3, N) ndarray
-        Diffuse flux, W.
-    lobe_flux, lobe_axis, lobe_exponent : ndarray or None
-        Their lobes.
-    area : (N,) ndarray or None
-        Surface that each stands for, m^2, where the clamp reads it.
-    pairs : PairSettings
-        How one light lights one point.
-    representative : str
-        Whether a cell is its representative pixel, or its mean surface.
-
-    Returns
-    -------
-    dict of (light, rgb, h_l, w_l) ndarray
-        Irradiance of each light, W/m^2, by level; 0 without surface.
+    area (light,): Surface that each stands for, m^2, where the clamp reads it.
+    representative: Whether a cell is its representative pixel, or its mean surface.
+    -> dict of (light, rgb, h_l, w_l): Irradiance of each light, W/m^2, by level; 0 without surface.
     """
     made = {}
     for level, pixel in enumerate(pixels):
@@ -84,26 +63,13 @@ def splits(
 ) -> dict[int, Array]:
     """Find the cells that each light splits: max - min of a channel over its quadrants exceeds T (AMS Sec. 3.3.1).
 
-    Parameters
-    ----------
-    pixels : tuple of (h_l, w_l) ndarray
-        Representative pixel of each cell of levels 0 to top, -1 without surface.
-    sampled : tuple of (N, 3, h_l, w_l) ndarray
-        Irradiance of each light there, W/m^2.
-    finest : int
-        Finest level.
-    threshold : float
-        T in W/m^2, or the share that it is of this.
-    form : str
-        Of the largest channel of the light's samples at the quadrants' level and above ("relative"), of none, or of the
-        largest sum of all lights at the coarsest cells over their number.
-    start : tuple of (subsplat) ndarray, optional
-        Level, row and column of the list of all lights that each goes on to refine.
-
-    Returns
-    -------
-    dict of (light, h_l, w_l) ndarray of bool
-        Whether the cell is split, by level; false where the list does not come to it.
+    sampled tuple of (light, 3, h_l, w_l): Irradiance of each light there, W/m^2.
+    finest: Finest level.
+    threshold: T in W/m^2, or the share that it is of this.
+    form: Of the largest channel of the light's samples at the quadrants' level and above ("relative"), of none, or of
+        the largest sum of all lights at the coarsest cells over their number.
+    start tuple of (subsplat): Level, row and column of the list of all lights that each goes on to refine.
+    -> dict of (light, h_l, w_l) bool: Whether the cell is split, by level; false where the list does not come to it.
     """
     top, covered = len(pixels) - 1, pixels[0] >= 0
     tree, count, real = cell_tree(covered, top, finest), len(sampled[0]), sampled[0].dtype
@@ -142,27 +108,13 @@ def _split_cells(cells: ReceiverTree, light: Array, offset: Any, share: Any) -> 
 def lists(pixels: Levels, sampled: Levels, split_levels: Levels) -> tuple[Array, Array, Array, Array, Array]:
     """List each light's subsplats: cells that are not split, but whose coarser cell is (AMS Sec. 3.3.1).
 
-    Parameters
-    ----------
-    pixels : tuple of (h_l, w_l) ndarray
-        Representative pixel of each cell of levels 0 to top, -1 without surface.
-    sampled : tuple of (N, 3, h_l, w_l) ndarray
-        Irradiance of each light there, W/m^2.
-    split_levels : tuple of (N, h_l, w_l) ndarray of bool
-        Cells of levels 1 to top that each light splits.
-
-    Returns
-    -------
-    first : (light and one more) ndarray of int64
-        Where each light's list begins, and the end.
-    level : (subsplat) ndarray of uint8
-        Level: cell of 2^level pixels a side. Light by light, coarsest level first, row by row.
-    row : (subsplat) ndarray of int32
-        Row in the grid of its level.
-    column : (subsplat) ndarray of int32
-        Column in the grid of its level.
-    irradiance : (rgb, subsplat) ndarray
-        Irradiance of its light there, W/m^2.
+    sampled tuple of (light, 3, h_l, w_l): Irradiance of each light there, W/m^2.
+    split_levels tuple of (light, h_l, w_l) bool: Cells of levels 1 to top that each light splits.
+    -> first (light and one more) int64: Where each light's list begins, and the end.
+    -> level (subsplat) uint8: Level: cell of 2^level pixels a side. Light by light, coarsest level first, row by row.
+    -> row (subsplat) int32: Row in the grid of its level.
+    -> column (subsplat) int32: Column in the grid of its level.
+    -> irradiance (rgb, subsplat): Irradiance of its light there, W/m^2.
     """
     top = len(pixels) - 1
     tree = cell_tree(pixels[0] >= 0, top, 0)
@@ -196,27 +148,13 @@ def sum_of_pictures(
 ) -> Array:
     """Upsample each light's subsplats by themselves, coarsest level first, and add (AMS Sec. 3.3.1, 3.5; E-AMS-09).
 
-    Parameters
-    ----------
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    first : (N + 1,) ndarray
-        Where each light's list begins.
-    level, row, column : (subsplat) ndarray
-        The lists of all lights.
-    irradiance : (rgb, subsplat) ndarray
-        Their light, W/m^2.
-    top : int
-        Coarsest level.
-    mode : str
-        Filter from level to level.
-    filter_all, corner_rule : bool
-        Whether leaves are filtered too; whether a cell across a corner counts only beside one that counts.
-
-    Returns
-    -------
-    (rgb, h, w) ndarray
-        Indirect irradiance, W/m^2; 0 without surface.
+    first (N + 1,): Where each light's list begins.
+    level, row, column (subsplat) int: The lists of all lights.
+    irradiance (rgb, subsplat): Their light, W/m^2.
+    mode: Filter from level to level.
+    filter_all, corner_rule: Whether leaves are filtered too; whether a cell across a corner counts only beside one that
+        counts.
+    -> (rgb, h, w): Indirect irradiance, W/m^2; 0 without surface.
     """
     total = np.zeros((3, *covered.shape), irradiance.dtype)
     for begin, end in itertools.pairwise(first):

@@ -41,23 +41,10 @@ CHUNK = 4096  # cells that a thread takes at once
 def depth_ranges(depth: Array, covered: Array, top: int, rim: int = 0) -> Mipmap:
     """Return the least and largest depth within each cell (AMS Sec. 3.2.1).
 
-    Parameters
-    ----------
-    depth : (h, w) ndarray
-        Axial depth, m.
-    covered : (h, w) ndarray of bool
-        Whether there is a surface.
-    top : int
-        Coarsest level.
-    rim : int
-        Pixels around a cell that count too (Fig. 15 top): with 1, an edge that lies between two cells is in both.
-
-    Returns
-    -------
-    low : tuple of (h_l, w_l) ndarray
-        Least depth in each cell, m; inf where empty.
-    high : tuple of (h_l, w_l) ndarray
-        Largest depth in each cell, m; -inf where empty.
+    depth (h, w): Axial depth, m.
+    rim: Pixels around a cell that count too (Fig. 15 top): with 1, an edge that lies between two cells is in both.
+    -> low tuple of (h_l, w_l): Least depth in each cell, m; inf where empty.
+    -> high tuple of (h_l, w_l): Largest depth in each cell, m; -inf where empty.
     """
     mip = _ranges(np.ascontiguousarray(depth)[None], covered, top, rim)
     low, high = (tuple(level[0] for level in side) for side in (mip.low, mip.high))
@@ -68,25 +55,10 @@ def depth_ranges(depth: Array, covered: Array, top: int, rim: int = 0) -> Mipmap
 def normal_ranges(normal: Array, covered: Array, top: int, rim: int = 0, components: int = 3) -> Mipmap:
     """Return the least and largest of each component of the normals within each cell (AMS Sec. 3.2.2).
 
-    Parameters
-    ----------
-    normal : (3, h, w) ndarray
-        Unit normals, world space.
-    covered : (h, w) ndarray of bool
-        Whether there is a surface.
-    top : int
-        Coarsest level.
-    rim : int
-        Pixels around a cell that count too (Fig. 15 top).
-    components : int
-        How many count: x, y and z, or the first two.
-
-    Returns
-    -------
-    low : tuple of (xyz, h_l, w_l) ndarray
-        Least component of normals in each cell; inf where empty.
-    high : tuple of (xyz, h_l, w_l) ndarray
-        Largest component of normals in each cell; -inf where empty.
+    rim: Pixels around a cell that count too (Fig. 15 top).
+    components: How many count: x, y and z, or the first two.
+    -> low tuple of (xyz, h_l, w_l): Least component of normals in each cell; inf where empty.
+    -> high tuple of (xyz, h_l, w_l): Largest component of normals in each cell; -inf where empty.
     """
     return _ranges(np.ascontiguousarray(normal[:components]), covered, top, rim)
 
@@ -166,19 +138,10 @@ def _steps(buffer: "GBuffer", criteria: "Criteria", top: int, finest: int = 0) -
 def discontinuities(buffer: "GBuffer", criteria: "Criteria", top: int, finest: int = 0) -> tuple[Array, ...]:
     """Return which cells of each level hold a discontinuity.
 
-    Parameters
-    ----------
-    buffer : GBuffer
-        The camera's G-buffer.
-    criteria : Criteria
-        Mipmaps to build, their thresholds and the `rim`.
-    top, finest : int
-        Coarsest and finest level.
-
-    Returns
-    -------
-    tuple of (h_l, w_l) ndarray of bool
-        Levels 0 to `top`; False at levels up to `finest`, which is never refined, and where a cell shows no surface.
+    criteria: Mipmaps to build, their thresholds and the `rim`.
+    top, finest: Coarsest and finest level.
+    -> tuple of (h_l, w_l) bool: Levels 0 to `top`; False at levels up to `finest`, which is never refined, and where a
+        cell shows no surface.
     """
     height, width = buffer.covered.shape
     sizes = layout(height, width, top, first=1)

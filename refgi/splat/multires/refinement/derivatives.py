@@ -36,21 +36,9 @@ BESIDE, DISTANCE, BELOW = range(3)
 def depth_slopes(depth: Array, covered: Array, top: int, relative: bool = True) -> Mipmap:
     """Return the steepest change of depth within each cell, sqrt((dz/dx)^2 + (dz/dy)^2), over z (AMS Sec. 3.2.1).
 
-    Parameters
-    ----------
-    depth : (h, w) ndarray
-        Axial depth, m.
-    covered : (h, w) ndarray of bool
-        Whether there is a surface.
-    top : int
-        Coarsest level.
-    relative : bool
-        Divide by z; the paper does not.
-
-    Returns
-    -------
-    high : tuple of (h_l, w_l) ndarray
-        The larger of both differences along each axis, 1/pixel, or m/pixel if not relative.
+    depth (h, w): Axial depth, m.
+    relative: Divide by z; the paper does not.
+    -> high tuple of (h_l, w_l): The larger of both differences along each axis, 1/pixel, or m/pixel if not relative.
 
     Notes
     -----
@@ -66,23 +54,8 @@ def depth_slopes(depth: Array, covered: Array, top: int, relative: bool = True) 
 def curvatures(normal: Array, position: Array, covered: Array, top: int, rate: bool = False) -> Mipmap:
     """Return the largest change of normal between neighbouring pixels within each cell (AMS Eq. 1; E-AMS-01).
 
-    Parameters
-    ----------
-    normal : (3, h, w) ndarray
-        Unit normals, world space.
-    position : (3, h, w) ndarray
-        World space, m.
-    covered : (h, w) ndarray of bool
-        Whether there is a surface.
-    top : int
-        Coarsest level.
-    rate : bool
-        Divide by the distance between the two points, which makes it a curvature: 1/R on a sphere of radius R.
-
-    Returns
-    -------
-    high : tuple of (h_l, w_l) ndarray
-        Largest length of N1 - N2, 0 to 2; for a rate over that of x1 - x2, 1/m.
+    rate: Divide by the distance between the two points, which makes it a curvature: 1/R on a sphere of radius R.
+    -> high tuple of (h_l, w_l): Largest length of N1 - N2, 0 to 2; for a rate over that of x1 - x2, 1/m.
 
     Notes
     -----

@@ -91,18 +91,9 @@ def representative(covered: Array, level: int, i: int, j: int) -> int:
 def representatives(covered: Array, top: int) -> tuple[Array, ...]:
     """Return the representative pixel of each cell of each level (E-AMS-11).
 
-    Parameters
-    ----------
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    top : int
-        Coarsest level.
-
-    Returns
-    -------
-    tuple of (h_l, w_l) ndarray of int32
-        Row * columns + column of the picture, of the pixel right and below of the cell's centre; where it shows no
-        surface the nearest that does, the first of several; -1 where the cell shows none. Levels 0 to `top`.
+    -> tuple of (h_l, w_l) int32: Row * columns + column of the picture, of the pixel right and below of the cell's
+        centre; where it shows no surface the nearest that does, the first of several; -1 where the cell shows none.
+        Levels 0 to `top`.
     """
     height, width = covered.shape
     places = tuple(np.empty(level_shape(height, width, level), np.int32) for level in range(top + 1))

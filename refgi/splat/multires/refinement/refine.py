@@ -106,21 +106,11 @@ def refine(
 ) -> Subsplats:
     """Return the subsplats that cover every surface of the picture once.
 
-    Parameters
-    ----------
-    discontinuous : tuple of (h_l, w_l) ndarray of bool
-        Which cells hold a discontinuity, for levels 0 to top; level 0 is never refined.
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    diagonal : str
-        Neighbours across a corner that count: "off", "corner", "literal" or "full8"; see `cells`.
-    traversal : str
-        "single_pass", depth first, or "list", as published; both give the same.
-
-    Returns
-    -------
-    Subsplats
-        Cells of the coarsest level row by row, depth first within them.
+    discontinuous tuple of (h_l, w_l) bool: Which cells hold a discontinuity, for levels 0 to top; level 0 is never
+        refined.
+    diagonal: Neighbours across a corner that count: "off", "corner", "literal" or "full8"; see `cells`.
+    traversal: "single_pass", depth first, or "list", as published; both give the same.
+    -> Subsplats: Cells of the coarsest level row by row, depth first within them.
     """
     cells = classify_cells(discontinuous, np.ascontiguousarray(covered), diagonal)
     return pass_by_pass(cells) if traversal == "list" else depth_first(cells)

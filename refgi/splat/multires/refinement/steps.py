@@ -39,29 +39,16 @@ def discontinuities(
 ) -> dict[int, Array]:
     """Mark the cells that any test finds discontinuous (AMS Sec. 3.2, 3.3; E-AMS-07).
 
-    Parameters
-    ----------
-    top, finest : int
-        Coarsest and finest level.
-    shape : tuple of int
-        Rows and columns of the picture.
-    depth_least, depth_largest : tuple of (h_l, w_l) ndarray, optional
-        Range of depths of levels 1 to `top`, m; None where there is no such test.
-    slope : tuple of (h_l, w_l) ndarray, optional
-        Steepest change of depth.
-    normal_least, normal_largest : tuple of (xyz, h_l, w_l) ndarray, optional
-        Range of the components of normals.
-    curvature : tuple of (h_l, w_l) ndarray, optional
-        Largest change between neighbouring normals.
-    depth_threshold, slope_threshold, normal_threshold, curvature_threshold : float
-        Threshold of each test.
-    depth_measure, slope_measure : str
-        What the threshold of a test of depths is a multiple of.
-
-    Returns
-    -------
-    dict of (h_l, w_l) ndarray of bool
-        True where a test exceeds its threshold, by level.
+    top, finest: Coarsest and finest level.
+    shape: Rows and columns of the picture.
+    depth_least, depth_largest tuple of (h_l, w_l): Range of depths of levels 1 to `top`, m; None where there is no such
+        test.
+    slope tuple of (h_l, w_l): Steepest change of depth.
+    normal_least, normal_largest tuple of (xyz, h_l, w_l): Range of the components of normals.
+    curvature tuple of (h_l, w_l): Largest change between neighbouring normals.
+    depth_threshold, slope_threshold, normal_threshold, curvature_threshold: Threshold of each test.
+    depth_measure, slope_measure: What the threshold of a test of depths is a multiple of.
+    -> dict of (h_l, w_l) bool: True where a test exceeds its threshold, by level.
     """
     sizes = layout(*shape, top, first=1)
     found = np.zeros(element_count(sizes), np.bool_)
@@ -114,19 +101,9 @@ def discontinuity_steps(buffer: "GBuffer", criteria: "Criteria", top: int, fines
 def states(discontinuous: Levels, covered: Array, diagonal: Diagonal) -> dict[int, Array]:
     """Find which cells are refined, by their own need or across a corner (AMS Sec. 3.3, 5.2; E-AMS-10).
 
-    Parameters
-    ----------
-    discontinuous : tuple of (h_l, w_l) ndarray of bool
-        Discontinuous cells of levels 1 to top.
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    diagonal : str
-        Neighbours across a corner that count.
-
-    Returns
-    -------
-    dict of (h_l, w_l) ndarray of uint8
-        0 no surface, 1 a subsplat may end here, 2 refined, by level.
+    discontinuous tuple of (h_l, w_l) bool: Discontinuous cells of levels 1 to top.
+    diagonal: Neighbours across a corner that count.
+    -> dict of (h_l, w_l) uint8: 0 no surface, 1 a subsplat may end here, 2 refined, by level.
     """
     cells = classify_cells((np.zeros_like(covered), *discontinuous), covered, diagonal)
     return dict(enumerate(level_views(cells.state, cells.sizes, first=1), start=1))
@@ -136,26 +113,14 @@ def states(discontinuous: Levels, covered: Array, diagonal: Diagonal) -> dict[in
 def subsplats(covered: Array, cell_states: Levels, traversal: Traversal) -> tuple[Array, Array, Array, Array]:
     """List the subsplats, depth first within the coarsest cells row by row (AMS Sec. 3.3; E-AMS-08, E-AMS-11).
 
-    Parameters
-    ----------
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    cell_states : tuple of (h_l, w_l) ndarray of uint8
-        States of the cells of levels 1 to top.
-    traversal : str
-        Depth first, or pass by pass: the same list.
-
-    Returns
-    -------
-    level : (subsplat) ndarray of uint8
-        Level: cell of 2^level pixels a side. A cell's four follow top left, top right, bottom left, bottom right.
-    row : (subsplat) ndarray of int32
-        Row in the grid of its level.
-    column : (subsplat) ndarray of int32
-        Column in the grid of its level.
-    pixel : (subsplat) ndarray of int64
-        Row * width + column of the pixel right and below of the cell's centre, or of the nearest that shows a surface,
-        the first of several.
+    cell_states tuple of (h_l, w_l) uint8: States of the cells of levels 1 to top.
+    traversal: Depth first, or pass by pass: the same list.
+    -> level (subsplat) uint8: Level: cell of 2^level pixels a side. A cell's four follow top left, top right, bottom
+        left, bottom right.
+    -> row (subsplat) int32: Row in the grid of its level.
+    -> column (subsplat) int32: Column in the grid of its level.
+    -> pixel (subsplat) int64: Row * width + column of the pixel right and below of the cell's centre, or of the nearest
+        that shows a surface, the first of several.
     """
     (height, width), top = covered.shape, len(cell_states)
     flat = np.concatenate([np.zeros(0, np.uint8), *(one.reshape(-1) for one in cell_states)])

@@ -19,23 +19,11 @@ def surface_detail(
 ) -> Array:
     """Darken what faces away from the camera: E (a <V, N> + 1 - a) (AMS Eq. 3).
 
-    Parameters
-    ----------
-    irradiance : (3, h, w) ndarray
-        Indirect irradiance, W/m^2.
-    position, normal : (3, h, w) ndarray
-        World space, m; unit normal on the camera's side.
-    covered : (h, w) ndarray of bool
-        Whether there is a surface.
-    eye : (3,) or (1, 3) array_like
-        Where the camera is, m.
-    a : float
-        How much, 0 (nothing changes) to 1; the paper shows 0.5.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2; 0 where there is no surface.
+    irradiance (3, h, w): Indirect irradiance, W/m^2.
+    normal (3, h, w): Unit normals on the camera's side.
+    eye (3,) or (1, 3): Where the camera is, m.
+    a: How much, 0 (nothing changes) to 1; the paper shows 0.5.
+    -> (3, h, w): Irradiance, W/m^2; 0 where there is no surface.
 
     Raises
     ------

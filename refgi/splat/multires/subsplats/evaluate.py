@@ -48,19 +48,9 @@ def representative_points(
 ) -> tuple[Array, Array]:
     """Return the point at which each subsplat is evaluated.
 
-    Parameters
-    ----------
-    buffer : GBuffer
-        The camera's G-buffer.
-    subsplats : Subsplats
-        The n subsplats.
-    representative : {"pixel", "mean"}
-        Position and normal of the cell's representative pixel, or the mean over the cell's surface.
-
-    Returns
-    -------
-    points, normals : (3, n) ndarray
-        World space, m, and unit vectors.
+    representative: Position and normal of the cell's representative pixel, or the mean over the cell's surface.
+    -> points (3, n): World space, m.
+    -> normals (3, n): Unit normals there.
     """
     position, normal = buffer.resolve("position", "normal")
     return points_of(position, normal, buffer.covered, subsplats, representative)
@@ -90,24 +80,11 @@ def evaluate(
 ) -> Array:
     """Sum the irradiance of every pixel light at some points (Eq. 2).
 
-    Parameters
-    ----------
-    points, normals : (3, n) ndarray
-        World space, m, and unit vectors; neighbours should follow each other.
-    lights : PixelLights
-        The lights to sum.
-    settings : PairSettings
-        Clamp, offset and lobes of a pair of light and receiver.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-    lightcuts : Lightcuts, optional
-        Sum diffuse lights by clusters, to an error.
-
-    Returns
-    -------
-    (3, n) ndarray
-        Irradiance, W/m^2, linear RGB: that of `irradiance` at the same points, to the bit; with lightcuts within their
-        error.
+    points (3, n): World space, m; neighbours should follow each other.
+    normals (3, n): Unit normals there.
+    lightcuts: Sum diffuse lights by clusters, to an error.
+    -> (3, n): Irradiance, W/m^2, linear RGB: that of `irradiance` at the same points, to the bit; with lightcuts within
+        their error.
 
     Raises
     ------
@@ -180,23 +157,8 @@ def evaluate_visible(
 ) -> Array:
     """Sum the irradiance that reaches each subsplat's representative pixel from every pixel light, by shadow rays.
 
-    Parameters
-    ----------
-    tracer : Tracer
-        The scene's Embree tracer.
-    geometry : Geometry
-        The triangles that the G-buffer's ids refer to.
-    buffer : GBuffer
-        The camera's G-buffer.
-    subsplats : Subsplats
-        The n subsplats.
-    lights : PixelLights
-        The lights to sum.
-
-    Returns
-    -------
-    (3, n) ndarray
-        Irradiance, W/m^2, linear RGB, in the buffer's dtype: that of `vpl` for the same lights, to the bit.
+    geometry: The triangles that the G-buffer's ids refer to.
+    -> (3, n): Irradiance, W/m^2, linear RGB, in the buffer's dtype: that of `vpl` for the same lights, to the bit.
         Excludes the receiver's albedo/pi.
 
     Notes
@@ -240,25 +202,9 @@ def evaluate_shadowed(
 ) -> Array:
     """Sum the irradiance of every pixel light under the soft shadow of its cluster, at representative pixels.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene, in which clusters cast shadows.
-    buffer : GBuffer
-        The camera's G-buffer.
-    subsplats : Subsplats
-        The n subsplats.
-    lights : PixelLights
-        The N lights to sum.
-    settings : ValSettings
-        Clusters, maps and visibility; how one light lights one receiver.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-
-    Returns
-    -------
-    (3, n) ndarray
-        Irradiance, W/m^2, linear RGB: that of `val` at the same pixels, to the bit. Excludes the receiver's albedo/pi.
+    frame: The scene, in which clusters cast shadows.
+    -> (3, n): Irradiance, W/m^2, linear RGB: that of `val` at the same pixels, to the bit. Excludes the receiver's
+        albedo/pi.
 
     Notes
     -----

@@ -26,23 +26,11 @@ def subsplat_facing(
 ) -> Array:
     """Find the normal of the face that each subsplat's pixel sees (docs/conventions).
 
-    Parameters
-    ----------
-    vertices : (n, 3) ndarray
-        Vertices of the scene, m.
-    faces : (m, 3) ndarray of int32
-        Its triangles.
-    point_normal : (3, n) ndarray
-        Normals of the subsplats.
-    triangle_id : (h, w) ndarray of int32
-        Triangle that each pixel sees.
-    pixel : (n,) ndarray
-        Pixel of each subsplat.
-
-    Returns
-    -------
-    (xyz, subsplat) ndarray
-        Unit normal of the face, on the side of the subsplat's normal.
+    vertices (n, 3): Vertices of the scene, m.
+    faces (m, 3) int32: Its triangles.
+    point_normal (3, n): Normals of the subsplats.
+    pixel (n,): Pixel of each subsplat.
+    -> (xyz, subsplat): Unit normal of the face, on the side of the subsplat's normal.
     """
     geometry = Geometry(vertices, faces, np.zeros(len(faces), np.int32))
     of = triangle_id.reshape(-1)[pixel]
@@ -56,26 +44,12 @@ def lights_seen(
 ) -> Array:
     """Trace whether light reaches each subsplat from each pixel light (SII Eq. 2 with V).
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    point, point_normal : (3, n) ndarray
-        The subsplats, m.
-    triangle_id : (h, w) ndarray of int32
-        Triangle that each pixel sees.
-    pixel : (n,) ndarray
-        Pixel of each subsplat.
-    face_normal : (3, n) ndarray
-        Normals of the subsplats' faces.
-    light_position, light_normal : (3, N) ndarray
-        The lights, m.
-
-    Returns
-    -------
-    (light, subsplat) ndarray of bool
-        True where the subsplat's point, its normal and its face look at the light, it at them, and nothing lies
-        between.
+    point (3, n): The subsplats, m.
+    point_normal (3, n): Their unit normals.
+    pixel (n,): Pixel of each subsplat.
+    face_normal (3, n): Normals of the subsplats' faces.
+    -> (light, subsplat) bool: True where the subsplat's point, its normal and its face look at the light, it at them,
+        and nothing lies between.
     """
     tracer = Tracer(geometry)
     to = receivers(geometry, point, point_normal, triangle_id.reshape(-1)[pixel], tracer.grain)
@@ -105,23 +79,10 @@ def seen_irradiance(
 ) -> Array:
     """Sum the irradiance of the lights that each subsplat sees, without albedo/pi (AMS Eq. 2 with V; E-AMS-02).
 
-    Parameters
-    ----------
-    point, point_normal : (3, n) ndarray
-        The subsplats, m.
-    seen : (N, n) ndarray of bool
-        Which lights reach which.
-    light_position, light_normal : (3, N) ndarray
-        The lights, m.
-    flux : (3, N) ndarray
-        Diffuse flux, W.
-    lobe_flux, lobe_axis, lobe_exponent : ndarray or None
-        Their lobes.
-
-    Returns
-    -------
-    (rgb, subsplat) ndarray
-        Indirect irradiance, W/m^2.
+    point (3, n): The subsplats, m.
+    point_normal (3, n): Their unit normals.
+    seen (light, n) bool: Which lights reach which.
+    -> (rgb, subsplat): Indirect irradiance, W/m^2.
     """
     at, up = (np.ascontiguousarray(one, np.float32) for one in (point, point_normal))
     count, total = flux.shape[1], np.zeros((3, point.shape[1]))

@@ -27,23 +27,10 @@ Array = npt.NDArray[Any]
 def one_row(position: Array, normal: Array, triangle_id: Array, pixel: Array) -> tuple[Array, Array, Array]:
     """Take the pixels of subsplats for a picture of one row (AMS Sec. 3.4; E-AMS-11).
 
-    Parameters
-    ----------
-    position, normal : (3, h, w) ndarray
-        Surface points, m, and unit normals.
-    triangle_id : (h, w) ndarray of int32
-        Triangle that each pixel sees.
-    pixel : (n,) ndarray
-        Pixel of each subsplat.
-
-    Returns
-    -------
-    position : (xyz, row, subsplat) ndarray
-        Surface point, m.
-    normal : (xyz, row, subsplat) ndarray
-        Its unit normal.
-    triangle_id : (row, subsplat) ndarray of int32
-        Triangle that it lies on.
+    pixel (n,): Pixel of each subsplat.
+    -> position (xyz, row, subsplat): Surface point, m.
+    -> normal (xyz, row, subsplat): Its unit normal.
+    -> triangle_id (row, subsplat) int32: Triangle that it lies on.
     """
     return (taken(position, pixel)[:, None], taken(normal, pixel)[:, None],
             np.ascontiguousarray(triangle_id.reshape(-1)[None, pixel]))
@@ -53,15 +40,8 @@ def one_row(position: Array, normal: Array, triangle_id: Array, pixel: Array) ->
 def of_row(irradiance: Array) -> Array:
     """Return the light of a picture of one row to the list of subsplats (AMS Sec. 3.4).
 
-    Parameters
-    ----------
-    irradiance : (3, 1, n) ndarray
-        Irradiance of the row, W/m^2.
-
-    Returns
-    -------
-    (rgb, subsplat) ndarray
-        Indirect irradiance, W/m^2.
+    irradiance (3, 1, n): Irradiance of the row, W/m^2.
+    -> (rgb, subsplat): Indirect irradiance, W/m^2.
     """
     return np.ascontiguousarray(irradiance[:, 0])
 

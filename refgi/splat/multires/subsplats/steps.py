@@ -1,4 +1,7 @@
-"""Light at subsplats and its upsampling one step after the other: points, Eq. 2, levels of the picture."""
+"""Light at subsplats and its upsampling one step after the other: points, Eq. 2, levels of the picture.
+
+- level, row, column (subsplat) int: The list of subsplats.
+"""
 
 from typing import TYPE_CHECKING, Any
 
@@ -34,25 +37,10 @@ def points(
 ) -> tuple[Array, Array]:
     """Find the point and normal that each subsplat is evaluated at (AMS Sec. 3.4; E-AMS-11).
 
-    Parameters
-    ----------
-    position : (3, h, w) ndarray
-        Surface points, m.
-    normal : (3, h, w) ndarray
-        Unit normals.
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    level, row, column, pixel : (subsplat) ndarray
-        The list of subsplats.
-    representative : str
-        Its representative pixel's, or the mean surface's.
-
-    Returns
-    -------
-    point : (xyz, subsplat) ndarray
-        Surface point, m.
-    normal : (xyz, subsplat) ndarray
-        Its unit normal.
+    pixel (subsplat) int: Each one's representative.
+    representative: Its representative pixel's, or the mean surface's.
+    -> point (xyz, subsplat): Surface point, m.
+    -> normal (xyz, subsplat): Its unit normal.
     """
     cells = Subsplats(level, row, column, pixel, (), covered.shape)
     return points_of(position, normal, covered, cells, representative)
@@ -73,29 +61,10 @@ def subsplat_irradiance(
 ) -> Array:
     """Sum the irradiance of every pixel light at every subsplat, without albedo/pi (AMS Eq. 2; E-AMS-02).
 
-    Parameters
-    ----------
-    point : (3, n) ndarray
-        Surface points, m.
-    point_normal : (3, n) ndarray
-        Unit normals.
-    light_position : (3, N) ndarray
-        Pixel lights, m.
-    light_normal : (3, N) ndarray
-        Their unit normals.
-    flux : (3, N) ndarray
-        Diffuse flux, W.
-    lobe_flux, lobe_axis, lobe_exponent : ndarray or None
-        Their lobes.
-    area : (N,) ndarray or None
-        Surface that each stands for, m^2, where the clamp reads it.
-    pairs : PairSettings
-        How one light lights one point.
-
-    Returns
-    -------
-    (rgb, subsplat) ndarray
-        Indirect irradiance, W/m^2.
+    point (3, n): Surface points, m.
+    point_normal (3, n): Unit normals.
+    area (light,): Surface that each stands for, m^2, where the clamp reads it.
+    -> (rgb, subsplat): Indirect irradiance, W/m^2.
     """
     lights = PixelLights(light_position, light_normal, flux, lobe_flux, lobe_axis, lobe_exponent, flux.shape[1])
     return sum_at(point, point_normal, lights, pairs, area)
@@ -127,31 +96,16 @@ def upsample_level(
 ) -> tuple[Array, Array]:
     """Make the light of a level from that of the level above and subsplats (AMS Sec. 3.5; E-AMS-09).
 
-    Parameters
-    ----------
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    level, row, column : (subsplat) ndarray
-        The list of subsplats.
-    irradiance : (rgb, subsplat) ndarray
-        Their light, W/m^2.
-    at : int
-        The level.
-    mode : str
-        Weights (1, 2, 1) x (1, 2, 1) of the level itself ("tent"), or (1 - f, 1, f) / 2 on the coarser level ("demo").
-    filter_all, corner_rule : bool
-        Whether leaves are filtered too; whether a cell across a corner counts only beside one that counts.
-    coarse : (3, h', w') ndarray, optional
-        Light of the level above, W/m^2; none above the coarsest.
-    coarse_known : (h', w') ndarray of bool, optional
-        Its cells with light.
-
-    Returns
-    -------
-    light : (rgb, h_l, w_l) ndarray
-        Indirect irradiance, W/m^2; 0 where the mask is false.
-    known : (h_l, w_l) ndarray of bool
-        Cells with light: evaluated here or coarser, with surface.
+    irradiance (rgb, subsplat): Light at the subsplats, W/m^2.
+    at: The level.
+    mode: Weights (1, 2, 1) x (1, 2, 1) of the level itself ("tent"), or (1 - f, 1, f) / 2 on the coarser level
+        ("demo").
+    filter_all, corner_rule: Whether leaves are filtered too; whether a cell across a corner counts only beside one that
+        counts.
+    coarse (3, h', w'): Light of the level above, W/m^2; none above the coarsest.
+    coarse_known (h', w') bool: Its cells with light.
+    -> light (rgb, h_l, w_l): Indirect irradiance, W/m^2; 0 where the mask is false.
+    -> known (h_l, w_l) bool: Cells with light: evaluated here or coarser, with surface.
     """
     top = max(int(level.max(initial=0)), at + (coarse is not None))
     listed, filled = subsplats_of(covered, level, row, column, top), filled_cells(covered, at)[at]
@@ -167,24 +121,10 @@ def upsample_at_once(
 ) -> Array:
     """Fill pixels from subsplats without levels (AMS Sec. 3.5, Fig. 7).
 
-    Parameters
-    ----------
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    level, row, column : (subsplat) ndarray
-        The list of subsplats.
-    irradiance : (rgb, subsplat) ndarray
-        Their light, W/m^2.
-    top : int
-        Coarsest level.
-    mode : str
-        Each pixel has the light of its subsplat ("nearest"), or the sum of all levels, each interpolated as if it were
-        black where it holds nothing ("naive_bilinear").
-
-    Returns
-    -------
-    (rgb, h, w) ndarray
-        Indirect irradiance, W/m^2; 0 without surface.
+    irradiance (rgb, subsplat): Light at the subsplats, W/m^2.
+    mode: Each pixel has the light of its subsplat ("nearest"), or the sum of all levels, each interpolated as if it
+        were black where it holds nothing ("naive_bilinear").
+    -> (rgb, h, w): Indirect irradiance, W/m^2; 0 without surface.
     """
     if mode == "nearest":
         return of_own_subsplat(irradiance, level, row, column, covered)

@@ -92,27 +92,14 @@ def upsample(
 ) -> Array:
     """Interpolate the irradiance of subsplats at every pixel.
 
-    Parameters
-    ----------
-    values : (3, n) ndarray
-        Irradiance at the subsplats, W/m^2.
-    subsplats : Subsplats
-        The n subsplats.
-    covered : (h, w) ndarray of bool
-        Whether a pixel shows a surface.
-    mode : str
-        "tent": each texel is the weighted mean of the 3 x 3 around it that hold irradiance; "demo": of the coarser
+    values (3, n): Irradiance at the subsplats, W/m^2.
+    mode: "tent": each texel is the weighted mean of the 3 x 3 around it that hold irradiance; "demo": of the coarser
         texels around, as in the authors' demo; "nearest": each pixel has the irradiance of its subsplat;
         "naive_bilinear": the sum of all layers, each interpolated as if it were black where it holds nothing.
-    filter_all : bool
-        Filter texels that were evaluated at a level as well, not only those from a coarser one ("tent", "demo").
-    corner_rule : bool
-        Count a diagonal texel only where one of the two beside it holds irradiance ("tent").
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Irradiance, W/m^2; 0 where a pixel shows no surface.
+    filter_all: Filter texels that were evaluated at a level as well, not only those from a coarser one ("tent",
+        "demo").
+    corner_rule: Count a diagonal texel only where one of the two beside it holds irradiance ("tent").
+    -> (3, h, w): Irradiance, W/m^2; 0 where a pixel shows no surface.
 
     Raises
     ------

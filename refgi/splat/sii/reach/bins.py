@@ -55,17 +55,9 @@ def pack_solids(solids: Solids, back: Array, *, hollow: bool = False, nearest: b
 def list_lights(position: Array, normal: Array, solids: Array) -> Array:
     """List the lights whose bound may reach each tile of receivers.
 
-    Parameters
-    ----------
-    position, normal : (3, n) ndarray
-        Receivers, block by block.
-    solids : (SOLID_ROWS, N) ndarray
-        The lights' bounds.
-
-    Returns
-    -------
-    (ceil(n / LANES), N) ndarray of bool
-        Whether a light may count for some receiver of a tile.
+    position, normal (3, n): Receivers, block by block.
+    solids (SOLID_ROWS, light): The lights' bounds.
+    -> (ceil(n / LANES), N) bool: Whether a light may count for some receiver of a tile.
     """
     listed = zeros((-(-position.shape[1] // LANES), solids.shape[1]), np.bool_)
     _list(position, normal, solids, bool((solids[BALL] > 0).any()), listed)

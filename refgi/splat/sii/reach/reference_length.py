@@ -91,19 +91,8 @@ def with_reference_length(receivers: Receivers, lights: "PixelLights", settings:
 def reference_length(receivers: Receivers, lights: "PixelLights", pairs: PairSettings) -> float:
     """Return the length under which lights cut at 5 % count at 125 / 768 of the pixels on average.
 
-    Parameters
-    ----------
-    receivers : Receivers
-        The picture's points.
-    lights : PixelLights
-        Lights; those drawn without flux count as lights that reach nothing, as they do in the paper.
-    pairs : PairSettings
-        Offset, norms and widening.
-
-    Returns
-    -------
-    float
-        Length, m; 1 where there is nothing to cut.
+    lights: Lights; those drawn without flux count as lights that reach nothing, as they do in the paper.
+    -> float: Length, m; 1 where there is nothing to cut.
     """
     return picture_length(receivers, lights, pairs)
 

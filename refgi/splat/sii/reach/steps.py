@@ -2,6 +2,9 @@
 
 B = I(w) / r^2 is the irradiance that a light causes at most; the largest channel of its intensity counts. A pair counts
 where B >= I_low, one irradiance for all lights; the parts of a light, diffuse and glossy, have each their own range.
+
+- pairs: Norms of lobes.
+- low (one,): I_low, W/m^2.
 """
 
 import dataclasses
@@ -30,19 +33,8 @@ Parts = tuple[Array, Array | None]  # diffuse, glossy: None where no light is gl
 def peaks(lights: PixelLights, pairs: PairSettings) -> Parts:
     """Compute I_0, the peak intensity of each part of each light (SII Sec. 3.4; E-SII-11).
 
-    Parameters
-    ----------
-    lights : PixelLights
-        The lights.
-    pairs : PairSettings
-        Norms of lobes.
-
-    Returns
-    -------
-    diffuse_peak : (light,) ndarray
-        Largest channel of I_0 of the diffuse part, W/sr; 0 without it.
-    glossy_peak : (light,) ndarray
-        That of the lobe, W/sr; 0 without it.
+    -> diffuse_peak (light,): Largest channel of I_0 of the diffuse part, W/sr; 0 without it.
+    -> glossy_peak (light,): That of the lobe, W/sr; 0 without it.
     """
     packed = _packed(lights, pairs)
     diffuse, lobes = all_peaks(packed)
@@ -53,21 +45,9 @@ def peaks(lights: PixelLights, pairs: PairSettings) -> Parts:
 def strengths(receivers: Receivers, lights: PixelLights, pairs: PairSettings) -> Parts:
     """Compute B, what each light causes at each pixel at most (SII Sec. 3.4; E-SII-11).
 
-    Parameters
-    ----------
-    receivers : Receivers
-        The pixels' points.
-    lights : PixelLights
-        The lights.
-    pairs : PairSettings
-        Norms of lobes.
-
-    Returns
-    -------
-    diffuse_strength : (light, h, w) ndarray
-        I(w) / r^2 of the diffuse part, W/m^2, without the pixel's cosine; 0 without surface.
-    glossy_strength : (light, h, w) ndarray
-        That of the lobe, W/m^2.
+    -> diffuse_strength (light, h, w): I(w) / r^2 of the diffuse part, W/m^2, without the pixel's cosine; 0 without
+        surface.
+    -> glossy_strength (light, h, w): That of the lobe, W/m^2.
     """
     here = receivers.covered.reshape(-1)
     position = np.ascontiguousarray(np.asarray(receivers.position, np.float64).reshape(3, -1)[:, here])
@@ -84,20 +64,10 @@ def strengths(receivers: Receivers, lights: PixelLights, pairs: PairSettings) ->
 def reference_length(receivers: Receivers, lights: PixelLights, pairs: PairSettings) -> Array:
     """Find the length under which 5 % of the largest peak leave 125 of 768 pairs (SII Fig. 8; E-SII-11).
 
-    Parameters
-    ----------
-    receivers : Receivers
-        The pixels' points.
-    lights : PixelLights
-        The lights; those drawn without flux count as well.
-    pairs : PairSettings
-        Norms of lobes.
-
-    Returns
-    -------
-    (one,) ndarray
-        sqrt(0.05 / b), m: b the k-th largest B over the largest I_0 of all pairs of part and pixel, k = 125/768 of all
-        pairs of drawn light and pixel, rounded; at most 10 diagonals of pixels and lights; 1 where nothing is lit.
+    lights: The lights; those drawn without flux count as well.
+    -> (one,): sqrt(0.05 / b), m: b the k-th largest B over the largest I_0 of all pairs of part and pixel, k = 125/768
+        of all pairs of drawn light and pixel, rounded; at most 10 diagonals of pixels and lights; 1 where nothing is
+        lit.
     """
     return np.array([picture_length(receivers, lights, pairs)])
 
@@ -106,19 +76,10 @@ def reference_length(receivers: Receivers, lights: PixelLights, pairs: PairSetti
 def low_irradiance(length: Array, diffuse_peak: Array, glossy_peak: Array | None, share: float) -> Array:
     """Compute I_low, a share of max I_0 over L^2 (SII Sec. 3.4; E-SII-11).
 
-    Parameters
-    ----------
-    length : (one,) ndarray
-        Reference length L, m.
-    diffuse_peak, glossy_peak : (light,) ndarray
-        Peak intensities of the parts of lights, W/sr.
-    share : float
-        Of the largest peak.
-
-    Returns
-    -------
-    (one,) ndarray
-        Irradiance under which pairs are left out, W/m^2; 0 without lights.
+    length (one,): Reference length L, m.
+    diffuse_peak, glossy_peak (light,): Peak intensities of the parts of lights, W/sr.
+    share: Of the largest peak.
+    -> (one,): Irradiance under which pairs are left out, W/m^2; 0 without lights.
     """
     peak = diffuse_peak if glossy_peak is None else np.concatenate([diffuse_peak, glossy_peak])
     return np.array([threshold(peak, ReachSettings(cut=RelativeCut(share, float(length[0]))))], diffuse_peak.dtype)
@@ -128,23 +89,11 @@ def low_irradiance(length: Array, diffuse_peak: Array, glossy_peak: Array | None
 def squares(low: Array, length: Array, diffuse_peak: Array, glossy_peak: Array | None, share: float) -> Parts:  # noqa: ARG001
     """Compute R_0^2 = I_0 / I_low of each part of each light (SII Sec. 3.4; E-SII-11).
 
-    Parameters
-    ----------
-    low : (one,) ndarray
-        I_low, W/m^2.
-    length : (one,) ndarray
-        Reference length, m, of wrong ones.
-    diffuse_peak, glossy_peak : (light,) ndarray
-        Peak intensities of the parts of lights, W/sr.
-    share : float
-        Of the largest peak, of wrong ones.
-
-    Returns
-    -------
-    diffuse_square : (light,) ndarray
-        Square of the largest distance at which the diffuse part counts, m^2.
-    glossy_square : (light,) ndarray
-        That of the lobe, m^2.
+    length (one,): Reference length, m, of wrong ones.
+    diffuse_peak, glossy_peak (light,): Peak intensities of the parts of lights, W/sr.
+    share: Of the largest peak, of wrong ones.
+    -> diffuse_square (light,): Square of the largest distance at which the diffuse part counts, m^2.
+    -> glossy_square (light,): That of the lobe, m^2.
     """
     diffuse, glossy = (None if peak is None else light_range(
         peak, float(low[0]), ReachSettings(cut=None), part, diffuse_peak.dtype).square
@@ -157,19 +106,9 @@ def squares(low: Array, length: Array, diffuse_peak: Array, glossy_peak: Array |
 def kept(low: Array, diffuse_strength: Array, glossy_strength: Array | None) -> Parts:
     """Find the pairs that count: B >= I_low (SII Sec. 3.4; E-SII-11).
 
-    Parameters
-    ----------
-    low : (one,) ndarray
-        I_low, W/m^2.
-    diffuse_strength, glossy_strength : (light, h, w) ndarray
-        B of the parts of lights, W/m^2.
-
-    Returns
-    -------
-    diffuse_kept : (light, h, w) ndarray of bool
-        True where the diffuse part counts; never where B is 0.
-    glossy_kept : (light, h, w) ndarray of bool
-        True where the lobe counts.
+    diffuse_strength, glossy_strength (light, h, w): B of the parts of lights, W/m^2.
+    -> diffuse_kept (light, h, w) bool: True where the diffuse part counts; never where B is 0.
+    -> glossy_kept (light, h, w) bool: True where the lobe counts.
     """
     diffuse, glossy = (None if one is None else (one >= low[0]) & (one > 0)
                        for one in (diffuse_strength, glossy_strength))
@@ -184,25 +123,8 @@ def range_sum(
 ) -> Array:
     """Sum the irradiance of the pairs that count (SII Sec. 3.4; E-SII-11).
 
-    Parameters
-    ----------
-    diffuse_kept, glossy_kept : (light, h, w) ndarray of bool
-        Pairs that count, as a port may read them; here B is compared anew.
-    receivers : Receivers
-        The pixels' points.
-    lights : PixelLights
-        The lights.
-    footprint : (light,) ndarray, optional
-        Surface that each light stands for, m^2.
-    low : (one,) ndarray
-        I_low, W/m^2.
-    pairs : PairSettings
-        How one light lights one receiver.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Indirect irradiance, W/m^2, without visibility and albedo/pi.
+    diffuse_kept, glossy_kept (light, h, w) bool: Pairs that count, as a port may read them; here B is compared anew.
+    -> (3, h, w): Indirect irradiance, W/m^2, without visibility and albedo/pi.
     """
     if low[0] <= 0:
         return summed(receivers, lights, pairs, footprint)
@@ -214,21 +136,7 @@ def range_sum(
 def other_ranges(receivers: Receivers, lights: PixelLights, settings: SiiSettings, footprint: Array | None) -> Array:
     """Sum the irradiance of pairs within ranges that are drawn, or of each light alone (SII Sec. 3.4).
 
-    Parameters
-    ----------
-    receivers : Receivers
-        The pixels' points.
-    lights : PixelLights
-        The lights.
-    settings : SiiSettings
-        Cut, and how one light lights one receiver.
-    footprint : (light,) ndarray, optional
-        Surface that each light stands for, m^2.
-
-    Returns
-    -------
-    (3, h, w) ndarray
-        Indirect irradiance, W/m^2, without visibility and albedo/pi.
+    -> (3, h, w): Indirect irradiance, W/m^2, without visibility and albedo/pi.
     """
     plain = dataclasses.replace(settings, reach=dataclasses.replace(settings.reach, bound=FullBound()))
     return sum_in_range(receivers, lights, plain, footprint)
@@ -238,25 +146,13 @@ def other_ranges(receivers: Receivers, lights: PixelLights, settings: SiiSetting
 def ellipsoids(exponent: Array) -> tuple[Array, ...]:
     """Bound the region where B >= I_low by ellipsoids of revolution (SII Eq. 7 and 8; E-SII-12, E-SII-13).
 
-    Parameters
-    ----------
-    exponent : (shape,) ndarray
-        Exponent n of cos^n; 1: diffuse.
-
-    Returns
-    -------
-    appendix_center : (shape,) ndarray
-        Centre along the axis of the one that is centred where the region is widest, in R_0.
-    appendix_half_width : (shape,) ndarray
-        Its half axis along the axis, in R_0.
-    appendix_height : (shape,) ndarray
-        Its half axis across, in R_0.
-    tangent_center : (shape,) ndarray
-        Centre along the axis of the least wasteful one through the light, in R_0.
-    tangent_half_width : (shape,) ndarray
-        Its half axis along the axis, in R_0.
-    tangent_height : (shape,) ndarray
-        Its half axis across, in R_0.
+    exponent (shape,): Exponent n of cos^n; 1: diffuse.
+    -> appendix_center (shape,): Centre along the axis of the one that is centred where the region is widest, in R_0.
+    -> appendix_half_width (shape,): Its half axis along the axis, in R_0.
+    -> appendix_height (shape,): Its half axis across, in R_0.
+    -> tangent_center (shape,): Centre along the axis of the least wasteful one through the light, in R_0.
+    -> tangent_half_width (shape,): Its half axis along the axis, in R_0.
+    -> tangent_height (shape,): Its half axis across, in R_0.
     """
     return tuple(np.asarray(one, exponent.dtype) for one in (*appendix_ellipsoid(exponent),
                                                              *tangent_ellipsoid(exponent)))

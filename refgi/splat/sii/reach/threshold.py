@@ -87,23 +87,8 @@ def cut_loss(
 ) -> float:
     """Return the share of the light that the threshold leaves out of a picture.
 
-    Parameters
-    ----------
-    light : (3, h, w) ndarray
-        The picture's irradiance, W/m^2.
-    receivers : Receivers
-        Its points.
-    lights : PixelLights
-        Its lights.
-    settings : SiiSettings
-        How one light lights one receiver.
-    footprint : (N,) ndarray, optional
-        Surface area each light stands for, m^2; needed by the clamps "disc" and "sphere" alone.
-
-    Returns
-    -------
-    float
-        Of the light without visibility, at sampled pixels.
+    light (3, h, w): The picture's irradiance, W/m^2.
+    -> float: Of the light without visibility, at sampled pixels.
     """
     sample = sample_for(receivers, lights)
     cut = light.reshape(3, -1)[:, sample.place]

@@ -6,6 +6,7 @@ reads, and versions and sources of what compiles it; comments, docstrings, line 
 no part of it. Intrinsics, and overloads registered by `refgi.jit.by_type`, count with their code as well.
 """
 
+import dis
 import hashlib
 import os
 import sys
@@ -26,6 +27,7 @@ COMPILERS = ("dispatch.py", "bands.py", "launcher.py")  # of this package
 TARGET = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE", "NUMBA_OPT",
           "NUMBA_SLP_VECTORIZE")
 OVERLOADS = "__overloads__"  # attribute of a function that stands for others, by argument types
+READS = frozenset({"LOAD_GLOBAL", "LOAD_NAME"})  # operations that read a global
 EXACT = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
 
 
@@ -57,7 +59,7 @@ def _function(function: Callable[..., Any], known: set[int]) -> Iterator[str]:
     yield from _value(function.__defaults__, known)
     for cell in function.__closure__ or ():
         yield from _value(cell.cell_contents, known)
-    for name in _names(function.__code__):
+    for name in _names(function.__code__, READS):
         if name in function.__globals__:
             yield name
             yield from _value(function.__globals__[name], known, _names(function.__code__))
@@ -75,10 +77,12 @@ def _code(code: CodeType) -> Iterator[str]:
             yield repr(constant)
 
 
-def _names(code: CodeType) -> list[str]:
-    """Return the globals and attributes that code and the functions in it name."""
-    nested = (name for constant in code.co_consts if isinstance(constant, CodeType) for name in _names(constant))
-    return sorted({*code.co_names, *nested})
+def _names(code: CodeType, operations: frozenset[str] | None = None) -> list[str]:
+    """Return the globals and attributes that code and the functions in it name, or those of some operations."""
+    nested = (name for one in code.co_consts if isinstance(one, CodeType) for name in _names(one, operations))
+    own = code.co_names if operations is None else (
+        step.argval for step in dis.get_instructions(code) if step.opname in operations)
+    return sorted({*own, *nested})
 
 
 def _value(value: Any, known: set[int], names: list[str] | tuple[str, ...] = ()) -> Iterator[str]:

@@ -141,6 +141,20 @@ def test_intrinsics_count_with_their_code():
     assert key(text) != key(text.replace(", 7)", ", 8)"))
 
 
+def test_a_global_with_an_attributes_name_does_not_count():
+    text = """
+        import numpy as np
+        from refgi.jit import kernel
+
+        zeros = object()  # a place in memory that is another one in each process
+
+        @kernel
+        def outer(n):
+            return np.zeros(n)
+        """
+    assert key(text) == key(text.replace("object()", "None"))
+
+
 @cache
 def kernels() -> dict[str, str]:
     modules = [import_module(name) for _, name, _ in walk_packages(refgi.__path__, "refgi.")

@@ -17,14 +17,11 @@ from benchmarks.harness import real_scene
 from refgi.bench.error import without_noise
 from refgi.bench.grid import Grid, built_in
 from refgi.bench.measure import bench_scene
-from refgi.bench.overview import Place, overview
-from refgi.bench.report import plot_of
+from refgi.bench.report import Place, bars, overview, plot_of
 from refgi.bench.results import Result, Run, SceneResult, write_results
 from refgi.bench.split import with_splits
-from refgi.bench.split_plot import bars
 from refgi.cli.session import progress
-from refgi.compare.provenance import environment
-from refgi.compare.report import PAGE, number
+from refgi.compare.report import PAGE, environment, number
 from refgi.errors import RefgiWarning
 from refgi.image import write_text
 from refgi.scene import load_scene

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.accuracy import standalone
-from refgi.bench.curves import front
+from refgi.bench.error import front
 from refgi.bench.folder import read_result
 from refgi.bench.results import Run, SceneResult
 from refgi.compare.plot import Axes, Curve, curves_plot

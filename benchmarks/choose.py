@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 from benchmarks.harness import Row, real_scene
 from refgi.bench.choose import Pictures, Wish, choose
-from refgi.bench.grid import Choice
-from refgi.bench.tracks import Track, built_in_tracks
+from refgi.bench.grid import Choice, Track, built_in_tracks
 from refgi.scene import Scene, load_scene
 
 SIZE = {"width": 160, "height": 120, "shadows": "exact"}

@@ -17,7 +17,7 @@ from benchmarks.harness import Row, ratio, seconds
 from refgi.jit import threads
 from refgi.settings import of
 from refgi.sssil import HssilSettings
-from refgi.sssil.crown.add import ROWS, WIDE, add_two, term
+from refgi.sssil.crown.form_factor import ROWS, WIDE, add_two, term
 from refgi.sssil.crown.gather import gather
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import PRESETS

@@ -9,7 +9,6 @@ import ctypes
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
@@ -18,8 +17,8 @@ from refgi.jit import kernel, prange
 from refgi.rays import embree
 from refgi.rsm.raster.projection import Projection
 from refgi.scene import Geometry
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 WIDE, HIGH, LANES = 4, 2, 8
 # rows of a packet: origin, tnear, direction, time, tfar, mask, id, flags; normal, u, v, triangle, geometry, 2 instances
 ROWS, DIRECTION, REACH, MASK, HIT, GEOMETRY = 21, 4, 8, 9, 17, 18

@@ -23,7 +23,7 @@ from rich.table import Table
 
 from refgi.testing import kit_folder
 from refgi.vectors.check import ALL_WITHIN, Asked, Kit, check_output
-from refgi.vectors.edits import StaleEditError, replaced
+from refgi.vectors.rows import StaleEditError, replaced
 from refgi.vectors.search import searched
 from refgi.vectors.spec import kind_of
 

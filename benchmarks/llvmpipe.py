@@ -9,11 +9,10 @@ import os
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.scene import Scene
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 NEAR, FAR = 1e-3, 1e3  # of the scene's diagonal
 
 VERTEX = """

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.harness import Row, ratio
 from refgi.cluster.filters import mip as reading
-from refgi.cluster.filters.depth_scale import DepthScale
+from refgi.cluster.filters.basis import DepthScale
 from refgi.cluster.filters.mip import Mip, build_mip, mip_means, mip_of, mips
 from refgi.jit import kernel
 

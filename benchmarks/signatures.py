@@ -12,7 +12,7 @@ from pathlib import Path
 
 from refgi.jit import Kernel
 from refgi.jit.ahead import LIST, Specialisation
-from refgi.jit.typetext import text_of
+from refgi.jit.kernelfile import text_of
 
 DTYPES = ("float32", "float64")
 SCENE = "cornell_box"

@@ -3,10 +3,8 @@
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.harness import Row, ratio
 from refgi.frame import Frame
@@ -19,8 +17,8 @@ from refgi.truth.result import add_pass, no_passes
 from refgi.truth.settings import Estimator
 from refgi.truth.task import Task
 from refgi.truth.truth import task_of
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 ESTIMATORS: tuple[Estimator, ...] = ("hemisphere", "light", "combined")
 TARGETS = (1e-2, 1e-3, 1e-4)
 PIECE = 1 << 17  # rays a call of `run`

@@ -16,10 +16,9 @@ import math
 import time
 import warnings
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.harness import Row
 from refgi.errors import RefgiWarning
@@ -28,9 +27,9 @@ from refgi.rays import Tracer
 from refgi.scene import Scene
 from refgi.truth import TruthResult, TruthSettings
 from refgi.truth.truth import accumulate
+from refgi.types import Array
 from tests.truth.glossy_scenes import EXPONENTS, SCENES, frame, reference
 
-Array = npt.NDArray[Any]
 SECONDS, QUICK_SECONDS = 2.0, 0.5  # a run
 SEEDS, QUICK_SEEDS = 24, 6
 TARGET = 1e-2

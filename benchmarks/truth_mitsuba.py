@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import betainc
 
 from benchmarks.harness import Row, real_scene
@@ -32,9 +31,9 @@ from refgi.radiometry import POINT
 from refgi.scene import Scene, light_table, load_scene
 from refgi.scene.light import BEND
 from refgi.truth import TruthSettings
+from refgi.types import Array
 from tests.truth.glossy_scenes import SCENES, frame, reference
 
-Array = npt.NDArray[Any]
 DIFFUSE = ("buddha", "horse", "kitchen", "cornell_box", "sponza", "quake_e1m1")
 FILES = {"horse": "cornell_horse"}
 SIZE, QUICK_SIZE = (256, 192), (64, 48)

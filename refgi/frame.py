@@ -17,14 +17,13 @@ from refgi.scene.motion import near_origin
 from refgi.scene.values import is_count
 from refgi.skips import left_out
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rays import Tracer
     from refgi.rsm import GBuffer, Rsm
     from refgi.rsm.buffers.extent import Extent
-    from refgi.rsm.buffers.glossy import GlossyPoints
-
-Array = npt.NDArray[Any]
+    from refgi.rsm.buffers.leaving import GlossyPoints
 Shadows = Literal["map", "exact"]
 
 BUFFERS = ("gbuffer", "rsms", "tracer")  # of a frame, the dear ones
@@ -145,7 +144,7 @@ class Frame:
     def direct(self) -> Array:
         """Direct irradiance of all lights with shadows, (3, h, w), W/m^2."""
         from refgi.rsm.buffers.direct import irradiance_of_lamps
-        from refgi.scene.lamps import lamp_of
+        from refgi.scene.light import lamp_of
 
         visible = [self._visible_from_light(index) for index in range(len(self.scene.lights))]
         position, normal, covered = self.gbuffer.resolve("position", "normal", "covered")
@@ -155,7 +154,7 @@ class Frame:
     @cached_property
     def glossy_receivers(self) -> bool:
         """Whether any visible surface reflects by a lobe; without, no code of lobes runs."""
-        from refgi.rsm.buffers.glossy import shows_glossy
+        from refgi.rsm.buffers.leaving import shows_glossy
 
         if not any(material.is_glossy and not material.is_dielectric for material in self.scene.materials):
             return not left_out("frame.lobes", lambda: (self.width * self.height,) * 2)
@@ -166,14 +165,14 @@ class Frame:
     @cached_property
     def glossy_points(self) -> "GlossyPoints":
         """The pixels whose surface reflects by a lobe towards the eye."""
-        from refgi.rsm.buffers.glossy import glossy_points
+        from refgi.rsm.buffers.leaving import glossy_points
 
         return glossy_points(self.gbuffer, self.materials, self.scene.camera.eye)
 
     @cached_property
     def direct_lobes(self) -> Array:
         """Radiance of lobes by direct light with its shadows, (3, h, w), W/m^2/sr; 0 where there is no lobe."""
-        from refgi.rsm.buffers.glossy import direct_lobes, spread_over_picture
+        from refgi.rsm.buffers.leaving import direct_lobes, spread_over_picture
 
         points = self.glossy_points
         parts = [direct_lobes(points, light, self._visible_from_light(index))
@@ -210,7 +209,7 @@ class Frame:
 
             return shadow_map_visibility(buffer.position, buffer.facing, buffer.covered, self.rsms[index],
                                          interpolated=buffer.facing is not buffer.normal)
-        from refgi.rays.shadows import visible_from_light
+        from refgi.rays.tracer import visible_from_light
 
         return visible_from_light(self.tracer, self.scene.geometry, buffer.position, buffer.facing, buffer.covered,
                                   light)

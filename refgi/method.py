@@ -5,14 +5,11 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-import numpy.typing as npt
-
 from refgi.diagnostics import SamplingError, diagnosing
 from refgi.errors import InputError, RefgiWarning
 from refgi.settings import Settings
 from refgi.stages import sharing
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 DEFAULT = "default"
 NONE: Mapping[str, Any] = MappingProxyType({})

@@ -12,18 +12,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.diagnostics import SamplingError, diagnosing, is_due
 from refgi.errors import InputError, RefgiWarning
 from refgi.method import Method
 from refgi.skips import left_out
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame, Shadows
     from refgi.scene import Scene
-
-Array = npt.NDArray[Any]
 
 GROUP = "refgi.methods"  # of entry points
 FEW_BACKS = 0.01  # of what a picture shows; silhouettes of closed meshes have some by rounding

@@ -19,12 +19,11 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import InputError, RefgiWarning
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.scene import Scene
     from refgi.vectors.check import Kit
-
-Array = npt.NDArray[Any]
 
 KIT_FOLDER = "REFGI_KIT"  # environment variable: a kit to use in place of one made here
 
@@ -91,7 +90,7 @@ def assert_stage_close(
     opened = quick_kit() if kit is None else kit
     verdict = stage_of_array(opened, case, name, np.asarray(got), tier)
     if verdict.verdict in ("out", "invalid"):
-        from refgi.vectors.words import story
+        from refgi.vectors.report import story
 
         raise AssertionError("\n".join(story(verdict)))
     if verdict.verdict == "not-judged":
@@ -181,7 +180,7 @@ def assert_image_close(
     AssertionError
         If it is not, with RMSE, noise, the worst pixel and likely causes.
     """
-    from refgi.vectors.pictures import judge_picture
+    from refgi.vectors.judge import judge_picture
 
     got, expected = np.asarray(picture), np.asarray(reference)
     its, own = (None if one is None else np.asarray(one) for one in (variance, own_variance))

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster import ValSettings, val
-from refgi.cluster.visibility.kernel_size import (
+from refgi.cluster.visibility.pcf import (
     cone_tangent,
     disc,
     published_square,

@@ -20,7 +20,7 @@ from refgi.scene import DirectionalLight, Material, Mesh, Scene, light_table, lo
 from refgi.scene.builtin.surfaces import rectangle, sphere
 from refgi.settings import of
 from refgi.splat import SiiSettings
-from refgi.splat.sii.ledger import sii_ledger
+from refgi.splat.sii.approximations import sii_ledger
 from refgi.stress.changes import CHANGES
 from refgi.truth import TruthSettings, VplSettings, vpl
 from refgi.truth.imperfect import Imperfect, imperfect_maps

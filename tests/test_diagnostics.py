@@ -15,7 +15,7 @@ from refgi.cli.group import VerbGroup
 from refgi.errors import RefgiWarning
 from refgi.lights import choose_pixel_lights
 from refgi.methods import METHODS, render
-from refgi.pairs.sampling import LEAST_ERROR, error_of_halves
+from refgi.pairs.estimates import LEAST_ERROR, error_of_halves
 from refgi.scene import Camera, DirectionalLight, Scene, load_scene, merge
 from refgi.settings import of
 from refgi.sssil.temporal import Sequence

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from refgi import load_scene
-from refgi.batch.thresholds import broken, read_threshold
+from refgi.batch.plan import broken, read_threshold
 from refgi.bench.results import markdown
 from refgi.cli.group import VerbGroup
 from refgi.compare.outcome import measure

@@ -10,9 +10,9 @@ import pytest
 from scipy.stats import chi2, kstwo
 
 import refgi
-from refgi import draws as module
-from refgi.draws import PIXEL_LIGHTS, RANGE, draw_bits, draws
+from refgi import sampling as module
 from refgi.errors import InputError
+from refgi.sampling import PIXEL_LIGHTS, RANGE, draw_bits, draws
 from tests.naive import draws as naive
 
 COUNT = 1 << 20

@@ -301,7 +301,7 @@ def test_val_shadows_each_area_light(room, changes):
     seen = reference_visibility(room, lights, areas, maps, settings)
     normal = face_normals(room.scene.geometry, room.gbuffer.triangle_id.reshape(-1)[points.pixel], points.normal.T).T
     if seen is None and settings.visibility is not None:
-        from refgi.cluster.visibility.evaluate import visibility
+        from refgi.cluster.visibility.shadow import visibility
 
         def seen(m, at, facing):
             return visibility(maps, areas, m, at, facing, settings)

@@ -9,8 +9,7 @@ import pytest
 from scipy.special import betainc, betaincc
 
 import refgi
-from refgi.lobes import inverse_fraction, lobe_direction, lobe_gap, lobe_norm, lobe_power
-from refgi.radiometry import lobe_fraction
+from refgi.radiometry import inverse_fraction, lobe_direction, lobe_fraction, lobe_gap, lobe_norm, lobe_power
 from refgi.scene.material import SHARPEST
 
 EXPONENTS = [0.0, 0.5, 1.0, 7.0, 100.0, 1e4, 1e6, 1e8, 1e12, 1e16, SHARPEST]

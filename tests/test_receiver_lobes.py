@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
-from refgi.lobes import mirrored, receiver_lobe, receiver_norm
 from refgi.pairs.settings import PairSettings
+from refgi.radiometry import mirrored, receiver_lobe, receiver_norm
 from refgi.scene import PointLight, SpotLight
 from tests.glossy import glossy_box
 from tests.naive import receiver_lobes as naive

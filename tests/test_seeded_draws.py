@@ -9,7 +9,7 @@ import pytest
 
 from refgi.frame import Frame
 from refgi.lights import choose_pixel_lights
-from refgi.lights.openness_flux import roulette
+from refgi.lights.selection import roulette
 from refgi.lights.shares import map_shares
 from refgi.rays import Tracer
 from refgi.rays.openness import openness

@@ -9,11 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import InputError
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from benchmarks.papers.workbench import Scale, Workbench
-
-Array = npt.NDArray[Any]
 Cell = str | float | None  # None: nothing is known or nothing was printed
 Rows = Sequence[Sequence[Cell]]
 

@@ -21,8 +21,7 @@ from refgi.cli.destination import Permission, folder
 from refgi.cli.options import on_threads
 from refgi.cli.session import FAILED, progress, say, table
 from refgi.compare.comparison import require_folder
-from refgi.compare.provenance import environment
-from refgi.compare.report import number
+from refgi.compare.report import environment, number
 from refgi.errors import RefgiError, RefgiWarning
 from refgi.image import canonical_json, write_exr, write_png, write_text
 from refgi.provenance import plain, program

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from benchmarks.papers.records import Array, Picture
-from refgi.compare import maps
+from benchmarks.papers.records import Picture
+from refgi.compare import pictures as maps
 from refgi.compare.metrics import mae, rmse
 from refgi.compare.pictures import linear_planes, rgb_planes
 from refgi.compare.report import number
@@ -19,6 +19,7 @@ from refgi.image import tone_map
 from refgi.scene import Scene, load_scene
 from refgi.stages import Memory
 from refgi.truth import TruthResult, TruthSettings, trace_truth
+from refgi.types import Array
 
 T = TypeVar("T")
 K = TypeVar("K", bound=Hashable)

@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.inputs import BLOCK, around, directions
 from benchmarks.stability.ladder import Ladder
@@ -11,8 +10,8 @@ from benchmarks.stability.maths import cross, dot
 from benchmarks.stability.pair_ladders import filled
 from benchmarks.stability.promise import Case, Promise
 from refgi.cluster.clustering.kmeans import Clustering
-from refgi.cluster.clustering.metric import linear
 from refgi.cluster.clustering.rectangle import AreaLights, area_lights
+from refgi.cluster.clustering.rounds import linear
 from refgi.cluster.maps.occluders import Ends
 from refgi.cluster.maps.shadow_maps import shadow_maps
 from refgi.cluster.settings import AreaLightSettings, ShadowMapSettings
@@ -20,8 +19,8 @@ from refgi.jit import kernel
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.rsm.buffers.extent import Extent
 from refgi.scene import Geometry
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 LIGHTS, CLUSTERS = 60, 8
 NUMBERS = ("map_of", "center", "near", "far", "scene_far", "depth")  # of shadow maps
 

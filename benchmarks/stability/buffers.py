@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.promise import Case, Promise
 from refgi import Frame, load_scene
@@ -20,8 +19,8 @@ from refgi.rsm import shadow_map_visibility
 from refgi.rsm.buffers.facing import facing_normals
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene
 from refgi.stress.changes import mapped
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 SIZE = 48  # pixels along a side
 LARGEST_SHARE = 1e6  # half the floor's side over the camera's height
 HORIZON = 1e-3  # rays that fall less than this are not asked

@@ -19,7 +19,7 @@ from numba import types
 
 from benchmarks.stability.promise import Tell
 from refgi.jit import kernel
-from refgi.stress.rows import Row
+from refgi.stress.promises import Row
 
 ROOT = Path(__file__).parents[2]
 STARTS = {True: 2, False: 8}

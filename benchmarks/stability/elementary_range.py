@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.inputs import BLOCK, any_size
 from benchmarks.stability.ladder import THREADS, Ladder
@@ -17,9 +16,9 @@ from benchmarks.stability.maths import Maths
 from benchmarks.stability.pair_ladders import each, filled
 from refgi.elementary import exp2, log2, log2p1, pow
 from refgi.jit import kernel
-from refgi.stress.rows import Row
+from refgi.stress.promises import Row
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 PATTERNS = 1 << 16  # of bits in a block
 STRIDE = 4099  # of the short form: prime, so that all low bits are seen
 PROMISED = {"exp2": 1.3, "log2": 0.6, "log2p1": 3.0}  # ULP, in the docstrings of refgi/elementary

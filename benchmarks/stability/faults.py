@@ -17,7 +17,7 @@ from benchmarks.stability.cache_faults import cold_starts, damaged
 from benchmarks.stability.promise import Task, Tell
 from benchmarks.stability.victim_host import Host
 from benchmarks.stability.victims import VICTIMS, Stand, undisturbed
-from refgi.stress.rows import Row
+from refgi.stress.promises import Row
 
 AGAIN = "python -m benchmarks stability --part faults --out out/stability"
 DISK_KIB = {True: (64,), False: (4, 16, 32, 48, 64, 96, 128, 192, 256, 384, 512, 1024)}

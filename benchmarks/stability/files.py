@@ -12,7 +12,7 @@ from benchmarks.stability.bombs import BOMBS
 from benchmarks.stability.file_child import BOMB, MEMORY, SECONDS, Breach, kinds, read_in_children
 from benchmarks.stability.file_formats import FORMATS
 from benchmarks.stability.promise import Task, Tell
-from refgi.stress.rows import Row
+from refgi.stress.promises import Row
 
 SEED = 19
 MUTATIONS = {True: 200, False: 100_000}  # of each format, in the short form and in full

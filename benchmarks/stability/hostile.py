@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from refgi.scene import Camera, DirectionalLight, Light, Material, Mesh, PointLight, Scene, SpotLight, merge
-from refgi.scene.values import Array
+from refgi.types import Array
 
 MOST_PIXELS = 17  # along a side
 ANGLES = (179.999, 0.001, 40.0, 90.0, 120.0)  # vertical fields of view, degrees

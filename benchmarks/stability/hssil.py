@@ -14,20 +14,18 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.inputs import BLOCK, across, around, block_of, directions, sizes, some
 from benchmarks.stability.ladder import SEED, Ladder
 from benchmarks.stability.maths import cross, dot
 from benchmarks.stability.pair_ladders import each_of, filled
 from refgi.jit import kernel
-from refgi.sssil.crown.add import DISC, POINT, TEXEL, term
-from refgi.sssil.crown.emitters import length_scale
+from refgi.sssil.crown.form_factor import DISC, POINT, TEXEL, length_scale, term
 from refgi.sssil.pyramid.view import pixel_surface
-from refgi.sssil.visibility.elevation import PLANES, direction, heights, pack
-from refgi.stress.rows import Row
+from refgi.sssil.visibility.slices import PLANES, direction, heights, pack
+from refgi.stress.promises import Row
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 NEAREST, FARTHEST = 1e-7, 1e9  # m
 LEAST_FACING = 1.01e-6  # less is the rounding of a float32 normal
 DOMAIN = "r 1e-7 .. 1e9 m, areas 1e-6 .. 10 r^2, 1 .. 10 texels a sample"

@@ -6,9 +6,8 @@ Everything is drawn from a generator of its block, so that case `i` of seed `s` 
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 BLOCK = 1 << 14  # cases drawn at once
 SMALL = (1e-7, 1e-1)  # of a length: components that are tiny, angles that graze

@@ -28,7 +28,7 @@ from benchmarks.stability.inputs import BLOCK
 from benchmarks.stability.ladder import Ladder, conditions, errors, inputs_of, rows
 from benchmarks.stability.maths import DIGITS, EXTENDED, trusted
 from benchmarks.stability.promise import Task, Tell
-from refgi.stress.rows import Row
+from refgi.stress.promises import Row
 
 MODULES = (pair_ladders, hssil, lamp_ladders, val_ladders, map_ladders, elementary_range, lobes, light_ladders,
            area_promises, level_promises, sent_promises)

@@ -20,7 +20,7 @@ from benchmarks.kill_batch import killed as killed_batch
 from benchmarks.stability.promise import Task, Tell
 from benchmarks.stability.victim_host import Host
 from benchmarks.stability.victims import VICTIMS, Stand, Undisturbed, allowed, undisturbed, with_old_files
-from refgi.stress.rows import Row
+from refgi.stress.promises import Row
 
 SEED = 19
 TIMES = {"render": 50, "compare": 30, "sequence": 50, "checkpoint": 40}

@@ -14,13 +14,12 @@ from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.inputs import BLOCK, block_of
 from benchmarks.stability.maths import DIGITS, EXTENDED, Maths, spacing
-from refgi.stress.rows import Kind, Row
+from refgi.stress.promises import Kind, Row
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 Run = Callable[[Array], Array]  # (inputs, n) -> (outputs, n), both of the type under test
 Formula = Callable[[Maths, Sequence[Any]], Sequence[Any]]
 

@@ -8,7 +8,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.inputs import BLOCK, across, directions, sizes
 from benchmarks.stability.ladder import Ladder
@@ -26,8 +25,8 @@ from refgi.radiometry import (
 from refgi.rsm.buffers.solid_angle import texel_solid_angles_at
 from refgi.rsm.raster.projection import Projection
 from refgi.scene.light import cone_row
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 CONES = 32  # distinct ones in a block: each takes 60 digits to make
 LARGEST_MAP = 16384  # texels along a side
 OUTER, INNER = 6, 7  # rows of the drawn half-angles

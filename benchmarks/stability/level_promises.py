@@ -7,7 +7,6 @@ from its own origin, so that the same points by another origin are the same poin
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.ladder import Ladder
 from benchmarks.stability.promise import Case, Promise
@@ -15,8 +14,8 @@ from refgi.rsm.raster.projection import PERSPECTIVE, Projection
 from refgi.splat.multires.error_target.interpolate import blend_weights, surface_levels
 from refgi.splat.sii.reach.bounds import TANGENT_POINT, tangent_ellipsoid
 from refgi.sssil.reprojection import SourceView, reproject
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 SIDE = 16  # pixels, a multiple of 4: no level has cells without pixels
 FINENESS = 2.0**-10  # places are whole multiples of it
 

@@ -7,18 +7,16 @@ angle a, B = 2 pi / 3 (1 - cos^3 a) along its axis and A = pi (2/3 - cos a + cos
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.inputs import BLOCK, directions, sizes, some
 from benchmarks.stability.ladder import Ladder
 from benchmarks.stability.maths import dot
 from benchmarks.stability.pair_ladders import each_of
 from refgi.jit import kernel
-from refgi.pairs.sphere_pair import cone_term
+from refgi.pairs.sphere_sum import cone_term
 from refgi.radiometry import POINT, incident_light
 from refgi.scene.model import LightTable
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 
 @kernel

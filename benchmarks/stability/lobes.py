@@ -10,7 +10,6 @@ rounding, to either side alike; a fraction which is cut too early, or a wrong te
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.inputs import BLOCK, across, directions, sizes
 from benchmarks.stability.ladder import Ladder
@@ -18,12 +17,12 @@ from benchmarks.stability.maths import DIGITS, digits, dot
 from benchmarks.stability.pair_ladders import LEAST, each_of, norm, norms
 from benchmarks.stability.promise import Case, Promise
 from refgi.jit import kernel
-from refgi.lobes import lobe_direction
 from refgi.pairs.lobe_culling import LIMIT, bound_lobes
 from refgi.pairs.lobe_sum import EXPONENT, RATIO, add_lobe
 from refgi.pairs.pair_sum import NX, SUM, Clamp, X
+from refgi.radiometry import lobe_direction
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 ROWS = max(EXPONENT, RATIO) + 1
 SHARP, SHARPEST = 1e6, 1e20
 SMALLEST, STEP = 2.0**-126, 2.0**-149  # a lobe below this share of its peak is 0; of subnormal float32 numbers

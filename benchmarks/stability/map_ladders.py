@@ -8,15 +8,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.inputs import BLOCK, across, directions, sizes
 from benchmarks.stability.ladder import Ladder
 from benchmarks.stability.maths import cross, dot
 from benchmarks.stability.pair_ladders import filled
 from refgi.jit import kernel
-from refgi.rsm.buffers.surfaces import barycentric_axes
-from refgi.rsm.buffers.texel_rays import image_ray
+from refgi.rsm.buffers.surfaces import barycentric_axes, image_ray
 from refgi.rsm.raster.projection import (
     PARABOLOID,
     PERSPECTIVE,
@@ -26,8 +24,8 @@ from refgi.rsm.raster.projection import (
     texel_coordinates,
     texel_of,
 )
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 HEIGHT, WIDTH, HALF, FACE = 600, 800, (0.8, 0.6), 1024
 MAP = "4 ULP of one input or of the answer, beyond 4 ULP of the map's size"
 # forward and up of the faces of a cube: docs/conventions.md

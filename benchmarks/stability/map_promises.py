@@ -6,11 +6,9 @@ cos outer) / 2); parallel light's map encloses a box.
 """
 
 import math
-from typing import Any
 
 import mpmath
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.inputs import directions
 from benchmarks.stability.promise import Case, Promise
@@ -24,8 +22,8 @@ from refgi.rsm.raster.projection import (
     spot_projection,
 )
 from refgi.scene import DirectionalLight, SpotLight
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 POINTS, TRIANGLES = 2000, 16
 TEXELS = 96  # of a paraboloid map along a side
 UNSURE = 1e-11  # sine of the angle to an edge, within which rounding may decide

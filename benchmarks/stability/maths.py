@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 
 import mpmath
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 digits: Any = mpmath.MPContext()  # of its own: nobody else's precision changes
 digits.dps = 50

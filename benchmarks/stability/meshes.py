@@ -8,11 +8,10 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.scene import Geometry
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 NEEDLES = 5000
 WITHIN = 0.25  # radius of the ball that rays start in, of size 1
 TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])  # a rotation that aligns nothing

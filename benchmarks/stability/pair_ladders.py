@@ -7,18 +7,17 @@ lobe c <r . w>^P with c = (P + 1) / (2 pi K).
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from benchmarks.stability.inputs import BLOCK, around, directions, sizes, some
 from benchmarks.stability.ladder import Ladder
 from benchmarks.stability.maths import dot
 from refgi.jit import kernel
-from refgi.lobes import lobe_gap, lobe_norm, lobe_power
 from refgi.pairs.pair_sum import clamped_term, geometry_term
-from refgi.rays.offsets import far_offset, ray_offset
+from refgi.radiometry import lobe_gap, lobe_norm, lobe_power
+from refgi.rays.watertight import far_offset, ray_offset
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 NEAREST, FARTHEST = 1.01e-15, 1e9  # m
 ROUNDINGS = "14 roundings, each at most one ULP: 5 of r^2, each of which counts twice, 2 divisions, 2 products"
 LEAST = 1e-12  # of a lobe above the surface, below which it counts as dark: docs/radiometry.md

@@ -20,8 +20,7 @@ from benchmarks.stability.promise import Task, Tell
 from refgi import load_scene
 from refgi.errors import InputError, RefgiWarning
 from refgi.methods import BUILT_IN, render
-from refgi.stress.promises import settings_of
-from refgi.stress.rows import Row
+from refgi.stress.promises import Row, settings_of
 from refgi.stress.run import PART, stress
 
 SIZE = 64

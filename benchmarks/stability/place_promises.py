@@ -1,17 +1,15 @@
 """Promises of places: scenes anywhere are brought near the origin as they are, and thin triangles stay in them."""
 
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.promise import Case, Promise
 from refgi.errors import InputError
 from refgi.scene import Camera, Geometry, Material, Mesh, PointLight, Scene, SpotLight
 from refgi.scene.motion import near_origin
 from refgi.scene.repair import repaired
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 DIAGONALS = 16  # off the origin, at most: docs/conventions.md
 POINTS = 48
 FARTHEST = 9e8  # m: refgi takes no places beyond 1e9

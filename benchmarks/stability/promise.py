@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from refgi.stress.rows import Kind, Row
+from refgi.stress.promises import Kind, Row
 
 Tell = Callable[[str], None]
 SEED = 17

@@ -17,15 +17,14 @@ from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability import promise
 from benchmarks.stability.meshes import MESHES, Mesh, Places, Rays, aimed_rays, leaving_rays, places_upon, random_rays
 from benchmarks.stability.promise import Promise, Task, Tell, promise_tasks
 from refgi.rays import MISS, Tracer
-from refgi.stress.rows import Row
+from refgi.stress.promises import Row
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 SEED = 17
 SIZES = (1e-6, 1e-3, 1.0, 1e4, 1e8)  # m
 CHUNK = 1 << 14  # always drawn whole

@@ -15,12 +15,11 @@ from pathlib import Path
 
 from benchmarks.stability.promise import Task, Tell
 from refgi import Frame, load_scene
-from refgi.batch.digest import hashes_of
+from refgi.batch.buffers import hashes_of
 from refgi.errors import RefgiWarning
 from refgi.methods import BUILT_IN, find_method
 from refgi.stages import observe
-from refgi.stress.promises import settings_of
-from refgi.stress.rows import Row
+from refgi.stress.promises import Row, settings_of
 
 ROOT = Path(__file__).parents[2]
 PART = "sameness"

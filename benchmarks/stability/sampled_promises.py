@@ -5,18 +5,16 @@ times the mean of a point's cell is the mean of all maps, and a sum over texels 
 """
 
 import math
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.promise import Case, Promise
 from refgi.errors import InputError
 from refgi.lights.importance import importance_pyramid
 from refgi.lights.warp import Warp, texel_of, warp_stacked
 from refgi.splat.gather.gather_sum import GatherMap, disc_pattern, gather_discs
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 U = 2.0**-53
 MOST_SIDE = 257  # texels of a drawn map
 ROUNDINGS = 8  # of a weight, each level: sum, quotient and two products, down and across

@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 from benchmarks.mutate.project import REFGI
 from benchmarks.mutate.scratch import Scratch, remove_copies
 from benchmarks.stability.runner import PARTS
-from refgi.stress.rows import read_rows
-from refgi.vectors.edits import replaced
+from refgi.stress.promises import read_rows
+from refgi.vectors.rows import replaced
 
 FAULTS = Path(__file__).with_name("precision_faults.toml")
 ORDER = sorted(PARTS, key=["kernels", "pictures", "rays", "sameness", "files", "faults", "kills"].index)

@@ -8,7 +8,6 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.inputs import BLOCK, directions
 from benchmarks.stability.ladder import Ladder
@@ -20,8 +19,8 @@ from refgi.scene import Geometry, Material, SpotLight, light_table, material_tab
 from refgi.truth.hemisphere import cosine_direction
 from refgi.truth.light_grid import light_rays
 from refgi.truth.surfaces import Surfaces, face_normal, lift
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 GOOD_TO = 1e-8  # hemisphere directions, as the kernel promises
 CELLS, PATHS = 16, 64
 NARROWEST, WIDEST = 1.8e-7, 1.2  # half-angles, rad: refgi takes no narrower ones

@@ -7,10 +7,8 @@ a small scene hides no thin gap in it: rays start above their face by 4 u (|y|_1
 most 16 times the largest coordinate of half of the triangles.
 """
 
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.meshes import TURN, Mesh, places_upon
 from benchmarks.stability.promise import Case, Promise
@@ -19,8 +17,8 @@ from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.rays import MISS, Tracer
 from refgi.scene import Geometry
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 POINTS, LIGHTS = 200, 40
 OFF = 2.0**-15  # half the share of a point's coordinates by which it may be off its face
 SIZES = (1e-6, 1e-3, 1.0, 1e4, 1e8)

@@ -9,14 +9,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.promise import Case, Promise
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import PairSettings
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 POINTS = 8  # receivers
 MOST_GROUPS = 1 << 14  # of 64 lights: a million
 PLAIN = PairSettings(clamp=None)

@@ -9,15 +9,13 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.stability.inputs import BLOCK, directions, sizes
 from benchmarks.stability.ladder import Ladder
 from benchmarks.stability.pair_ladders import each_of, filled
-from refgi.cluster.filters.basis import fill_basis, sine_cosine
-from refgi.cluster.filters.depth_scale import DepthScale, series_depths, series_distance
+from refgi.cluster.filters.basis import DepthScale, fill_basis, series_depths, series_distance, sine_cosine
 from refgi.cluster.visibility.csm import compare_filtered, find_penumbra
-from refgi.cluster.visibility.kernel_size import (
+from refgi.cluster.visibility.pcf import (
     cone_tangent,
     disc,
     published_square,
@@ -34,8 +32,8 @@ from refgi.cluster.visibility.search_region import (
     FilterSizing,
 )
 from refgi.jit import kernel
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 TERMS = 4
 LEAST_BLOCKED = 0.02  # share of a search disc below which nothing blocks
 CAP = math.radians(80.0)  # the widest cone

@@ -10,11 +10,9 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-import numpy.typing as npt
 from numba import types
 
 from benchmarks.stability.promise import Case, Promise
@@ -22,8 +20,8 @@ from refgi.errors import InputError
 from refgi.image import read_exr, tone_map, write_exr, write_png, write_text
 from refgi.jit.cache import KernelCache
 from refgi.truth.checkpoint import Checkpoint
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 COMPUTATION, VALUES = b"c" * 32, 6
 MARK = "refgi"
 MAGENTA = (255, 0, 255)

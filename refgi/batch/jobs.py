@@ -14,8 +14,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from refgi.batch.code import RUNNERS, SHARED, code_key, place_of
-from refgi.batch.plan import Plan
-from refgi.batch.thresholds import FRAME
+from refgi.batch.plan import FRAME, Plan
 from refgi.bench.grid import Choice
 from refgi.bench.measure import REFERENCE_SEED, stop
 from refgi.errors import expect

@@ -1,24 +1,40 @@
-"""Jobs spread over processes of this machine, so that a process keeps to a frame and what its jobs share.
+"""Jobs spread over processes of this machine or over machines, and what they will take.
 
 A worker that dies, by the system or by a fault of compiled code, takes no other job along: the jobs that may have ended
 it run again, each in a process of its own, and one that ends that too has failed.
+
+A worker that dies loses what it was at; dask gives its chunk to another one, which goes on after the jobs that have a
+result. A job that ends several workers has failed.
+
+One run at each size comes before the timed one, for its kernels. What does not grow with the picture, RSMs above all,
+is in the part that two sizes tell apart; noise of the clock never makes a time fall with the size.
 """
 
+import contextlib
 import math
 import os
 import signal
 import threading
+import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
+from importlib import import_module
 from itertools import groupby
 from multiprocessing import Pipe, get_context
 from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from refgi.batch.jobs import Job
+from refgi.batch.jobs import Job, reference_settings, scene_at
 from refgi.batch.outcome import failed, is_done, write_outcome
 from refgi.batch.shared import Common, Tell, within
 from refgi.batch.work import Chunk, forget, run_chunk
+from refgi.bench.grid import TRUTH
+from refgi.errors import InputError, RefgiError, RefgiWarning
+from refgi.frame import Frame
+from refgi.methods import METHODS
 
 SECONDS_BETWEEN_LOOKS = 0.5
 DIED = "its process died: out of memory, or a fault of compiled code"
@@ -136,3 +152,97 @@ def _end_with(parent: Connection) -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=watch, daemon=True).start()
+
+
+SCHEME = "dask:"
+SECONDS_TO_ANSWER = 10
+
+
+def run_on_cluster(address: str, jobs: Sequence[Job], common: Common, tell: Tell, written: Written) -> None:
+    """Do jobs, those of one frame side by side, on the workers of a scheduler, such as ``tcp://10.0.0.1:8786``.
+
+    Scenes and folders are there on every worker; `written` is called after each chunk. InputError if dask.distributed
+    is not installed or nobody answers at the address.
+    """
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError as error:
+        raise InputError("--executor: expected the extra refgi[distributed], got none installed",
+                         key="--executor") from error
+    try:
+        client = distributed.Client(address, timeout=SECONDS_TO_ANSWER)
+    except (OSError, ValueError) as error:
+        raise InputError(f"--executor: expected a scheduler at {address}, got {error}", key="--executor") from error
+    with client:
+        executor = client.get_executor(pure=False)
+
+        def died(chunk: Chunk, error: BaseException) -> "Future[int] | None":
+            if not isinstance(error, distributed.KilledWorker):
+                raise error
+            left = unfinished([chunk])
+            if left:
+                fail_first(left[0])
+            left = unfinished(left)
+            return executor.submit(run_chunk, left[0]) if left else None
+
+        chunks = chunks_of(jobs, common, len(client.scheduler_info(n_workers=-1)["workers"]))
+        follow([(chunk, executor.submit(run_chunk, chunk)) for chunk in map(absolute, chunks)], tell, written, died)
+
+
+def absolute(chunk: Chunk) -> Chunk:
+    """Return a chunk whose folders have the same names from wherever they are looked for."""
+    common = chunk.common._replace(folder=chunk.common.folder.resolve(), store=chunk.common.store.resolve())
+    return chunk._replace(common=common, working_folder=str(Path(chunk.working_folder).resolve()))
+
+
+SIZES = (64, 128)  # pixels along a side
+
+
+class Estimate(NamedTuple):
+    """Time of the jobs of a batch, all threads at work on one after the other."""
+
+    seconds: float  # of all jobs
+    truth_seconds: float  # of the truths, one a frame
+
+
+def estimate(jobs: Sequence[Job], common: Common, tell: Tell) -> Estimate:
+    """Estimate the time of jobs by measuring each choice on the first frame of each scene.
+
+    A choice that gives no picture there counts nothing.
+    """
+    known: dict[Any, float] = {}
+    seconds, truths, seen = 0.0, 0.0, set()
+    for number, job in enumerate(jobs):
+        tell(f"estimating {job.label}", number / len(jobs))
+        key = job.shot.scene, job.choice
+        if key not in known:
+            known[key] = _seconds(job, job.choice.method, job.choice.settings, common)
+        seconds += known[key] * (len(job.seeds) + 1)
+        if job.shot not in seen:
+            seen.add(job.shot)
+            settings = reference_settings(common.truth, job.shot)
+            truth = job.shot.scene, TRUTH
+            if truth not in known:
+                known[truth] = _seconds(job, TRUTH, settings, common)
+            truths += known[truth]
+    return Estimate(seconds, truths)
+
+
+def _seconds(job: Job, method: str, settings: Any, common: Common) -> float:
+    scene = scene_at(job.shot)
+    times = []
+    with warnings.catch_warnings(), contextlib.suppress(RefgiError):
+        warnings.simplefilter("ignore", RefgiWarning)
+        for size in SIZES:
+            for _ in range(2):
+                frame = Frame(scene, width=size, height=size, **common.options)
+                started = time.perf_counter()
+                METHODS[method].made(frame, settings)
+                seconds = time.perf_counter() - started
+            times.append(seconds)
+    if len(times) < len(SIZES):
+        return 0.0
+    pixels = scene.camera.width * scene.camera.height
+    small, large = (size * size for size in SIZES)
+    slope = max(0.0, (times[1] - times[0]) / (large - small))
+    return max(0.0, times[1] + slope * (pixels - large))

@@ -1,21 +1,208 @@
-"""`choose`: the cheapest method and settings that meet a wish on a scene."""
+"""`choose`: the cheapest method and settings that meet a wish on a scene, found without running all.
+
+Along a track error falls and time grows. For an error, the walk goes up all tracks at once on a small picture, always
+to the probe that promises to be fastest, and ends where that one would take longer than what was found. Between a probe
+that meets the wish and the one before it lies the first rung that does. A track is left where it would miss the wish
+even if its error went on falling as it did last: it falls ever slower. Each find is timed at full size and judged
+there, the fastest first: one that misses moves up its track as far as its slope says, one that meets moves down while
+it does.
+
+For a time, each track is followed at full size up to that time, the small picture ranks where they come to, and the
+first few are judged at full size.
+"""
 
 import dataclasses
+import heapq
 import math
 import statistics
 import warnings
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple, Protocol
 
 from refgi.bench.error import error_of, without_noise
-from refgi.bench.grid import TRUTH, Choice
+from refgi.bench.grid import TRUTH, Choice, Track
 from refgi.bench.measure import REFERENCE_SEED, load_kernels, small_frame, stopped, timed, traced, with_seed
-from refgi.bench.search import Found, for_error, for_time
-from refgi.bench.tracks import Track
 from refgi.errors import RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.scene import Scene
 from refgi.truth import TruthSettings
+
+STRIDE = 4  # rungs from probe to probe: a factor of 4
+SLACK = 3.0  # a probe may take as many times as long as what meets the wish: small pictures tell times roughly
+DOUBT = 0.85  # share of the error ahead that a track is left for: slopes are measured with noise
+MARGIN = 0.95  # share of the wish to come to at full size: the truth's noise and the seeds leave as much open
+TIME_MARGIN = 0.9  # share of the time wished for to come to, where something does: other work takes the rest
+FURTHEST = 6  # rungs that a judged choice moves up at once
+JUDGED = 4  # tracks that are judged for a time
+
+
+class Probe(NamedTuple):
+    """What a choice costs and by how much it is off."""
+
+    choice: Choice
+    seconds: float
+    error: float  # RMSE without the truth's noise, over the truth's mean; infinite where there is no picture
+
+
+class JudgedPictures(Protocol):
+    """A scene at one size; each choice is run once, however often it is asked for."""
+
+    def seconds(self, choice: Choice) -> float:
+        """Return the time of a frame; infinite where it gives no picture."""
+
+    def error(self, choice: Choice) -> float:
+        """Return the error over the truth's mean; infinite where there is no picture."""
+
+
+class Found(NamedTuple):
+    """What a search came to."""
+
+    best: Probe | None  # None where nothing meets the wish
+    judged: tuple[Probe, ...]  # at full size, the fastest first
+    small: tuple[Probe, ...]  # on the small picture, in the order of the search
+
+
+def for_error(tracks: Sequence[Track], wish: float, small: JudgedPictures, full: JudgedPictures) -> Found:
+    """Find the fastest choice whose error, RMSE over the truth's mean, is at most a wish.
+
+    `small` is searched; the best is of what was judged at `full` size.
+    """
+    walk = _Walk(tracks, wish, small)
+    queue = [(full.seconds(track.rungs[rung]), number, rung)
+             for number, (track, rung) in enumerate(walk.starts) if math.isfinite(full.seconds(track.rungs[rung]))]
+    heapq.heapify(queue)
+    judged: dict[Choice, Probe] = {}
+    best: Probe | None = None
+    while queue and (best is None or queue[0][0] < best.seconds):
+        seconds, number, rung = heapq.heappop(queue)
+        track = walk.starts[number][0]
+        one = Probe(track.rungs[rung], seconds, full.error(track.rungs[rung]))
+        judged[one.choice] = one
+        if one.error <= wish * MARGIN:  # faster than the best so far: the queue ends before
+            best = one
+        following = walk.after(track, rung, one.error)
+        if following is not None and track.rungs[following] not in judged:
+            heapq.heappush(queue, (full.seconds(track.rungs[following]), number, following))
+    found = Found(best, _by_time(judged.values()), tuple(walk.probes.values()))
+    left = [track for track in tracks if all(track is not tried for tried, _ in walk.starts)]
+    if best is not None or not left or not walk.starts:
+        return found
+    others = for_error(left, wish, small, full)  # what the small picture promised was not kept
+    return Found(others.best, _by_time((*found.judged, *others.judged)), (*found.small, *others.small))
+
+
+def for_time(tracks: Sequence[Track], wish: float, small: JudgedPictures, full: JudgedPictures) -> Found:
+    """Find the choice of least error whose frame takes at most a wish, s.
+
+    `small` is ranked; the best is of what was timed and judged at `full` size.
+    """
+    reached = _reached(tracks, TIME_MARGIN * wish, full) or _reached(tracks, wish, full)
+    ranked = sorted((Probe(choice, small.seconds(choice), small.error(choice)) for choice in reached),
+                    key=lambda one: one.error)
+    judged = [Probe(one.choice, full.seconds(one.choice), full.error(one.choice)) for one in ranked[:JUDGED]]
+    best = min((one for one in judged if math.isfinite(one.error)), key=lambda one: one.error, default=None)
+    return Found(best, _by_time(judged), tuple(ranked))
+
+
+class _Walk:
+    """The walk for an error: `starts` are tracks with the first rung of each that meets the wish, fastest first."""
+
+    def __init__(self, tracks: Sequence[Track], wish: float, small: JudgedPictures) -> None:
+        self._wish, self._small = wish, small
+        self.probes: dict[Choice, Probe] = {}
+        self.starts: list[tuple[Track, int]] = []
+        fastest = math.inf
+        queue = [(0.0, number, 0) for number in range(len(tracks))]
+        while queue and queue[0][0] <= SLACK * fastest:
+            _, number, rung = heapq.heappop(queue)
+            track = tracks[number]
+            if self._probe(track, rung).error <= wish:
+                first = self._first_that_meets(track, max(-1, rung - STRIDE), rung)
+                fastest = min(fastest, self._probe(track, first).seconds)
+                self.starts.append((track, first))
+            elif rung < len(track.rungs) - 1 and self._may_meet(track, rung):
+                following = min(rung + STRIDE, len(track.rungs) - 1)
+                heapq.heappush(queue, (self._seconds_at(track, rung, following), number, following))
+
+    def after(self, track: Track, rung: int, error: float) -> int | None:
+        """Return the rung to judge after one with an error at full size: down where it meets the wish, else up."""
+        if error <= self._wish * MARGIN:
+            return rung - 1 if rung else None
+        if rung == len(track.rungs) - 1 or not math.isfinite(error):
+            return None
+        slope = min(-0.1, self._slope(track, rung))
+        factor = (error / (self._wish * MARGIN)) ** (-1 / slope) if error < 1e3 * self._wish else math.inf
+        up = next((more for more in range(1, FURTHEST) if track.values[min(rung + more, len(track.values) - 1)]
+                   >= factor * track.values[rung]), FURTHEST)
+        return min(rung + up, len(track.rungs) - 1)
+
+    def _probe(self, track: Track, rung: int) -> Probe:
+        choice = track.rungs[rung]
+        if choice not in self.probes:
+            self.probes[choice] = Probe(choice, self._small.seconds(choice), self._small.error(choice))
+        return self.probes[choice]
+
+    def _first_that_meets(self, track: Track, misses: int, meets: int) -> int:
+        while meets - misses > 1:
+            middle = (misses + meets) // 2
+            if self._probe(track, middle).error <= self._wish:
+                meets = middle
+            else:
+                misses = middle
+        return meets
+
+    def _may_meet(self, track: Track, rung: int) -> bool:
+        """Return whether a track whose error goes on falling as it did last comes to the wish at its end."""
+        if rung == 0:
+            return True
+        ahead = math.log(track.values[-1] / track.values[rung])
+        return DOUBT * self._probe(track, rung).error * math.exp(self._slope(track, rung) * ahead) <= self._wish
+
+    def _seconds_at(self, track: Track, rung: int, following: int) -> float:
+        """Return the time of the next probe: what was added since the last one grows in proportion."""
+        known = self._known(track, rung)
+        seconds = known[-1][1].seconds
+        added = seconds - known[-2][1].seconds if len(known) > 1 else 0.0
+        return seconds + max(0.0, added) * track.values[following] / track.values[rung]
+
+    def _slope(self, track: Track, rung: int) -> float:
+        """Return d log error / d log value of the last two probes up to a rung, 0 at most."""
+        known = [(value, one.error) for value, one in self._known(track, rung) if 0 < one.error < math.inf]
+        if len(known) < 2:
+            return 0.0
+        (x, a), (y, b) = known[-2:]
+        return min(0.0, math.log(b / a) / math.log(y / x))
+
+    def _known(self, track: Track, rung: int) -> list[tuple[int, Probe]]:
+        return [(track.values[at], self.probes[choice]) for at, choice in enumerate(track.rungs[:rung + 1])
+                if choice in self.probes]
+
+
+def _reached(tracks: Sequence[Track], wish: float, full: JudgedPictures) -> list[Choice]:
+    """Return where tracks come to within a time."""
+    return [choice for choice in (_slowest_within(track, wish, full) for track in tracks) if choice is not None]
+
+
+def _slowest_within(track: Track, wish: float, full: JudgedPictures) -> Choice | None:
+    """Return the last choice of a track whose frame takes no longer than a wish; None where the first does."""
+    within, beyond = -1, len(track.rungs)
+    rung = 0
+    while rung < beyond and full.seconds(track.rungs[rung]) <= wish:
+        within = rung
+        rung = rung + STRIDE if rung + STRIDE < beyond or rung == beyond - 1 else beyond - 1
+    beyond = min(rung, beyond)
+    while beyond - within > 1:
+        middle = (within + beyond) // 2
+        if full.seconds(track.rungs[middle]) <= wish:
+            within = middle
+        else:
+            beyond = middle
+    return None if within < 0 else track.rungs[within]
+
+
+def _by_time(probes: Iterable[Probe]) -> tuple[Probe, ...]:
+    return tuple(sorted(probes, key=lambda one: one.seconds))
+
 
 Tell = Callable[[str, float], None]
 

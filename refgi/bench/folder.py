@@ -9,8 +9,7 @@ from urllib.parse import quote
 import pydantic
 
 from refgi.bench.grid import FILES
-from refgi.bench.overview import Place, overview
-from refgi.bench.report import write_page
+from refgi.bench.report import Place, overview, write_page
 from refgi.bench.results import Result
 from refgi.compare.report import PAGE, machine, script, templates
 from refgi.errors import InputError

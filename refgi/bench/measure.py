@@ -13,11 +13,9 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi import stages
-from refgi.bench.curves import error_in, front
-from refgi.bench.error import error_of
+from refgi.bench.error import error_in, error_of, front
 from refgi.bench.grid import TRUTH, Choice, Grid
 from refgi.bench.pictures import TRUTH_FILES, Place, Writer
 from refgi.bench.results import Run, SceneResult, Work, figures_of, known
@@ -34,8 +32,8 @@ from refgi.scene import Scene
 from refgi.settings import Settings, from_text, leaves
 from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.result import doubt_of_both
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 Tell = Callable[[str, float], None]
 
 REFERENCE_SEED = 2**31  # of the truth: none of the rounds'

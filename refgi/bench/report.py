@@ -1,20 +1,171 @@
-"""The page of a bench: error over time of every method on each scene, and what it costs against the path tracer."""
+"""The page of a bench: error over time, bars of split errors, several scenes at once.
+
+Two panels: the change of the mean that each approximation makes, and its share of the whole's mean square error. In
+both the parts add up exactly; what lies below 0 takes back what others did. A mark shows the sum.
+"""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from refgi.bench.grid import FILES, TRUTH
-from refgi.bench.overview import Place, overview
-from refgi.bench.results import Result, Run, SceneResult, percent, taken, times
-from refgi.bench.split_plot import splits_of
-from refgi.bench.views import named, provenance_of, view_of
+from refgi.bench.pictures import named, provenance_of, view_of
+from refgi.bench.results import (
+    SPLIT_COLUMNS,
+    Part,
+    Result,
+    Run,
+    SceneResult,
+    Split,
+    in_percent,
+    rows_of_split,
+    said_of_split,
+    taken,
+    times,
+)
 from refgi.compare.page.album import album
-from refgi.compare.plot import Axes, Curve, curves_plot
+from refgi.compare.plot import CARD, INK, LINE, METHOD_COLOURS, Axes, Curve, curves_plot, figure_svg, style_plot
 from refgi.compare.report import PAGE, machine, number, script, sort_key, templates
 from refgi.image import write_text
 from refgi.provenance import Record
+
+OVERVIEW_AXES = Axes("time of a frame, ms", "RMSE over the path tracer's in equal time", log_x=True, log_y=True,
+                     decimal_x=True)
+
+
+class Place(NamedTuple):
+    """A scene and where its page is."""
+
+    scene: SceneResult
+    link: str
+
+
+def overview(places: Sequence[Place]) -> dict[str, Any]:
+    """Return the table and the plot over all scenes, in the page's order.
+
+    `methods`; `rows`, one a scene, with a cell a method; `plot`, an ``<svg>`` element.
+    """
+    from markupsafe import Markup
+
+    methods = list(dict.fromkeys(run.method for place in places for run in place.scene.runs))
+    rows = [{"scene": place.scene.scene, "link": place.link, "size": f"{place.scene.width} x {place.scene.height}",
+             "cells": [_cell([run for run in place.scene.runs if run.method == name]) for name in methods]}
+            for place in places]
+    return {"methods": methods, "rows": rows, "plot": Markup(_plot(places, methods))}
+
+
+def _cell(runs: Sequence[Run]) -> dict[str, str]:
+    """Return a method's least ratio with its time and settings, and its nearest picture."""
+    known = [run for run in runs if run.in_equal_time is not None]
+    best = min(known, key=lambda run: run.in_equal_time or math.inf, default=None)
+    nearest = min((run for run in runs if math.isfinite(run.rmse)), key=lambda run: run.rmse, default=None)
+    return {"ratio": times(best.in_equal_time) if best else "", "sort": sort_key(best.in_equal_time if best else None),
+            "at": f"{best.label}, {number(1e3 * best.seconds)} ms" if best else "",
+            "nearest": f"{in_percent(nearest.rmse)} % in {number(1e3 * nearest.seconds)} ms" if nearest else "",
+            "beaten": "yes" if best and (best.in_equal_time or 0) > 1 else ""}
+
+
+def _plot(places: Sequence[Place], methods: Sequence[str]) -> str:
+    """Draw every run of every scene by time and ratio, and the path tracer's own line at 1."""
+    points = [(run.method, 1e3 * run.seconds, run.in_equal_time) for place in places for run in place.scene.runs
+              if run.in_equal_time is not None and run.seconds > 0]
+    if not points:
+        return ""
+    curves = [Curve(name, [x for method, x, _ in points if method == name],
+                    [y for method, _, y in points if method == name], joined=False) for name in methods]
+    ends = [min(x for _, x, _ in points), max(x for _, x, _ in points)]
+    return curves_plot([*curves, Curve("path tracer", ends, [1.0, 1.0], dashed=True)], OVERVIEW_AXES)
+
+
+HATCHES = ("", "////", "\\\\\\\\")  # of approximations that share a colour; dots would be a quarter of a MB each
+LEAST = 1e-4  # a part of less than that shows in no bar
+WIDTH, HEIGHT, ROW = 9.2, 1.5, 0.45  # inches: of the plot, of what stands around the bars, and of a bar
+LEGEND_ROW = 0.18  # inches, of a name
+SPLIT_HOW = (
+    "From the truth to the method as it is used, one approximation more at a time, in the order of its "
+    "pipeline. Left: what each changes of the mean. Right: its share of the mean square error, its own "
+    "square and half of its cross terms with others. Both add up to the mark; what lies on the other side "
+    "takes back what others did. The tables also have what the error would be with one approximation "
+    "alone switched off.")
+
+
+def splits_of(splits: Sequence[Split]) -> dict[str, Any] | None:
+    """Return what the page's template shows of a scene's splits; None without splits."""
+    from markupsafe import Markup
+
+    if not splits:
+        return None
+    return {"how": SPLIT_HOW, "plot": Markup(bars(splits)), "columns": SPLIT_COLUMNS,
+            "tables": [{"said": said_of_split(split), "rows": rows_of_split(split)} for split in splits]}
+
+
+def bars(splits: Sequence[Split]) -> str:
+    """Draw a bar for each split, top to bottom: an ``<svg>`` element that refers to nothing outside itself."""
+    names = list(dict.fromkeys(part.name for split in splits for part in split.parts))
+
+    def draw(figure: Any) -> None:
+        left, right = figure.subplots(1, 2, sharey=True)
+        _panel(left, [[part.mean for part in split.parts] for split in splits], splits, names)
+        _panel(right, [[part.share for part in split.parts] for split in splits], splits, names)
+        left.set(xlabel="change of the mean, %", yticks=range(len(splits)),
+                 yticklabels=[split.label.replace(", ", "\n") for split in splits])
+        right.set(xlabel="share of the square, %")
+        left.invert_yaxis()
+        handles, labels = _legend(names)
+        legend = figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=9)
+        for text in (*left.get_yticklabels(), *legend.get_texts()):
+            text.set_parse_math(False)  # a name is no formula
+
+    return figure_svg(draw, (WIDTH, HEIGHT + max(len(splits) * ROW, len(names) * LEGEND_ROW)), "Error split")
+
+
+def stacked(values: Sequence[float]) -> list[tuple[float, float]]:
+    """Return where the parts of a signed bar begin, and their lengths.
+
+    Those above 0 follow each other to the right of 0, those below to the left.
+
+    >>> stacked([3, -1, 2, -4])
+    [(0.0, 3), (0.0, -1), (3.0, 2), (-1.0, -4)]
+    """
+    ends, found = {True: 0.0, False: 0.0}, []
+    for value in values:
+        found.append((ends[value >= 0], value))
+        ends[value >= 0] += value
+    return found
+
+
+def _panel(
+    plot: Any, rows: Sequence[Sequence[float | None]], splits: Sequence[Split], names: Sequence[str]
+) -> None:
+    style_plot(plot)
+    plot.grid(True, axis="x", color=LINE, linewidth=0.8)
+    plot.use_sticky_edges = False
+    plot.margins(x=0.06)
+    plot.axvline(0, color=INK, linewidth=0.8)
+    plot.tick_params(axis="y", length=0, labelsize=8)
+    for row, (values, split) in enumerate(zip(rows, splits, strict=True)):
+        known = [100 * (value or 0.0) for value in values]
+        for part, (begin, length) in zip(split.parts, stacked(known), strict=True):
+            if abs(length) > 100 * LEAST:
+                plot.barh(row, length, left=begin, height=0.66, **_look(part, names))
+        plot.plot([sum(known)], [row], "D", markersize=5, color=INK, markerfacecolor=CARD)
+
+
+def _look(part: Part, names: Sequence[str]) -> dict[str, Any]:
+    number = names.index(part.name)
+    return {"facecolor": METHOD_COLOURS[number % len(METHOD_COLOURS)], "edgecolor": CARD, "linewidth": 0.8,
+            "hatch": HATCHES[number // len(METHOD_COLOURS) % len(HATCHES)]}
+
+
+def _legend(names: Sequence[str]) -> tuple[list[Any], list[str]]:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    looks = [_look(Part.model_construct(name=name), names) for name in names]
+    total = Line2D([], [], color=INK, marker="D", markerfacecolor=CARD, linestyle="")
+    return [*(Patch(**look) for look in looks), total], [*names, "sum"]
+
 
 COLUMNS = ("method", "settings", "time, ms", "RMSE, %", "95 % interval", "bias, %", "spread, %",
            "own limits, %", "over truth's in equal time", "FLIP", "SSIM", "pairs, M", "rays, M", "stages, MiB",
@@ -105,7 +256,8 @@ def said_of(scene: SceneResult) -> Iterator[str]:
     """
     best = {run.method: run for run in sorted(scene.runs, key=lambda one: -one.rmse)}
     for method, run in sorted(best.items(), key=lambda one: one[1].rmse):
-        text = f"{method} comes to {percent(run.errors[TRUTH].rmse)} % in {number(1e3 * run.seconds)} ms ({run.label})"
+        text = (f"{method} comes to {in_percent(run.errors[TRUTH].rmse)} % in {number(1e3 * run.seconds)} ms "
+                f"({run.label})")
         own = [one for one in scene.runs if one.method == method]
         ahead = [one for one in own if (one.in_equal_time or 0) <= 1]
         if not scene.line:
@@ -123,7 +275,7 @@ def said_of(scene: SceneResult) -> Iterator[str]:
 
 def _curve(label: str, runs: list[tuple[str, Run]], *, dashed: bool = False) -> Curve:
     ordered = sorted(runs, key=lambda one: one[1].seconds)
-    links = [(name, f"{label}, {run.label}: {percent(run.rmse)} % in {_ms(run.seconds)} ms")
+    links = [(name, f"{label}, {run.label}: {in_percent(run.rmse)} % in {_ms(run.seconds)} ms")
              for name, run in ordered]
     return Curve(label, [1e3 * run.seconds for _, run in ordered], [100 * run.rmse for _, run in ordered], dashed,
                  [_interval(run) for _, run in ordered], links)
@@ -136,10 +288,10 @@ def _interval(run: Run) -> tuple[float, float]:
 
 def _row(name: str, run: Run) -> dict[str, Any]:
     known = run.errors[TRUTH]
-    interval = "" if known.low is None else f"{percent(known.low)} to {percent(known.high)}"
-    cells = [(_ms(run.seconds), run.seconds), (percent(known.rmse), known.rmse), (interval, known.low),
-             (percent(known.bias), known.bias), (percent(known.spread), known.spread),
-             (percent(run.own_limits), run.own_limits), (times(run.in_equal_time), run.in_equal_time),
+    interval = "" if known.low is None else f"{in_percent(known.low)} to {in_percent(known.high)}"
+    cells = [(_ms(run.seconds), run.seconds), (in_percent(known.rmse), known.rmse), (interval, known.low),
+             (in_percent(known.bias), known.bias), (in_percent(known.spread), known.spread),
+             (in_percent(run.own_limits), run.own_limits), (times(run.in_equal_time), run.in_equal_time),
              (times(run.flip), run.flip), (times(run.ssim), run.ssim),
              *taken(run.work)]
     return {"name": name, "method": run.method, "settings": run.label, "front": run.front,

@@ -17,8 +17,7 @@ import numpy as np
 import pydantic
 
 from refgi import skips
-from refgi.bench.dim_lights import DimLights, dim_lights
-from refgi.bench.trades import Trade, changes_of, difference
+from refgi.bench.trades import DimLights, Trade, changes_of, difference, dim_lights
 from refgi.errors import RefgiWarning, expect
 from refgi.methods import Picture, find_method, render
 from refgi.scene import Scene

@@ -2,21 +2,130 @@
 
 import re
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from refgi.cli.batch_report import Done, failures_of, folder_of, require_memory, say_done, say_what_would_be
 from refgi.cli.options import speech, writing
-from refgi.cli.session import Session, progress, say
+from refgi.cli.session import DONE, FAILED, Session, progress, say
+from refgi.texts import annotation
 
 if TYPE_CHECKING:
     from refgi.batch.jobs import Job
-    from refgi.batch.plan import Plan
+    from refgi.batch.plan import Finding, Plan
     from refgi.batch.shared import Common
     from refgi.bench.results import Result
     from refgi.cli.session import Tell
+
+class Done(NamedTuple):
+    """What became of a batch."""
+
+    jobs: int  # of the plan, or of the part that was asked for
+    begun: int  # that had no result before
+    failures: dict[str, str]  # why jobs gave no picture, by what is said of them
+    findings: "list[Finding]"
+    out: str
+    doubts: list[str]  # truths whose error is not to be trusted
+
+
+def say_done(session: Session, done: Done, form: str) -> int:
+    """Print what became of a batch, as "text" or as annotations of "github"; return the exit code."""
+    github = form == "github" and not session.as_json
+    lines = [f"{done.jobs} jobs: {done.begun} done now, {done.jobs - done.begun} were there, "
+             f"{len(done.failures)} without a picture -> {done.out}"]
+    for name, why in done.failures.items():
+        text = f"{name} gave no picture: {why}"
+        lines += [annotation("refgi: no picture", text)] if github else []
+        say(text)
+    for doubt in done.doubts:
+        lines += [annotation("refgi: in doubt", doubt)] if github else []
+        say(doubt)
+    for finding in done.findings:
+        lines += [annotation(f"refgi: {finding.place} {finding.figure}", str(finding))] if github else []
+        say(str(finding))
+    content = {"jobs": done.jobs, "done_now": done.begun, "failures": done.failures, "doubts": done.doubts,
+               "findings": [finding._asdict() for finding in done.findings], "out": done.out}
+    lines += [] if github else [f"refgi report {done.out} shows times, errors and pictures"]
+    session.result("\n".join(lines), content)
+    return FAILED if done.failures or done.findings else DONE
+
+
+def say_what_would_be(
+    session: Session, jobs: "Sequence[Job]", open_jobs: "Sequence[Job]", common: "Common", workers: int, tell: "Tell"
+) -> int:
+    """Print what a batch would do, in how much time and memory; return the exit code.
+
+    `jobs` are all that are asked for, `open_jobs` those without a result.
+    """
+    from refgi.batch.schedule import estimate
+
+    found = estimate(open_jobs, common, tell)
+    needed = memory_needed(open_jobs, common, workers)
+    frames = len({job.shot for job in open_jobs})
+    lines = [f"{len(jobs)} jobs on {len({job.shot for job in jobs})} frames; {len(open_jobs)} have no result",
+             f"about {duration(found.seconds)} for them, and up to {duration(found.truth_seconds)} for the truths of "
+             f"{frames} frames where the store has none", f"about {needed / 2**20:,.0f} MB of memory in {workers} "
+             f"{'process' if workers == 1 else 'processes'}"]
+    lines += [f"  {job.name}  {job.label}" for job in open_jobs]
+    session.result("\n".join(lines), {
+        "jobs": len(jobs), "open": [{"job": job.name, "label": job.label} for job in open_jobs], "bytes": needed,
+        **found._asdict()})
+    return DONE
+
+
+def duration(seconds: float) -> str:
+    """Return a time, s, in the unit that suits it.
+
+    >>> duration(3.21), duration(200), duration(20000)
+    ('3.2 s', '3.3 min', '5.6 h')
+    """
+    for unit, length, most in (("s", 1, 90), ("min", 60, 90)):
+        if seconds < most * length:
+            return f"{seconds / length:.1f} {unit}"
+    return f"{seconds / 3600:.1f} h"
+
+
+def memory_needed(jobs: "Sequence[Job]", common: "Common", workers: int) -> int:
+    """Estimate the memory that jobs take, bytes: the most that a job takes, in every one of `workers` processes."""
+    from refgi.batch.jobs import scene_at
+    from refgi.cli.view import map_count, needed_bytes
+    from refgi.method import Extent
+    from refgi.methods import find_method
+
+    most = 0
+    for first in {job.shot.scene: job for job in jobs}.values():  # frames of a path differ little
+        scene = scene_at(first.shot)
+        size = scene.camera.width, scene.camera.height
+        extent = Extent(size, maps=map_count(scene), texels=common.rsm_resolution**2)
+        own = needed_bytes(scene, *size, rsm_resolution=common.rsm_resolution, traced=True,
+                           compared=2 + max(len(job.seeds) for job in jobs))
+        extra = max(find_method(job.choice.method).extra_bytes(job.choice.settings, extent)
+                    for job in jobs if job.shot.scene == first.shot.scene)
+        most = max(most, own + extra)
+    return most * workers
+
+
+def require_memory(jobs: "Sequence[Job]", common: "Common", workers: int) -> None:
+    """Refuse more processes than there is memory for; an InputError names what is needed and what is available."""
+    from refgi import memory
+    from refgi.errors import expect
+
+    needed, available = memory_needed(jobs, common, workers), memory.available_bytes()
+    expect(available is None or needed <= available, "--workers",
+           f"so few that about {needed:,} bytes of memory are there, or a smaller size", f"{available} available")
+
+
+def failures_of(result: "Result") -> dict[str, str]:
+    """Return why jobs gave no picture, by what is said of them."""
+    return {f"{scene.scene} {name}": why for scene in result.scenes for name, why in scene.failures.items()}
+
+
+def folder_of(baseline: str | None) -> str:
+    """Return where the pictures of a baseline lie."""
+    return str(Path(baseline).parent) if baseline else ""
+
 
 FILES = ("results.json", "results.csv", "results.md")
 SECONDS_BETWEEN_RESULTS = 30.0
@@ -73,10 +182,9 @@ def _batch(session: Session, /, plan_file: str, out: str, parents: bool, force: 
     Every job is done once: its result is named by all that it depends on. An interrupted batch goes on where it was.
     Exits with 1 where a job failed, a threshold of [expect] is missed or a figure is worse than the baseline's.
     """
-    from refgi.batch.baseline import read_baseline, worse
     from refgi.batch.jobs import jobs_of
-    from refgi.batch.plan import read_plan
-    from refgi.batch.thresholds import broken
+    from refgi.batch.outcome import read_baseline, worse
+    from refgi.batch.plan import broken, read_plan
     from refgi.cli.destination import Permission, folder, make
 
     plan = read_plan(Path(plan_file))
@@ -131,7 +239,7 @@ def _since(jobs: "list[Job]", commit: str | None) -> "list[Job]":
     """Return the jobs of methods whose code changed since a commit; all where there is none."""
     if commit is None:
         return jobs
-    from refgi.batch.changes import changed_methods
+    from refgi.batch.code import changed_methods
 
     names = dict.fromkeys(job.choice.method for job in jobs)
     changed = changed_methods(names, commit)
@@ -152,9 +260,8 @@ def _open_jobs(request: _Request) -> "list[Job]":
 
 def _do(request: _Request, executor: str | None, tell: "Tell") -> int:
     """Do what is not done; return how many jobs that was."""
-    from refgi.batch.cluster import SCHEME, run_on_cluster
     from refgi.batch.outcome import outcome_file, remove_leftovers
-    from refgi.batch.schedule import chunks_of, run_here, run_in_processes
+    from refgi.batch.schedule import SCHEME, chunks_of, run_here, run_in_processes, run_on_cluster
     from refgi.cli.warm import warm_up
     from refgi.errors import expect
 
@@ -194,7 +301,7 @@ def _from_time_to_time(request: _Request) -> Any:
 
 
 def _written(request: _Request) -> "Result":
-    from refgi.batch.results import read_outcomes, result_of
+    from refgi.batch.outcome import read_outcomes, result_of
     from refgi.bench.results import write_results
 
     folder = request.common.folder

@@ -52,7 +52,7 @@ def _bench(
     from refgi.cli.destination import Permission, folder
     from refgi.cli.settings import settings_for, still_frames
     from refgi.cli.view import View
-    from refgi.compare.provenance import environment
+    from refgi.compare.report import environment
     from refgi.errors import RefgiWarning, expect
 
     expect(not (quick and grid_file), "--grid", "--quick or --grid, not both", "both")

@@ -43,16 +43,15 @@ def _check(
     Exit codes: 0 within the tolerance or the noise, 1 not, or by a truth whose error is not to be trusted.
     """
     from refgi import stages
-    from refgi.cli.memory import require_memory
     from refgi.cli.options import on_threads
     from refgi.cli.settings import settings_for
-    from refgi.cli.view import View
+    from refgi.cli.view import View, require_memory
     from refgi.cli.warm import warm_up
     from refgi.errors import expect
     from refgi.image.picture import read_colour
     from refgi.methods import render
     from refgi.truth.result import doubt_of_both
-    from refgi.vectors.pictures import judge_picture
+    from refgi.vectors.judge import judge_picture
 
     found = read_colour(Path(picture), (INDIRECT, ""), layer, part)
     kind = "indirect irradiance" if INDIRECT in found.names[0] else "radiance"

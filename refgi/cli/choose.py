@@ -11,8 +11,7 @@ from refgi.cli.options import Size, on_threads, speech
 from refgi.cli.session import DONE, FAILED, Session, progress, table
 
 if TYPE_CHECKING:
-    from refgi.bench.choose import Chosen, Wish
-    from refgi.bench.search import Probe
+    from refgi.bench.choose import Chosen, Probe, Wish
 
 UNITS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "": 1.0}
 
@@ -67,7 +66,7 @@ def _choose(
     tracing over its mean, without the path tracer's own noise. The path tracer is among the candidates.
     """
     from refgi.bench.choose import Wish, choose
-    from refgi.bench.tracks import built_in_tracks
+    from refgi.bench.grid import built_in_tracks
     from refgi.cli.view import View
     from refgi.errors import expect
     from refgi.settings import from_text

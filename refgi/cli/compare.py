@@ -39,11 +39,10 @@ def _compare(session: Session, /, methods: str | None, preset: str, pairs: tuple
     A method that knows no visibility is also compared with the truth without visibility, to which it converges.
     """
     from refgi.cli.destination import Permission, folder
-    from refgi.cli.memory import require_memory
     from refgi.cli.options import on_threads
     from refgi.cli.session import progress
     from refgi.cli.settings import still_frames
-    from refgi.cli.view import View
+    from refgi.cli.view import View, require_memory
     from refgi.cli.warm import warm_up
     from refgi.compare import compare
     from refgi.compare.results import file_names

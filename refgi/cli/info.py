@@ -17,7 +17,7 @@ from refgi.cli.session import Session, table
 @click.pass_obj
 def _info(session: Session, /) -> None:
     """Show methods, versions, CPU features, threads and cache."""
-    from refgi.compare.provenance import environment
+    from refgi.compare.report import environment
     from refgi.jit import cache_root
     from refgi.methods import METHODS
 

@@ -53,7 +53,7 @@ def _render(ctx: click.Context, /, **options: Any) -> int:
     """
     from refgi.cli.destination import Permission, Pictures, picture_files
     from refgi.cli.job import asked, recorded, require_either, stem
-    from refgi.cli.memory import require_memory
+    from refgi.cli.view import require_memory
     from refgi.errors import expect
 
     require_either(ctx)

@@ -32,13 +32,12 @@ def _stress(session: Session, /, methods: str | None, changes: tuple[str, ...], 
     limit; the exit code is 1 where one is broken.
     """
     from refgi.cli.destination import Permission, folder
-    from refgi.cli.memory import require_memory
-    from refgi.cli.view import View
+    from refgi.cli.view import View, require_memory
     from refgi.cli.warm import warm_up
-    from refgi.compare.provenance import environment
+    from refgi.compare.report import environment
     from refgi.methods import METHODS, find_method
     from refgi.stress.page import markdown_summary, write_page
-    from refgi.stress.rows import Stability, markdown, write_rows
+    from refgi.stress.promises import Stability, markdown, write_rows
     from refgi.stress.run import Found, Silence, stress
 
     names = [find_method(name.strip()).name for name in methods.split(",")] if methods is not None else list(METHODS)

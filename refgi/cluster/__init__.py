@@ -8,10 +8,9 @@ shadows, PCF, PCSS and convolution shadow maps, `lighting` the picture. `adaptiv
 `reference` holds the references of these steps and the error of each.
 """
 
-from refgi.cluster.approximations import APPROXIMATIONS
+from refgi.cluster.approximations import APPROXIMATIONS, val_ledger
 from refgi.cluster.clustering.kmeans import Clustering, cluster
 from refgi.cluster.clustering.rectangle import AreaLights, area_lights
-from refgi.cluster.ledger import val_ledger
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps

@@ -10,10 +10,9 @@ import dataclasses
 import math
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.clustering.kmeans import clusters_of
 from refgi.cluster.clustering.rectangle import AreaLights, area_lights
@@ -22,20 +21,19 @@ from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.cluster.reference import reference_visibility, vpl_visibility
 from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters
-from refgi.draws import AREA_LIGHT_SAMPLES, draws
 from refgi.errors import RefgiWarning, expect
 from refgi.jit import threads
 from refgi.lights.selection import footprints
 from refgi.pairs.irradiance import Receivers
 from refgi.rsm import facing_normals
+from refgi.sampling import AREA_LIGHT_SAMPLES, draws
 from refgi.stages import skip, stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.cluster.settings import ValSettings
     from refgi.frame import Frame
     from refgi.lights import PixelLights
-
-Array = npt.NDArray[Any]
 
 SAMPLES = 2048  # pixels: what one in a thousand adds is seen
 DEVIATIONS = 1.645  # standard errors from the estimate to its bound: 95 %

@@ -1,4 +1,4 @@
-"""What `val` approximates, in the order of its pipeline: from a ray to each pixel light to filtered shadow maps.
+"""What `val` approximates, in the order of its pipeline, and where the light goes that it loses.
 
 Kinds of visibility stand on each other: without the series there is none to filter, without a map none to search. What
 switches one off switches off those that follow from it.
@@ -6,7 +6,7 @@ switches one off switches off those that follow from it.
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from refgi.cluster.settings import (
     BY_MAPS,
@@ -21,10 +21,25 @@ from refgi.cluster.settings import (
     ValSettings,
     Visibility,
 )
-from refgi.lights.approximations import CLAMP, FINER, LIGHT_SAMPLING, OPENNESS, RSM_RESOLUTION, VISIBILITY
-from refgi.lights.settings import MOST_LIGHTS
+from refgi.cluster.val import val
+from refgi.ledger import Ledger, account
+from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import (
+    CLAMP,
+    FINER,
+    LIGHT_SAMPLING,
+    MOST_LIGHTS,
+    OPENNESS,
+    RSM_RESOLUTION,
+    VISIBILITY,
+    with_clamp,
+)
 from refgi.method import Approximation
+from refgi.pairs.irradiance import Receivers, irradiance
+from refgi.stages import stage
 
+if TYPE_CHECKING:
+    from refgi.frame import Frame
 
 def _seen_by(settings: ValSettings, visibility: Visibility) -> ValSettings:
     """Return settings with another kind of visibility and the same maps, whatever is best for that kind."""
@@ -87,3 +102,25 @@ APPROXIMATIONS = (
     Approximation("CSM series", "M terms and their bias for the test of depth", _tests_of_depth),
     Approximation("filter", "levels of a mip map for each texel of the region", _every_texel),
     Approximation("interleaving", "a pixel sums one light of n x n, and the blur", _all_at_each_pixel))
+
+
+@stage("cluster.ledger")
+def val_ledger(frame: "Frame", settings: ValSettings) -> Ledger:
+    """Account for the power of the lights under `val`.
+
+    -> Ledger: Its lines sum to `emitted` but for the rounding of the frame's dtype.
+
+    Notes
+    -----
+    `shadowed` is what the method's own soft shadows take. On the Cornell box at 512 x 512 it takes 2.6 times as long as
+    the picture.
+    """
+    settings = with_clamp(settings)
+    footprint = footprints(frame, settings.lights, settings.pairs)
+    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    unblocked = irradiance(receivers, choose_lights(frame, settings.lights), settings.pairs, footprint)
+    whole = dataclasses.replace(settings, interleaving=InterleavingSettings(block=1))
+    picture = val(frame, settings)
+    every = val(frame, whole) if whole != settings else picture
+    return account(frame, settings.lights, settings.pairs, footprint, picture,
+                   {"shadowed": unblocked - every, "interpolated": every - picture})

@@ -1,12 +1,10 @@
 """Real-time Indirect Illumination with Clustered Visibility (Dong, Grosch, Ritschel, Kautz and Seidel 2009)."""
 
-from typing import TYPE_CHECKING, Any
-
-import numpy.typing as npt
+from typing import TYPE_CHECKING
 
 from refgi.cluster.adaptive import MOST_TEXELS, count_for_error, group_lights
 from refgi.cluster.clustering.rectangle import AreaLights
-from refgi.cluster.filters.eight import EIGHT
+from refgi.cluster.filters.pyramid import EIGHT
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.lighting.glossy import clustered_radiance
@@ -17,18 +15,16 @@ from refgi.jit import thread_count
 from refgi.lights.selection import choose_lights, footprints, light_areas
 from refgi.lights.settings import most_lights, with_clamp
 from refgi.method import Extent
+from refgi.pairs.estimates import report_sampling, warn_of_clamp
 from refgi.pairs.irradiance import Receivers
-from refgi.pairs.loss import warn_of_clamp
-from refgi.pairs.sampling import report_sampling
 from refgi.rsm import facing_normals
-from refgi.rsm.buffers.glossy import GlossyPoints, spread_over_picture
+from refgi.rsm.buffers.leaving import GlossyPoints, spread_over_picture
 from refgi.stages import skip
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.lights import PixelLights
-
-Array = npt.NDArray[Any]
 
 PAIRS_IN_FULL = 1 << 30  # about a quarter of a second on two cores
 PUBLISHED_BLOCK = 8  # pixels

@@ -11,15 +11,13 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.compare.metrics import count_non_finite
 from refgi.errors import RefgiError
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 EXPOSURES = 3
 MOST_STOPS = 8.0  # between the first and the last exposure

@@ -7,15 +7,12 @@ the reference, per pixel and channel. Every figure refuses pixels that are NaN o
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.compare.ssim import mean_ssim
 from refgi.errors import InputError, expect
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 RELATIVE_FLOOR = 0.1  # of the reference's mean: keeps relMSE finite where the reference is dark
 

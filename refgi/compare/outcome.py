@@ -19,7 +19,6 @@ from refgi import stages
 from refgi.compare.flip import Flip
 from refgi.compare.metrics import (
     METRICS,
-    Array,
     checked_mask,
     count_non_finite,
     decibels,
@@ -31,6 +30,7 @@ from refgi.compare.ssim import ssim_of_noise
 from refgi.errors import expect
 from refgi.provenance import Record, scene_record
 from refgi.scene import Scene
+from refgi.types import Array
 
 NOISE_MARGIN = 1.1  # a figure is itself random: within 10 % of the expected noise it is noise
 BIAS_MARGIN = 2.0  # standard errors: 95 % of what noise alone gives

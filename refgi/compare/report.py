@@ -1,27 +1,74 @@
-"""The page of a comparison: one file that works from disk, with pictures as numbers, table, plot and stages inside."""
+"""The page of a comparison: one file that works from disk, with pictures as numbers, table, plot and stages inside.
+
+What a result was made with: versions, processor, threads.
+"""
 
 import functools
 import math
-from collections.abc import Mapping
+import platform
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi import stages
 from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, Figure, Measurement, MethodResult, Reference
 from refgi.compare.page.album import LABELS, Judge, Picture, View, album
 from refgi.compare.plot import Point, time_against_error
-from refgi.compare.provenance import provenance_rows
 from refgi.image import write_text
-from refgi.provenance import plain
+from refgi.provenance import Record, plain, versions
+from refgi.scene.files import text_of
+from refgi.types import Array
 
 if TYPE_CHECKING:
     import jinja2
     from markupsafe import Markup
 
-Array = npt.NDArray[Any]
+DEGREE = "\N{DEGREE SIGN}"
+SIMD = ("sse2", "avx", "avx2", "fma", "avx512f", "avx512vl", "neon", "sve")
+
+
+def provenance_rows(record: Record) -> list[tuple[str, str]]:
+    """Return what a record says, as (name, text), in the order in which one asks."""
+    scene, program = record["scene"], record["refgi"]
+    return [
+        ("scene", "made in Python" if scene["source"] is None else text_of(scene["source"])),
+        *((f"file {text_of(name)}", f"SHA-256 {digest}") for name, digest in scene["files"].items()),
+        ("geometry", f"{scene['faces']:,} faces, SHA-256 {scene['geometry_sha256']}"),
+        ("materials", f"SHA-256 {scene['materials_sha256']}"),
+        ("camera", _fields(scene["camera"])),
+        *((f"light {number}", f"{light['type']}; {_fields(light)}") for number, light in enumerate(scene["lights"])),
+        *((key.replace("_", " "), str(value)) for key, value in record["options"].items()),
+        ("refgi", f"{program['version']}, commit {program.get('git', 'unknown')}"),
+    ]
+
+
+def _fields(content: dict[str, Any]) -> str:
+    return "; ".join(f"{key.replace('_', ' ')} {_value(value)}" for key, value in content.items() if key != "type")
+
+
+def _value(value: Sequence[float] | float) -> str:
+    if isinstance(value, Sequence):
+        return ", ".join(f"{part:g}" for part in value)
+    return str(value) if isinstance(value, int) else f"{math.degrees(value):g}{DEGREE}"  # sizes, and angles
+
+
+def environment() -> dict[str, Any]:
+    """Return versions, platform, cpu, simd (features of the processor) and threads as JSON values."""
+    import llvmlite.binding
+
+    from refgi.jit import thread_count
+
+    features = llvmlite.binding.get_host_cpu_features()
+    return {
+        "versions": versions(),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "cpu": llvmlite.binding.get_host_cpu_name(),
+        "simd": [name for name in SIMD if features.get(name)],
+        "threads": thread_count(),
+    }
+
 
 PAGE = Path(__file__).with_name("page")
 SCRIPTS = ("floats", "scene", "paint", "panels", "input", "viewer", "page")  # each after what it builds on

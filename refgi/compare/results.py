@@ -10,17 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi import stages
-from refgi.compare import maps
+from refgi.compare import pictures as maps
 from refgi.compare.flip import Flip
 from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, Measurement, MethodResult, Reference
 from refgi.compare.pictures import linear_planes, write_preview
 from refgi.image import canonical_json, write_encoded, write_exr, write_text
 from refgi.provenance import UNITS, Record, method_record, plain
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 SCHEMA = 1
 

@@ -8,12 +8,10 @@ K1 = 0.01, K2 = 0.03. The dynamic range is the reference's maximum, since linear
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 RADIUS = 5
 SIGMA = 1.5

@@ -18,13 +18,12 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import InputError, expect
 from refgi.image.whole import MARK, canonical_json, is_text, whole_file
 from refgi.memory import available_bytes
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 Channels = dict[str, Array]
 
 

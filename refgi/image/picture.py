@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import InputError, RefgiWarning, expect, shortened
 from refgi.image.exr import Part, read_parts, verified
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # x, y of red, green, blue, white
 SAME = 1e-3  # of chromaticities, which programs round

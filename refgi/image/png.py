@@ -16,8 +16,7 @@ import numpy.typing as npt
 
 from refgi.errors import RefgiWarning, expect
 from refgi.image.whole import MARK, canonical_json, whole_file
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 NOT_FINITE = (255, 0, 255)  # how a NaN or infinite pixel shows
 END_OF_HEADER = 33  # bytes of the signature and the first chunk, IHDR, after which a text may stand

@@ -15,9 +15,8 @@ import numba
 
 from refgi.jit.bands import in_bands, most_threads, threads
 from refgi.jit.cache import cache_root
-from refgi.jit.dispatch import Kernel, by_type
+from refgi.jit.dispatch import Kernel, by_type, has_wide_registers
 from refgi.jit.launcher import thread_count
-from refgi.jit.target import has_wide_registers
 
 __all__ = ["Kernel", "by_type", "cache_root", "has_wide_registers", "kernel", "most_threads", "prange",
            "thread_count", "threads"]

@@ -1,7 +1,7 @@
 """Compile kernels ahead, in as many processes as there are cores.
 
 `signatures.txt` lists which specialisations the methods need at their defaults: a line holds a kernel, its argument
-types as `refgi.jit.typetext` writes them, and what needs them.
+types as `refgi.jit.kernelfile` writes them, and what needs them.
 """
 
 import importlib
@@ -13,7 +13,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from refgi.jit.typetext import types_of
+from refgi.jit.kernelfile import types_of
 
 LIST = Path(__file__).with_name("signatures.txt")
 

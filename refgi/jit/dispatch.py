@@ -1,5 +1,8 @@
 """`Kernel`: a compiled function that is native code for Python and plain LLVM code for other kernels.
 
+A call with arrays counts references, atomically, so that threads wait for each other. Of a borrowed array nothing is
+counted; whoever lends it keeps it alive.
+
 Numba makes native code of every compiled function, also of one that is only ever called from others, where it is
 optimised and made native once more as a part of each. A `Kernel` therefore holds two dispatchers: itself, for calls
 from Python, with the cache on disk, and a `Callee`, which types and lowers the function for its callers and leaves
@@ -7,19 +10,59 @@ the rest to them.
 """
 
 import gc
+import os
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
+import llvmlite.binding
+from numba.core import types
 from numba.core.analysis import compute_cfg_from_blocks
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
+from numba.core.imputils import impl_ret_untracked
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
+from numba.extending import intrinsic
 from numba.extending import overload as numba_overload
+from numba.np.arrayobj import make_array
 
-from refgi.jit.cache import KernelCache
-from refgi.jit.key import OVERLOADS
+from refgi.jit.cache import OVERLOADS, KernelCache
+
+WIDEST = "avx512f"
+
+
+def has_wide_registers() -> bool:
+    """Return whether kernels are compiled for AVX-512, which masks out what lies beside a span at no cost.
+
+    Returns
+    -------
+    bool
+        Of the processor, unless NUMBA_CPU_NAME and NUMBA_CPU_FEATURES name another target.
+    """
+    features = os.environ.get("NUMBA_CPU_FEATURES")
+    if features is not None:
+        return f"+{WIDEST}" in features.split(",")
+    if os.environ.get("NUMBA_CPU_NAME") not in (None, "host"):
+        return False
+    return bool(llvmlite.binding.get_host_cpu_features().get(WIDEST))
+
+
+def _without_count(_: Any, array: Any) -> Any:
+    """Type and emit the same array, owned by nobody."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = signature.args[0]
+        lent = make_array(kind)(context, builder, value=arguments[0])
+        lent.meminfo = context.get_constant_null(types.MemInfoPointer(kind.dtype))
+        lent.parent = context.get_constant_null(types.pyobject)
+        return impl_ret_untracked(context, builder, signature.return_type, lent._getvalue())
+
+    return array(array), generate
+
+
+borrowed: Any = intrinsic(_without_count)
+
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -36,10 +36,9 @@ stochastic range, `cut` are signed, below 0 where power was added. The cut of th
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.ledger.light_terms import LightTerms, light_terms
 from refgi.lights.selection import choose_lights, light_maps
@@ -47,6 +46,7 @@ from refgi.lights.settings import MapLights, PathLights
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.radiometry import lobe_fraction
 from refgi.settings import replaced
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
@@ -55,8 +55,6 @@ if TYPE_CHECKING:
     from refgi.pairs.settings import PairSettings
     from refgi.rsm import GBuffer
     from refgi.scene import Geometry
-
-Array = npt.NDArray[Any]
 
 PRINTED_WIDENINGS = frozenset({"sii_widening", "sii_widening_unnorm"})
 MEANING = {

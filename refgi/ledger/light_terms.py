@@ -7,18 +7,16 @@ by itself, so that they give the closed form again only where solid angles, fall
 """
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
+
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rsm import Projection, Rsm
     from refgi.scene import Geometry, MaterialTable
     from refgi.scene.model import Light
-
-Array = npt.NDArray[Any]
-
 
 class LightTerms(NamedTuple):
     """Power of one light by where it goes, (3,) float64 each, W."""

@@ -10,22 +10,20 @@ ones lights come out too dim inside and too bright outside (Nichols and Wyman 20
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.rsm.buffers.gbuffer import values_at
 from refgi.rsm.raster.projection import Projection
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
     from refgi.rsm import Rsm
     from refgi.scene.model import Light
-
-Array = npt.NDArray[Any]
 
 EQUALLY_NEAR = 8  # chosen texels tested for ties
 LEAST_COSINE = 1e-3  # at grazing angles areas would grow without limit

@@ -14,14 +14,13 @@ import math
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.stages import stage
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 Kind = Literal["flux", "peak", "openness"]
 
 

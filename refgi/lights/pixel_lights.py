@@ -15,9 +15,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.draws import PIXEL_LIGHTS, draws
 from refgi.errors import expect
 from refgi.lights.footprints import cell_sums, cells_of_grid, cells_of_nearest, texel_areas, texels_with_flux
 from refgi.lights.importance import importance as importance_of
@@ -26,14 +24,12 @@ from refgi.lights.warp import Warp, texel_of, warp_stacked
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.rsm.buffers.gbuffer import values_at
 from refgi.rsm.buffers.reflective import Rsm
-from refgi.sampling import grid, halton
+from refgi.sampling import PIXEL_LIGHTS, draws, grid, halton
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.lights.steps import MapPlanes
-
-Array = npt.NDArray[Any]
-
 
 class Drawn(NamedTuple):
     """Texels of one map, drawn as pixel lights; those without flux included."""

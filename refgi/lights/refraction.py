@@ -19,7 +19,6 @@ side, T share that is not reflected.
 from typing import Any, Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.rsm.buffers.gbuffer import GBuffer
@@ -30,8 +29,8 @@ from refgi.scene.material import SHARPEST
 from refgi.scene.model import DirectionalLight, Geometry, MaterialTable
 from refgi.skips import left_out
 from refgi.stages import skip, stage
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 Mode = Literal["back_face", "two_interface"]
 
 

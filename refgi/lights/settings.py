@@ -1,10 +1,12 @@
-"""Settings of pixel lights: how many, from shadow maps or light paths, with which importance and openness."""
+"""Settings of pixel lights, and what every method that uses pixel lights approximates by them."""
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, TypeVar
 
 from refgi.errors import expect
 from refgi.lights.walk import MOST_BOUNCES
+from refgi.method import Approximation
 from refgi.pairs.settings import LAST_SEED, AutoClamp, DiscClamp, PairSettings
 from refgi.scene.material import SHARPEST
 from refgi.scene.values import LARGEST
@@ -169,3 +171,42 @@ def expect_footprints(lights: LightSettings, pairs: PairSettings) -> None:
                pairs.clamp and pairs.clamp.name())
         expect(lights.openness.flux != "roulette", "lights.openness.flux",
                f"'none' or 'scale' with the clamp {pairs.clamp and pairs.clamp.name()!r}", lights.openness.flux)
+
+
+PATHS = 1 << 16  # light paths that stand for all
+FINER = 2  # texels along a side for each one
+
+
+def every_light(lights: LightSettings) -> LightSettings:
+    """Return settings by which every texel of the maps is a pixel light, or many ends of light paths are."""
+    if not isinstance(lights.source, MapLights):
+        return dataclasses.replace(lights, count=max(lights.count, PATHS), seed=0)
+    source = dataclasses.replace(lights.source, pattern="all", filtered=False, warp=None,
+                                 as_published=lights.source.as_published - {"sii_peak"})
+    return dataclasses.replace(lights, count=1, seed=0, source=source)
+
+
+def without_clamp(settings: Any, _: Mapping[str, Any]) -> Any:
+    """Return settings of a method whose near pairs are not clamped."""
+    return dataclasses.replace(settings, pairs=dataclasses.replace(settings.pairs, clamp=None))
+
+
+def _finer_map(options: Mapping[str, Any]) -> Mapping[str, Any]:
+    return {**options, "rsm_resolution": FINER * options["rsm_resolution"]}
+
+
+def _unscaled(settings: Any, _: Mapping[str, Any]) -> Any:
+    return dataclasses.replace(settings, lights=dataclasses.replace(settings.lights, openness=OpennessSettings()))
+
+
+def _sampled(settings: Any, _: Mapping[str, Any]) -> Any:
+    return dataclasses.replace(settings, lights=every_light(settings.lights))
+
+
+VISIBILITY = Approximation("visibility", "nothing blocks indirect light", limit=lambda _: {"visibility": False})
+RSM_RESOLUTION = Approximation(
+    "RSM resolution", f"texels of the reflective shadow map; off: {FINER} along a side for each", frame=_finer_map)
+LIGHT_SAMPLING = Approximation(
+    "light sampling", "N pixel lights for all texels of the reflective shadow map", _sampled)
+OPENNESS = Approximation("openness", "flux of lights in the open is scaled down or left to chance", _unscaled)
+CLAMP = Approximation("clamp", "what bounds the light of near pairs", without_clamp)

@@ -10,21 +10,19 @@ Symbols: Phi_i flux of lamp i (W, all channels), q_i its quota of the count.
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.draws import PARTS, PIXEL_LIGHTS, draws
 from refgi.errors import expect
 from refgi.rsm.buffers.extent import texel_grid
 from refgi.rsm.buffers.gbuffer import values_at
+from refgi.sampling import PARTS, PIXEL_LIGHTS, draws
 from refgi.stages import skip, stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rsm import Rsm
-
-Array = npt.NDArray[Any]
 Pattern = Literal["grid", "halton", "all", "random"]
 
 SIDE = 128  # texels along a side of a map of which the flux is summed: a share need not be exact to be unbiased

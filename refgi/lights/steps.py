@@ -5,9 +5,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.draws import PIXEL_LIGHTS, draws
 from refgi.lights.footprints import areas_of, cell_sums, cells_of_grid, cells_of_nearest
 from refgi.lights.importance import importance as importance_of
 from refgi.lights.pixel_lights import Drawn, gathered_lights
@@ -16,11 +14,11 @@ from refgi.lights.warp import Warp, _clamped_to_texel, texel_of, warp_stacked
 from refgi.rsm.buffers.gbuffer import values_at
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.raster.projection import Projection
-from refgi.sampling import grid, halton
-from refgi.scene.lamps import lamp_of
+from refgi.sampling import PIXEL_LIGHTS, draws, grid, halton
+from refgi.scene.light import lamp_of
 from refgi.stages import stage
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 Lobes = Sequence[Array | None] | None
 
 NAMES = ("position", "normal", "flux", "lobe_flux", "lobe_axis", "lobe_exponent", "texel", "map_index")

@@ -9,22 +9,19 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.draws import LIGHT_PATHS, draws
 from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.radiometry import DIRECTIONAL, POINT, orthonormal_basis, radiant_intensity
-from refgi.sampling import cosine_hemisphere, halton
+from refgi.sampling import LIGHT_PATHS, cosine_hemisphere, draws, halton
 from refgi.scene.light import CAP
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
     from refgi.rays import Tracer
     from refgi.scene import Geometry, LightTable, MaterialTable
-
-Array = npt.NDArray[Any]
 
 BASES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53)  # a pair for the light and for each bounce
 MOST_BOUNCES = len(BASES) // 2 - 1

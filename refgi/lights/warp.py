@@ -13,14 +13,13 @@ import dataclasses
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.lights.importance import Levels, border, cell_sum, importance_pyramid, packed
 from refgi.stages import stage
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 Method = Literal["A", "B"]
 
 BELOW_1 = 1.0 - 2.0**-53

@@ -1,11 +1,12 @@
-"""From pixel lights to radiance of glossy receivers: checks, packing and order around `glossy_sum`."""
+"""From pixel lights to radiance of glossy receivers: checks, packing and order around `glossy_sum`, or shadow rays."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from refgi.jit import kernel, prange
 from refgi.pairs.glossy_sum import Culls, add_diffuse_lights, add_glossy_lights, receiver_lobes_of
 from refgi.pairs.irradiance import PAIRS_AT_ONCE, Receivers, checked
 from refgi.pairs.packing import Packed
@@ -13,15 +14,18 @@ from refgi.pairs.pair_sum import TILE
 from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import LANES
 from refgi.pairs.settings import PairSettings
+from refgi.pairs.shadow_rays import BATCH, Hidden, RayReceivers, Senders, summed
 from refgi.pairs.tile_counts import lights_off_lobes, lobe_tiles, tiles_behind
-from refgi.rsm.buffers.glossy import GlossyPoints
+from refgi.radiometry import receiver_lobe
+from refgi.rsm.buffers.leaving import GlossyPoints
 from refgi.skips import left_out
 from refgi.stages import report_progress, stage, tally
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
+    from refgi.rays import Tracer
 
-Array = npt.NDArray[Any]
 Listing = Callable[[Array, Array], tuple[Array | None, Array | None]]
 
 
@@ -46,7 +50,7 @@ def glossy_radiance(
     its pi is part of the lights here. Lights are summed one by one, never by clusters. Results do not depend on the
     number of threads or on which receivers follow each other, to the bit.
     """
-    return summed(points, checked(as_receivers(points), lights, settings, footprint), (None, None), width)
+    return glossy_summed(points, checked(as_receivers(points), lights, settings, footprint), (None, None), width)
 
 
 def as_receivers(points: GlossyPoints) -> Receivers:
@@ -54,7 +58,7 @@ def as_receivers(points: GlossyPoints) -> Receivers:
     return Receivers(points.position[:, None], points.normal[:, None], np.ones((1, len(points.pixel)), np.bool_))
 
 
-def summed(
+def glossy_summed(
     points: GlossyPoints, packed: Packed, ranges: tuple[Range | None, Range | None], width: int = 0,
     lists: Listing | None = None,
 ) -> Array:
@@ -106,3 +110,54 @@ def block_order(pixel: Array, width: int) -> Array:
     for side in (8, 4):
         key = key * 4 + row // side % 2 * 2 + column // side % 2
     return np.argsort(key * 16 + row % 4 * 4 + column % 4, kind="stable")
+
+
+@stage("pairs.glossy_rays")
+def shadowed_radiance(
+    tracer: "Tracer", to: RayReceivers, points: GlossyPoints, lights: "PixelLights", *, visibility: bool = True,
+    batch: int = BATCH, hidden: Hidden | None = None,
+) -> Array:
+    """Sum the radiance that every receiver's lobe reflects towards the eye of the light that reaches it.
+
+    points: The receivers with their lobes.
+    visibility: Whether to trace the rays, none for a light that lies off the lobe; without, every pair counts.
+    batch: Pairs held at a time; changes no bit of the result.
+    hidden: As for `shadowed_sum`.
+    -> (3, n) float64: W/m^2/sr.
+    """
+    return summed(tracer, to, lights, visibility, batch, hidden, partial(weigh_by_lobes, points))
+
+
+@kernel(parallel=True)
+def weigh_by_lobes(
+    points: GlossyPoints, to: RayReceivers, receivers: tuple[int, int], senders: Senders, lights: tuple[int, int],
+    reach: Array, contribution: Array,
+) -> None:
+    """Turn the irradiance of each pair, `contribution` (pairs, 3) of `fill_shadow_rays`, into radiance of the lobe.
+
+    Pairs off the lobe give 0, and their `reach` (pairs,) is 0.
+    """
+    count = lights[1] - lights[0]
+    for i in prange(receivers[1] - receivers[0]):
+        for k in range(count):
+            _weigh(points, to, receivers[0] + i, senders, lights[0] + k, reach, contribution, i * count + k)
+
+
+@kernel
+def _weigh(
+    points: GlossyPoints, to: RayReceivers, r: int, senders: Senders, j: int, reach: Array, contribution: Array,
+    ray: int,
+) -> None:
+    if reach[ray] <= 0:
+        return
+    mirror, position = points.mirrored, to.position
+    lobe = receiver_lobe(
+        np.float64(mirror[0, r]), np.float64(mirror[1, r]), np.float64(mirror[2, r]),
+        senders.position[0, j] - position[0, r], senders.position[1, j] - position[1, r],
+        senders.position[2, j] - position[2, r], np.float64(points.exponent[r]))
+    reach[ray] = 0
+    for c in range(3):
+        # f_s I cos / r^2
+        contribution[ray, c] = contribution[ray, c] * (points.specular[c, r] * lobe)
+        if contribution[ray, c] > 0:
+            reach[ray] = 1

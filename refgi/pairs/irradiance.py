@@ -6,10 +6,9 @@ without diffuse flux is no diffuse light; among others it would move where sums 
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.pairs.lightcuts.cuts import add_cuts
@@ -24,11 +23,10 @@ from refgi.pairs.tiles import block_by_block, clear, put, receiving, taken
 from refgi.rsm.pool import plane, zeros
 from refgi.skips import left_out
 from refgi.stages import report_progress, skip, stage, tally
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
-
-Array = npt.NDArray[Any]
 
 PAIRS_AT_ONCE = 1 << 31  # between two reports of progress
 

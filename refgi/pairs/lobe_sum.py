@@ -13,7 +13,6 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
@@ -27,12 +26,6 @@ from refgi.pairs.lobe_culling import (
     bound_range,
     lobes_in_reach,
     parts_in_reach,
-)
-from refgi.pairs.lobe_shape import (
-    CORRECTED,
-    Widening,
-    lobe_norm_factor,
-    widened,
 )
 from refgi.pairs.pair_sum import (
     COMPENSATION,
@@ -49,11 +42,16 @@ from refgi.pairs.pair_sum import (
     load_tile,
     pair_cosines,
 )
-from refgi.pairs.pixel_lights import Range
+from refgi.pairs.pixel_lights import (
+    CORRECTED,
+    Range,
+    Widening,
+    lobe_norm_factor,
+    widened,
+)
 from refgi.pairs.ranged_sum import LANES, list_chosen
 from refgi.pairs.tiles import list_all
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 H, TERM, SQUARE, EXPONENT, RATIO = range(ROWS, ROWS + 5)  # further rows of a tile, of one light
 AT_ONCE = 4 * GROUP  # lights that are taken from a list at once

@@ -12,15 +12,14 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.pairs.lightcuts.tree import LightTree, light_tree
-from refgi.pairs.lobe_shape import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
 from refgi.pairs.pair_sum import Clamp
+from refgi.pairs.pixel_lights import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
 from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, Lightcuts, PairSettings, SphereClamp
 from refgi.skips import left_out
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
-
-Array = npt.NDArray[Any]
 
 NORMS = {"none": NO_NORM, "full_lobe": FULL_LOBE, "clamped": CLAMPED}
 HEADROOM = 1e8  # of the largest number to the largest that is packed: what kernels multiply it by comes on top

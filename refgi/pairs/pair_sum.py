@@ -13,12 +13,10 @@ c_x = <n_x . d> (not divided by |d|), g = c_l c_x / r^4 the geometry term (1/m^2
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.tiles import bound_tile, lights_in_reach, list_all
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 TILE = 256  # receivers a thread works on at once
 GROUP = 64  # lights summed before they are added to the total

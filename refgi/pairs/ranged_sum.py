@@ -10,7 +10,6 @@ lights are the same.
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.pair_sum import (
@@ -30,8 +29,7 @@ from refgi.pairs.pair_sum import (
     pair_term,
 )
 from refgi.pairs.pixel_lights import Range
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 LANES = 64  # receivers a list of lights belongs to
 AT_ONCE = 16 * GROUP  # lights that are taken from a list at once

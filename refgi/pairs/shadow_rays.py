@@ -16,21 +16,19 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.lobes import lobe_gap, lobe_norm, lobe_power
 from refgi.pairs.packing import with_dark_lobes
 from refgi.pairs.pair_sum import pair_cosines
+from refgi.radiometry import lobe_gap, lobe_norm, lobe_power
 from refgi.rays import STEPS, Tracer, far_offset, ray_offset
 from refgi.scene import Geometry
 from refgi.skips import left_out
 from refgi.stages import report_progress, stage, tally
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
-
-Array = npt.NDArray[Any]
 
 ROUNDED = 2.0**-14  # of a point's coordinates: it is off its face by that at most, or not meant to lie on it
 LIGHTS_AT_A_TIME = 1024

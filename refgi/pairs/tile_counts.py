@@ -1,24 +1,28 @@
 """How many lights kernels pass over, tile by tile: the tests of `sum_pairs`, `add_lobes` and `glossy_sum`, counted."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.pairs.glossy_sum import ReceiverLobes, load_lobes
-from refgi.pairs.glossy_tile import FARTHEST, TILE_ROWS, M
-from refgi.pairs.lobe_culling import MEASURES, PARTS, bound_lobes, bound_part, lobes_in_reach
+from refgi.pairs.glossy_sum import FARTHEST, TILE_ROWS, M, ReceiverLobes, load_lobes
+from refgi.pairs.lobe_culling import (
+    CORNERS,
+    MEASURES,
+    PARTS,
+    bound_lobes,
+    bound_part,
+    bound_receivers,
+    lights_in_lobes,
+    lobes_in_reach,
+)
 from refgi.pairs.pair_sum import GROUP, ROWS, TILE, load_tile
 from refgi.pairs.ranged_sum import LANES
-from refgi.pairs.receiver_culling import CORNERS, bound_receivers, lights_in_lobes
 from refgi.pairs.tiles import bound_tile, lights_in_reach, list_all
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.pairs.packing import Packed, PackedLobes
-
-Array = npt.NDArray[Any]
-
 
 def tiles_behind(position: Array, normal: Array, lights: Array, lanes: int = TILE) -> tuple[int, int]:
     """Return how many pairs of tile and packed diffuse light `sum_pairs` passes over, and of how many.

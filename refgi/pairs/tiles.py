@@ -14,13 +14,11 @@ cosines: then each term is 0 in the kernels' arithmetic as well, and the sum is 
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
 from refgi.skips import left_out
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 BLOCK = 16  # BLOCK^2 pixels fill one tile of the kernels
 AT_ONCE = 1 << 12  # pixels that a thread copies at once

@@ -20,7 +20,7 @@ import numpy as np
 
 from refgi.provenance.content import geometry_digest, light_json, materials_digest, plain
 from refgi.scene import Scene
-from refgi.scene.emissive import APPROXIMATION
+from refgi.scene.placed import APPROXIMATION
 
 if TYPE_CHECKING:
     from refgi.diagnostics import SamplingError

@@ -9,8 +9,8 @@ found).
 """
 
 from refgi.rays.embree import MISS
-from refgi.rays.offsets import STEPS, far_offset, ray_offset
 from refgi.rays.openness import openness
 from refgi.rays.tracer import Hits, Tracer
+from refgi.rays.watertight import STEPS, far_offset, ray_offset
 
 __all__ = ["MISS", "STEPS", "Hits", "Tracer", "far_offset", "openness", "ray_offset"]

@@ -12,7 +12,6 @@ the scene has it (Moeller & Trumbore 1997): with the ray's own rounding those of
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
@@ -20,9 +19,8 @@ from numba.np.numpy_support import carray
 
 from refgi.jit import kernel, prange
 from refgi.scene import Geometry
-from refgi.scene.texture.alpha import NO_MASKS, AlphaTable, is_opaque
-
-Array = npt.NDArray[Any]
+from refgi.scene.texture.lookup import NO_MASKS, AlphaTable, is_opaque
+from refgi.types import Array
 
 CHUNK = 1024  # rays that one parallel iteration owns
 BYTES = ir.IntType(8).as_pointer()

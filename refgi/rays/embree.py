@@ -23,10 +23,9 @@ import numpy.typing as npt
 
 from refgi.jit import thread_count
 from refgi.rays.cutouts import Filter, RayHoles, mark_holes
-from refgi.rays.offsets import STEPS
 from refgi.rays.traversal import Calls, closest_hits, occlusions
-
-Array = npt.NDArray[Any]
+from refgi.rays.watertight import STEPS
+from refgi.types import Array
 
 MISS = -1  # triangle id of a ray that hits nothing
 

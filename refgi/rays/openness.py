@@ -8,20 +8,17 @@ angle (modulo 1) by two random numbers of its own. Every single estimate is unbi
 """
 
 import math
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.radiometry import orthonormal_basis
-from refgi.rays.offsets import ray_offset
 from refgi.rays.tracer import Tracer
+from refgi.rays.watertight import ray_offset
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.stages import report_progress, stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 SPAN = 1 << 19  # rays at a time: 14 MB
 CHUNK = 64  # points that one parallel iteration owns

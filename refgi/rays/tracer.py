@@ -1,21 +1,19 @@
-"""Tracer: batches of rays against one geometry, checked, with misses decided in float64."""
+"""Tracer: batches of rays against one geometry, checked, with misses decided in float64; direct light's shadows."""
 
 import threading
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.rays.cutouts import ray_holes
 from refgi.rays.embree import MISS, Backend, Cut, open_backend
-from refgi.rays.offsets import GRAIN, STEPS, grain_of
-from refgi.rays.watertight import Corners, Pieces, closest_around, corners, cut
+from refgi.rays.watertight import GRAIN, STEPS, Corners, Pieces, closest_around, corners, cut, grain_of
 from refgi.scene import DirectionalLight, Geometry, Light
-from refgi.stages import tally
-
-Array = npt.NDArray[Any]
+from refgi.scene.light import Lamp, lamp_of, light_of
+from refgi.stages import stage, tally
+from refgi.types import Array
 
 # Sideways shift that tells a slip between triangles from a miss: many float32 steps, far below any detail.
 RELATIVE_SHIFT = 4e-6
@@ -220,3 +218,32 @@ def _checked(origins: Array, directions: Array, reach: Array | float) -> tuple[A
     expect(far.shape in ((), (len(o),)), "reach", f"one number or shape ({len(o)},)", far.shape)
     expect(not np.isnan(far).any(), "reach", "numbers", "NaN")
     return o, d, np.ascontiguousarray(np.broadcast_to(far, len(o)))
+
+
+def _steps(
+    tracer: Tracer, geometry: Geometry, position: Array, normal: Array, covered: Array, light: Light  # noqa: ARG001
+) -> Array:
+    return shadow_rays(geometry, position, normal, covered, lamp_of(light))
+
+
+@stage("rays.visible_from_light", kept=False, steps=_steps)
+def visible_from_light(
+    tracer: Tracer, geometry: Geometry, position: Array, normal: Array, covered: Array, light: Light  # noqa: ARG001
+) -> Array:
+    """Trace a ray from each receiver to a light.
+
+    normal (3, h, w): Unit normals of the pixels' faces.
+    -> (h, w) bool: Whether the light reaches the receiver; false without surface.
+    """
+    return tracer.visible_from_light(position, normal, covered, light)
+
+
+@stage("rays.shadow_rays", kept=False, each="lamp")
+def shadow_rays(geometry: Geometry, position: Array, normal: Array, covered: Array, lamp: Lamp) -> Array:
+    """Test whether no triangle lies between each receiver and a lamp (docs/conventions).
+
+    normal (3, h, w): Unit normals of the pixels' faces.
+    lamp: The lamp; its cone does not matter here.
+    -> (h, w) bool: Whether the lamp reaches the receiver; false without surface.
+    """
+    return Tracer(geometry).visible_from_light(position, normal, covered, light_of(lamp))

@@ -8,14 +8,12 @@ view of the same memory. Addresses are run-time values, so compiled kernels can 
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
 from refgi.jit import kernel, prange
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 CHUNK = 1024  # rays that one parallel iteration owns
 

@@ -1,4 +1,10 @@
-"""Watertight misses: rays that pass between triangles in float32 are decided in float64.
+"""Rays in float32: offsets against self-intersection, and watertight misses that float64 decides.
+
+A ray that starts on a surface must not hit it again. What moves the surface about in float32, with u = 2^-24: the
+rounding of the start, u |y|, and that of the triangle test, a few u times the distance from the start to the corners.
+No triangle that Embree has is longer than the larger of the scene's grain and the distance of its points from the
+coordinates' origin (`cut`), so the lift 4 u (|y|_1 + grain) covers both, whatever lies elsewhere in the scene. A
+segment's far end is subject to the rounding of its direction as well, u times its length.
 
 A ray aimed exactly at a vertex can pass Embree's float32 test of every triangle around it. Such a miss is found by
 asking again with the ray shifted sideways by many float32 steps: if that misses as well, the miss stands. Else the
@@ -16,15 +22,47 @@ coarse. What is cut depends on the edge alone, so neighbours are cut at the same
 size S becomes some tens of pieces times log2(S / grain).
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel
 from refgi.rays.cutouts import RayHoles, is_there
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
+STEPS = 4 * 2.0**-24
+GRAIN = 8.0  # times the power of 2 above half of the triangles' largest coordinates
+
+
+def grain_of(vertices: Array, faces: Array) -> float:
+    """Return the size of details in a scene as its rays know it: a power of 2 that single triangles do not move.
+
+    `vertices` (n, 3): vertices, m. `faces` (m, 3): vertex indices. Result: length up to which triangles near the
+    coordinates' origin stay whole, m.
+    """
+    if not len(faces):
+        return GRAIN
+    largest = np.abs(vertices).max(axis=1)[faces].max(axis=1)
+    middle = float(np.partition(largest, len(largest) // 2)[len(largest) // 2])
+    return GRAIN * 2.0 ** math.ceil(math.log2(max(middle, 1e-30)))
+
+
+@kernel
+def ray_offset(x: Any, y: Any, z: Any, grain: Any) -> Any:
+    """Return the offset, m, of a ray's start from the surface at a point, against self-intersection.
+
+    `x, y, z`: the point, m; `grain`: the tracer's, m. Of the type of x.
+    """
+    return type(x)(STEPS) * (abs(x) + abs(y) + abs(z) + grain)
+
+
+@kernel
+def far_offset(dx: Any, dy: Any, dz: Any) -> Any:
+    """Return how much farther off its surface a segment (dx, dy, dz) must end for its length; m, of the type of dx."""
+    return type(dx)(STEPS) * (abs(dx) + abs(dy) + abs(dz))
+
+
 REACH = 0.4
 ROUNDING = 8 * 2.0**-53  # of the products of a signed volume: 7 roundings of half a unit
 

@@ -7,12 +7,11 @@ fill them. So the memory of an earlier frame's buffers serves the next frame's.
 import math
 import os
 import threading
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 PAGE = 4096  # bytes
 SMALL = 1 << 18  # bytes; smaller arrays are left to NumPy

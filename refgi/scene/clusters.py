@@ -5,17 +5,15 @@ draws them reads each cluster's vertices from one place, projects them once and 
 """
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.scene.model import Geometry
-
-Array = npt.NDArray[Any]
 
 CLUSTER = 64  # triangles
 TABLE = 256  # places where a cluster's vertex is looked for; a power of two

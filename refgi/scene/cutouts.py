@@ -12,11 +12,10 @@ import numpy as np
 
 from refgi.errors import expect
 from refgi.scene.material import Material
-from refgi.scene.texture.alpha import NO_MASKS, AlphaTable
 from refgi.scene.texture.image import Image
-from refgi.scene.texture.table import WRAPS
-from refgi.scene.texture.texture import Texture
-from refgi.scene.values import Array
+from refgi.scene.texture.lookup import NO_MASKS, AlphaTable
+from refgi.scene.texture.table import WRAPS, Texture
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.scene.model import Geometry

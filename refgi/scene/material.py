@@ -1,16 +1,21 @@
-"""Materials, and the table of them that kernels read."""
+"""Materials, the table of them that kernels read, and vertex colours as factors of their reflectance.
+
+Files that name no material say with their colours what a surface reflects: its material is then white.
+"""
 
 import dataclasses
+import warnings
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from refgi.errors import expect
-from refgi.scene.texture.table import Textures, textures_of
-from refgi.scene.texture.texture import Texture
-from refgi.scene.values import BLACK, BRIGHTEST, Array, Rgb, as_float_tuples, is_number, is_vector
+from refgi.errors import RefgiWarning, expect
+from refgi.scene.texture.image import srgb_table
+from refgi.scene.texture.table import Texture, Textures, textures_of
+from refgi.scene.values import BLACK, BRIGHTEST, Rgb, as_float_tuples, is_number, is_vector
+from refgi.types import Array
 
 SHARPEST = 1e20  # Phong exponent; far within float32
 DENSEST = 1e3  # index of refraction
@@ -127,3 +132,29 @@ def material_table(materials: Sequence[Material], dtype: npt.DTypeLike = np.floa
     return MaterialTable(column("diffuse", 3), column("specular", 3), column("exponent", 1), column("ior", 1),
                          column("emission", 3), textures_of([material.texture for material in materials]),
                          textures_of([material.emission_texture for material in materials]))
+
+
+WHITE = Material(diffuse=(1.0, 1.0, 1.0))  # of a mesh that names no material and has colours
+CODES = 256
+
+
+def factors(colours: Array, where: str) -> Array | None:
+    """Return linear colours (n, 3) as factors from 0 to 1, float64; None where all are white: they change nothing.
+
+    `where`: the file, for the warning that says how many lie beyond and are cut.
+    """
+    values = np.asarray(colours, np.float64)
+    found = np.nan_to_num(np.clip(values, 0.0, 1.0))
+    if cut := int(np.count_nonzero((found != values).any(axis=-1))):
+        text = f"{where}: {cut:,} vertex colour(s) beyond 0 to 1 cut: a surface reflects what arrives at most"
+        warnings.warn(RefgiWarning(text), stacklevel=6)
+    return None if (found == 1).all() else found
+
+
+def from_codes(values: Array) -> Array:
+    """Return linear colours of sRGB codes of 8 or 16 bits, or of numbers that are linear already."""
+    kind: np.dtype[Any] = values.dtype
+    if kind.kind == "f":
+        return values
+    count = np.iinfo(kind).max + 1 if kind in (np.uint8, np.uint16) else CODES
+    return np.asarray(srgb_table(count)[np.clip(values, 0, count - 1)])

@@ -14,7 +14,8 @@ import numpy as np
 
 from refgi.errors import expect
 from refgi.scene.material import UNPAINTED, Material
-from refgi.scene.values import LARGEST, Array
+from refgi.scene.values import LARGEST
+from refgi.types import Array
 
 SMALL = 1 << 12  # vertices and faces of a mesh that goes into a batch; a larger one is checked alone
 BATCH = 1 << 18  # vertices and faces in a batch: some megabytes

@@ -34,7 +34,6 @@ from refgi.scene.source import Source
 from refgi.scene.values import (
     BLACK,
     LARGEST,
-    Array,
     Rgb,
     Vector,
     as_float_tuples,
@@ -44,6 +43,7 @@ from refgi.scene.values import (
     is_number,
     is_place,
 )
+from refgi.types import Array
 
 __all__ = [
     "BLACK",

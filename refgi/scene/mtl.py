@@ -1,4 +1,4 @@
-"""MTL files of OBJ meshes: diffuse, specular and emissive colours of materials, texture of the diffuse one, cut-outs.
+"""MTL files of OBJ meshes, and the lines of both as words and numbers.
 
 `map_d`, which asks for partial transparency, becomes a cut-out with a cutoff of 1/2, unless it lies on a surface other
 than `map_Kd`: a corner has one pair of coordinates.
@@ -8,20 +8,54 @@ import dataclasses
 import itertools
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect, first_faults, shortened
-from refgi.scene.files import is_there
-from refgi.scene.lines import TEXTURES, colour_of, lines_of, numbers_of
+from refgi.scene.files import is_strict, is_there, read_text
 from refgi.scene.material import reflects_too_much
 from refgi.scene.model import Material, Rgb
-from refgi.scene.reading import is_strict
 from refgi.scene.texture.image import Image, image_file
-from refgi.scene.texture.texture import Texture
+from refgi.scene.texture.table import Texture
+
+TEXTURES = ("bump", "disp", "decal", "norm", "refl")  # and all that starts with map_
+NAMED = ("newmtl", "usemtl", "mtllib", *TEXTURES)  # what a name follows
+
+
+def lines_of(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Yield the number and the words of each line that says something, continued lines joined."""
+    for number, line in enumerate(read_text(path).replace("\\\n", " ").split("\n"), 1):
+        words = line.split()
+        if words and "#" in line:
+            words = _without_comment(words, line)
+        if words:
+            yield number, words
+
+
+def _without_comment(words: list[str], line: str) -> list[str]:
+    """Return the words before a comment; in a name, such as "Material #25", only a lone # starts one."""
+    if words[0].lower() in NAMED or words[0].lower().startswith("map_"):
+        return words[: words.index("#")] if "#" in words else words
+    return line.partition("#")[0].split()
+
+
+def numbers_of(words: list[str], where: str, count: int = 3) -> tuple[float, ...]:
+    """Return so many numbers of a line; raises `InputError` if there are others."""
+    try:
+        values = tuple(float(word) for word in words)
+    except ValueError:
+        values = ()
+    expect(len(values) == count, where, f"{count} number(s)", " ".join(words))
+    return values
+
+
+def colour_of(words: list[str], where: str) -> tuple[float, ...]:
+    """Return the three numbers of a colour; one alone is grey."""
+    return numbers_of(words * 3 if len(words) == 1 else words, where)
+
 
 CUTOFF = 0.5
 WHITE = (1.0, 1.0, 1.0)

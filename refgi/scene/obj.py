@@ -13,16 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect, first_faults, shortened
-from refgi.scene.files import Contents, is_there
-from refgi.scene.lines import lines_of, numbers_of
-from refgi.scene.material import UNPAINTED
+from refgi.scene.files import Contents, is_strict, is_there
+from refgi.scene.material import UNPAINTED, WHITE, factors
 from refgi.scene.mesh import expect_all_sound, expect_coordinates
-from refgi.scene.model import Array, Material, Mesh
-from refgi.scene.mtl import Maps, read_library
+from refgi.scene.model import Material, Mesh
+from refgi.scene.mtl import Maps, lines_of, numbers_of, read_library
 from refgi.scene.polygons import triangles_of
-from refgi.scene.reading import is_strict
 from refgi.scene.texture.image import expect_all_fit
-from refgi.scene.vertexcolours import WHITE, factors
+from refgi.types import Array
 
 NOT_POLYGONS = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "free-form surfaces"}
 

@@ -6,14 +6,13 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import InputError
 from refgi.scene.model import Camera, Geometry, Light, Scene
 from refgi.scene.motion import moved, rotation_about, with_own_vertices
 from refgi.scene.values import Vector
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 Curve = Literal["linear", "catmull_rom"]
 
 

@@ -32,8 +32,9 @@ from refgi.scene.files import read_toml
 from refgi.scene.light import DirectionalLight, PointLight, SpotLight
 from refgi.scene.model import Scene
 from refgi.scene.motion import faces_of
-from refgi.scene.path import Array, Curve, Motion, Path, Track, changed
+from refgi.scene.path import Curve, Motion, Path, Track, changed
 from refgi.scene.values import LARGEST, is_direction, is_place
+from refgi.types import Array
 
 MOST_FRAMES = 100_000
 Number = Annotated[float, Field(allow_inf_nan=False)]

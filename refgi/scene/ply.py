@@ -7,15 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from refgi.errors import RefgiWarning, expect
-from refgi.scene.files import Contents, is_there
-from refgi.scene.material import UNPAINTED
-from refgi.scene.model import Array, Material, Mesh
+from refgi.scene.files import Contents, is_there, tolerate
+from refgi.scene.material import UNPAINTED, WHITE, factors, from_codes
+from refgi.scene.model import Material, Mesh
 from refgi.scene.plydata import Column, Ply, read_entries
 from refgi.scene.polygons import triangles_of
-from refgi.scene.reading import tolerate
 from refgi.scene.texture.image import image_file
-from refgi.scene.texture.texture import Texture
-from refgi.scene.vertexcolours import WHITE, factors, from_codes
+from refgi.scene.texture.table import Texture
+from refgi.types import Array
 
 COLOURS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
 CORNERS = ("vertex_indices", "vertex_index")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from refgi.scene.values import Array
+from refgi.types import Array
 
 TURNED = 1e-6  # of a polygon's area: a triangle of its fan that is turned over by less is rounding
 MOST_CORNERS = 4096  # of a polygon that is cut into ears, which takes the square of their number

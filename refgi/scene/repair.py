@@ -16,7 +16,7 @@ import numpy as np
 from refgi.errors import InputError, RefgiWarning, expect
 from refgi.scene.mesh import Batch, Mesh, as_float64, at_corners, batches, missing_normals
 from refgi.scene.model import DirectionalLight, Geometry, Light
-from refgi.scene.values import Array
+from refgi.types import Array
 
 # A face counts as flat when twice its area is lost in the rounding of the cross product that gives it.
 FLAT = 16 * float(np.finfo(np.float64).eps)

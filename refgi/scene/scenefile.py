@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from refgi.errors import MOST_FAULTS, InputError, expect, first_faults, shortened
-from refgi.scene.emissive import lamps_where_asked
-from refgi.scene.files import Contents, expect_utf8, is_there, read_bytes, warn_of_undefined
+from refgi.scene.files import Contents, expect_utf8, is_there, read_bytes, wants_lamps, warn_of_undefined
 from refgi.scene.gltf import read_gltf
 from refgi.scene.mesh import expect_memory
 from refgi.scene.model import Camera, Light, Material, Mesh, Scene, merge
+from refgi.scene.motion import transformed_all
 from refgi.scene.obj import read_obj
+from refgi.scene.placed import lamps_where_asked
 from refgi.scene.ply import read_ply
-from refgi.scene.reading import wants_lamps
 from refgi.scene.repair import lights_with_power, repaired_all, warn_of_flat_faces, warn_of_unit
 from refgi.scene.texture.image import expect_all_fit, image_file
-from refgi.scene.texture.texture import Texture
-from refgi.scene.transform import transformed_all
+from refgi.scene.texture.table import Texture
 from refgi.stages import skip
 
 READERS: dict[str, Callable[[Path], Contents]] = {

@@ -14,8 +14,8 @@ from refgi.errors import MOST_FAULTS, shortened
 from refgi.scene import model
 from refgi.scene.files import did_you_mean
 from refgi.scene.light import Falloff
-from refgi.scene.texture.texture import Filter, Wrap
-from refgi.scene.transform import affine
+from refgi.scene.motion import affine
+from refgi.scene.texture.table import Filter, Wrap
 
 
 class Names:

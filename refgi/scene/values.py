@@ -4,9 +4,6 @@ import math
 import numbers
 from typing import Any
 
-import numpy.typing as npt
-
-Array = npt.NDArray[Any]
 Rgb = tuple[float, float, float]
 Vector = tuple[float, float, float]
 

@@ -9,11 +9,9 @@ what lies between receiver and sample.
 """
 
 from refgi.method import Method
-from refgi.sssil.approximations import APPROXIMATIONS
+from refgi.sssil.approximations import APPROXIMATIONS, extra_bytes
 from refgi.sssil.crown.gather import gather
-from refgi.sssil.hssil import hssil
-from refgi.sssil.lobes import hssil_lobes
-from refgi.sssil.memory import extra_bytes
+from refgi.sssil.hssil import hssil, hssil_lobes
 from refgi.sssil.pyramid.levels import pyramid
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import (

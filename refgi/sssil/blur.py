@@ -13,15 +13,13 @@ rows first, then along columns, each mean over the texels that count. The texels
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import LARGEST_WINDOW, GeometryBlur
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 TALL, WIDE = 32, 128  # texels of a tile of work
 PAD = LARGEST_WINDOW // 2  # lanes to either side of a tile

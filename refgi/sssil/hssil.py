@@ -1,30 +1,38 @@
-"""Hierarchical Screen-Space Indirect Illumination (Soler, Hoel, Rochet, Jay and Holzschuch 2009)."""
+"""Hierarchical Screen-Space Indirect Illumination (Soler et al. 2009), for diffuse and glossy receivers.
 
-from typing import TYPE_CHECKING, Any
+The paper assumes diffuse surfaces and names what glossy ones need: "importance-sample the BRDF" among samples of the
+picture. Receivers are the glossy pixels, at full resolution on every level (`crown.glossy`), where irradiance has a
+receiver for each texel: on level k that is 4^k times as many sums, for glossy pixels alone.
+"""
+
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.diagnostics import is_due
+from refgi.pairs.shadow_rays import receivers
+from refgi.rsm.buffers.leaving import GlossyPoints, glossy_points, spread_over_picture
 from refgi.settings import replaced
 from refgi.sssil.blur import blur
 from refgi.sssil.cameras import join_cameras
-from refgi.sssil.crown.gather import gather
+from refgi.sssil.crown.form_factor import form_of
+from refgi.sssil.crown.gather import gather, level_factor
+from refgi.sssil.crown.glossy import Draws, draw_samples, glossy_receivers
 from refgi.sssil.crown.loss import warn_of_few_samples
+from refgi.sssil.crown.pattern import every_texel, level_key, sample_weight
 from refgi.sssil.crown.reach import chosen_radius, warn_short_reach
 from refgi.sssil.pyramid.levels import pyramid, sender_pyramid
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import Bitmask, HssilSettings, Rays
 from refgi.sssil.upsampling.upsample import Guide, upsample
 from refgi.sssil.visibility.bitmask import bitmask_gather
-from refgi.sssil.visibility.rays import ray_gather
-from refgi.stages import skip
+from refgi.sssil.visibility.glossy import fill_glossy_rays, march_samples, slice_samples
+from refgi.sssil.visibility.rays import add_unoccluded, ray_gather, surfels_of
+from refgi.stages import report_progress, skip, stage, tally
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-
-Array = npt.NDArray[Any]
-
 
 def hssil(frame: "Frame", settings: HssilSettings) -> Array:
     """Light what a camera sees by what it sees, near by at high and far away at low resolution.
@@ -91,3 +99,109 @@ def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettin
 def guide_of(level: Level) -> Guide:
     """Return the guide (depths, normals) of joint bilateral upsampling to or from a level."""
     return Guide(level.depth, level.normal)
+
+
+BATCH = 1 << 18  # pairs held at a time
+
+
+def hssil_lobes(frame: "Frame", settings: HssilSettings) -> Array:
+    """Return the radiance towards the eye that receivers' lobes make of what a camera sees.
+
+    (3, h, w), W/m^2/sr, linear RGB; 0 where there is no lobe. Whatever the pattern but "all", each pixel has samples of
+    its own, and nothing is blurred.
+    """
+    lobes = view_lobes(frame, frame.glossy_points, settings)
+    if not (settings.cameras.count or settings.cameras.views):
+        return lobes
+    eye = frame.scene.camera.eye
+
+    def through(other: "Frame") -> Array:
+        return view_lobes(other, glossy_points(other.gbuffer, other.materials, eye), settings)
+
+    joined = join_cameras(frame, lobes, settings.cameras, through)
+    glossy = np.zeros(joined.shape[1:], np.bool_)
+    glossy.reshape(-1)[frame.glossy_points.pixel] = True
+    return np.where(glossy, joined, joined.dtype.type(0.0))
+
+
+def view_lobes(frame: "Frame", points: GlossyPoints, settings: HssilSettings) -> Array:
+    """Return the lobes of some pixels by what this camera alone sees, (3, h, w), W/m^2/sr.
+
+    The pixels are this camera's; their lobes may belong to another eye.
+    """
+    levels = pyramid(frame, settings)
+    senders = sender_pyramid(frame, levels, settings)
+    settings = replaced(settings, {"sampling.radius": chosen_radius(levels[0].shape, settings.sampling)})
+    total = np.zeros(points.position.shape)
+    for index, level in enumerate(senders):
+        if settings.senders.only_level in (None, index):
+            total += glossy_level(frame, points, level, index, settings)
+    radiance = (total * points.specular).astype(points.position.dtype)
+    return spread_over_picture(points, radiance, (frame.height, frame.width))
+
+
+@stage("sssil.glossy", kept=False)
+def glossy_level(
+    frame: "Frame", points: GlossyPoints, senders: Level, index: int, settings: HssilSettings
+) -> Array:
+    """Sum what lobes reflect of the samples of one level.
+
+    frame: The scene whose view the level is.
+    index: 0 for the first level, whose inner disc is sampled as well.
+    -> (3, n) float64: Radiance over the lobes' reflectance, W/m^2/sr.
+    """
+    to = glossy_receivers(points, frame.gbuffer.projection)
+    draws, slices = _draws(senders, index, settings), None
+    if isinstance(settings.visibility, Bitmask):
+        slices = slice_samples(to, senders, index, settings, frame.visible_extent.diagonal)
+    count = len(draws.weight) if slices is None else slices.per_receiver
+    tally("pairs", lambda: len(points.pixel) * count)
+    radiance = np.asarray(senders.radiance.reshape(3, -1), np.float64)
+    total, step = np.zeros((3, len(points.pixel))), max(1, BATCH // max(count, 1))
+    rays = _Rays(frame, points, senders) if isinstance(settings.visibility, Rays) else None
+    form, share = form_of(settings.senders.form_factor), settings.senders.disc_share
+    transfer, sender = np.empty(step * count), np.empty(step * count, np.int64)
+    blocked = np.zeros(step * count, np.bool_)
+    for first in range(0, total.shape[1], step):
+        last = min(first + step, total.shape[1])
+        if slices is None:
+            draw_samples(to, first, last, senders, draws, form, share, transfer, sender)
+        else:
+            march_samples(to, first, last, senders, slices, form, share, transfer, sender)
+        if rays is not None:
+            rays.trace(first, last, count, transfer, sender, blocked)
+        add_unoccluded(radiance, first, last, count, blocked, transfer, sender, total)
+        report_progress(last / total.shape[1])
+    result: Array = total * level_factor(index, settings)
+    return result
+
+
+def _draws(level: Level, index: int, settings: HssilSettings) -> Draws:
+    """Return how samples of a level are drawn; the radius of the settings is set."""
+    sampling = settings.sampling
+    assert sampling.radius is not None
+    radius, key = float(sampling.radius), level_key(sampling.seed, level.number)
+    if sampling.pattern == "all":
+        every = every_texel(0.0 if index == 0 else radius, 2.0 * radius, level.shape)
+        return Draws(0, radius, True, np.ones(len(every)), key, np.ascontiguousarray(every))
+    inner, crown = sampling.counts(index)
+    return Draws(inner, radius, sampling.density == "uniform", sample_weight(radius, inner, crown), key,
+                 np.zeros((0, 2), np.int32))
+
+
+class _Rays:
+    """Shadow rays from glossy pixels to texels."""
+
+    def __init__(self, frame: "Frame", points: GlossyPoints, senders: Level) -> None:
+        triangle_id = frame.gbuffer.triangle_id.reshape(-1)[points.pixel]
+        self._tracer = frame.tracer
+        self._to = receivers(frame.scene.geometry, points.position, points.normal, triangle_id, frame.tracer.grain)
+        self._from = surfels_of(senders, frame)
+
+    def trace(self, first: int, last: int, count: int, transfer: Array, sender: Array, blocked: Array) -> None:
+        """Fill which pairs of receivers `first` to `last` are blocked; pairs that transfer nothing are not traced."""
+        size = (last - first) * count
+        origin, direction = np.empty((size, 3), np.float32), np.empty((size, 3), np.float32)
+        reach = np.empty(size, np.float32)
+        fill_glossy_rays(self._to, self._from, first, last, count, sender, transfer, origin, direction, reach)
+        self._tracer.fill_occluded(origin, direction, reach, blocked[:size])

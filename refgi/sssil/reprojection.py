@@ -12,8 +12,7 @@ from refgi.rsm.raster.projection import PERSPECTIVE, Projection
 from refgi.scene.values import Vector
 from refgi.sssil.settings import Fetch
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 SNAP = 2.0**-8  # texels: so far off may float32 put a point that lies at a texel's centre
 

@@ -15,7 +15,8 @@ from refgi.errors import InputError
 from refgi.scene import Camera, DirectionalLight, Geometry, Light, Scene, SpotLight
 from refgi.scene.mesh import at_corners
 from refgi.scene.motion import rotation_about
-from refgi.scene.values import BRIGHTEST, LARGEST, Array, Vector
+from refgi.scene.values import BRIGHTEST, LARGEST, Vector
+from refgi.types import Array
 
 Map = Callable[[Array], Array]  # (n, 3) to (n, 3)
 Promise = Literal["bits", "rounding", "estimate", "mean"]

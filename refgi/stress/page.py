@@ -10,9 +10,9 @@ import numpy as np
 from refgi.compare.report import PAGE, machine, number, script, sort_key, templates
 from refgi.image import write_text
 from refgi.image.png import png_bytes
-from refgi.scene.values import Array
-from refgi.stress.rows import Row, Stability, strain
+from refgi.stress.promises import Row, Stability, strain
 from refgi.stress.run import Found, Silence
+from refgi.types import Array
 
 FILES = Path(__file__).parent / "files"
 COLUMNS = ("of", "after", "", "worst", "limit", "where the limit comes from", "what it is")

@@ -12,12 +12,20 @@ from scipy.stats import t as student
 from refgi.errors import InputError, RefgiWarning, expect
 from refgi.jit import threads
 from refgi.scene import Scene
-from refgi.scene.values import Array
 from refgi.stress.changes import CHANGES, Change, Changed, NotPromisedError
-from refgi.stress.energy import largest_bounce
-from refgi.stress.judge import Seen, bits_apart, estimates_apart, means_apart, rmse_apart, same_surface, see, unsound
-from refgi.stress.promises import FEW, SURFACES, UNBOUNDED, UNLIKELY, Asked, asked, settings_of, surfaces
-from refgi.stress.rows import Row
+from refgi.stress.judge import (
+    Seen,
+    bits_apart,
+    estimates_apart,
+    largest_bounce,
+    means_apart,
+    rmse_apart,
+    same_surface,
+    see,
+    unsound,
+)
+from refgi.stress.promises import FEW, SURFACES, UNBOUNDED, UNLIKELY, Asked, Row, asked, settings_of, surfaces
+from refgi.types import Array
 
 Tell = Callable[[str, float], None]
 PART = "pictures"

@@ -4,10 +4,8 @@ A screen-space method knows no other emitters. With only these the truth is what
 no visibility between emitter and receiver besides, its limit.
 """
 
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rays import MISS, Tracer, ray_offset
@@ -16,8 +14,7 @@ from refgi.truth.light_vertices import LightVertices
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point
 from refgi.truth.surfaces import Surfaces, face_normal, lift
 from refgi.truth.task import Task, shadow_batch
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 
 @kernel

@@ -11,11 +11,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.lobes import inverse_fraction, lobe_direction
-from refgi.radiometry import radiant_intensity
+from refgi.radiometry import inverse_fraction, lobe_direction, radiant_intensity
 from refgi.rays import MISS, Tracer, ray_offset
 from refgi.rsm.buffers.solid_angle import texel_solid_angles
 from refgi.rsm.raster.projection import camera_projection, project
@@ -24,8 +22,7 @@ from refgi.scene import DirectionalLight, LightTable, Scene, material_table
 from refgi.truth.light_grid import light_rays
 from refgi.truth.paths import CHUNK
 from refgi.truth.surfaces import Surfaces, around, face_cross, face_normal, height_above, shading_normal, surfaces
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 MIRROR_EXPONENT = 100.0  # lobes from here on count as mirror-like: half of their flux lies within 7 degrees
 SHARP_LOBE = 3e4  # half of its flux lies within 0.4 degrees: sharper than cells of light on curved surfaces

@@ -23,20 +23,17 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import types
 
 from refgi.jit import by_type, kernel
-from refgi.lobes import lobe_gap, lobe_power
 from refgi.pairs.shadow_rays import RayReceivers
-from refgi.radiometry import DIRECTIONAL
+from refgi.radiometry import DIRECTIONAL, lobe_gap, lobe_power
 from refgi.truth.cell_walk import Found, Receiver, column, fill_tops, found_at
 from refgi.truth.lobe_cells import LobeCells
 from refgi.truth.lobe_receivers import Lobes
 from refgi.truth.lobe_tree import LobeTree
 from refgi.truth.paths import Paths, dot, row
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 EVEN = 1 / 16  # e: share of the rays of b that are even over the lights' directions
 

@@ -7,10 +7,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.lobes import lobe_direction
+from refgi.radiometry import lobe_direction
 from refgi.rays import ray_offset
 from refgi.sampling import hash_bits
 from refgi.truth.cell_densities import EVEN, Beside, Counts, even_density, image_of, point_of, receiver_at, takes
@@ -26,12 +25,11 @@ from refgi.truth.cell_walk import (
     next_top,
     plane_chance,
 )
-from refgi.truth.light_square import ray_through
+from refgi.truth.light_grid import ray_through
 from refgi.truth.lobe_cells import LobeCells
 from refgi.truth.paths import Paths, dot, paths_for
 from refgi.truth.surfaces import around
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 DEEPEST_GROUP = 128  # levels of the tree that a way down may have
 

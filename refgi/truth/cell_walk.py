@@ -8,14 +8,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.truth.light_square import place_of
+from refgi.truth.light_grid import place_of
 from refgi.truth.lobe_cells import LobeCells
 from refgi.truth.lobe_tree import LobeTree
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 CHUNK = 64  # receivers that one parallel iteration owns
 ROUND = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)], np.float64)  # neighbours

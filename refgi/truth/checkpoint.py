@@ -13,16 +13,12 @@ import time
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import InputError, RefgiWarning, expect
 from refgi.image import temporary_name
 from refgi.truth.result import Moments, no_passes
-
-Array = npt.NDArray[Any]
 
 FIRST_LINE = b"refgi truth checkpoint 3\n"
 KINDS = ("<i8", "<f8", "<f8", "<i8", "<f8", "<i4")  # of the fields of `Moments`

@@ -12,7 +12,6 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
@@ -21,12 +20,21 @@ from refgi.rays import MISS, ray_offset
 from refgi.sampling import hash_bits, sobol_owen
 from refgi.scene import LightTable
 from refgi.truth.cell_densities import Beside, share_beside, tops_for
-from refgi.truth.next_event import aim_at_light, toward_light
-from refgi.truth.paths import CHUNK, Paths, Shadows, Sides, dot, hit_point, leaves, row
+from refgi.truth.paths import (
+    CHUNK,
+    Paths,
+    Shadows,
+    Sides,
+    aim_at_light,
+    diffuse_at,
+    dot,
+    hit_point,
+    leaves,
+    row,
+    toward_light,
+)
 from refgi.truth.surfaces import Surfaces, around, face_cross, lift, lobe_above, lobe_pattern, shading_normal
-from refgi.truth.textured import diffuse_at
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 
 @kernel

@@ -20,24 +20,21 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.draws import IMPERFECT_MAPS, draws
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers, Senders
 from refgi.radiometry import orthonormal_basis
-from refgi.sampling import FIRST_STEP, SECOND_STEP
+from refgi.sampling import FIRST_STEP, IMPERFECT_MAPS, SECOND_STEP, draws
 from refgi.scene import Geometry
 from refgi.scene.cutouts import NO_CUT, CutFaces
-from refgi.scene.texture.alpha import is_opaque
+from refgi.scene.texture.lookup import is_opaque
 from refgi.settings import Settings, setting
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.pairs.pixel_lights import PixelLights
-
-Array = npt.NDArray[Any]
 
 HORIZON = 1e-3  # least cosine at the light: points of its own face lie at 0, but for rounding
 GRAZING = 0.05  # least cosine at a receiver that the bias grows with

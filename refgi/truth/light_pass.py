@@ -11,7 +11,6 @@ density and is unbiased whatever the pilot found, since a share of the rays stay
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.truth.camera_visibility import visible_vertices
@@ -22,8 +21,8 @@ from refgi.truth.lobe_light_side import pick_for_lobes
 from refgi.truth.lobe_receivers import subset_of
 from refgi.truth.paths import Shadows
 from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 CELLS = 64  # along one side of a light's grid
 RECEIVERS, PICKS = 2048, 1 << 15  # sampled receivers, at most; picks of all of them together, at least
 

@@ -12,15 +12,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.rays import far_offset, ray_offset
 from refgi.sampling import hash_bits
 from refgi.truth.light_vertices import BLOCK, LightVertices
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 TILE = 256  # most receivers that one parallel iteration owns: the SIMD lanes
 PART = 8  # senders whose terms a pick may have to compute again

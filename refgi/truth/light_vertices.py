@@ -5,22 +5,18 @@ no cosine and no distance. Points come in sets, one for each set of rays. Lobes,
 cells of light are made of (`refgi.truth.lobe_cells`).
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.lobes import lobe_norm
-from refgi.radiometry import DIRECTIONAL, radiant_intensity
+from refgi.radiometry import DIRECTIONAL, lobe_norm, radiant_intensity
 from refgi.rays import MISS, Tracer
 from refgi.scene import DirectionalLight, Light, LightTable
 from refgi.truth.light_grid import LightRays
-from refgi.truth.paths import CHUNK, row
+from refgi.truth.paths import CHUNK, diffuse_at, row
 from refgi.truth.surfaces import Surfaces, face_normal, height_above, shading_normal
-from refgi.truth.textured import diffuse_at
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 SMALLEST = 1e-12
 BLOCK = 32  # points whose contributions are summed before a pick looks inside

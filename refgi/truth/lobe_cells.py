@@ -9,20 +9,17 @@ it, fresh rays find what is there, and every ray is divided by its density.
 Symbols: P the lobe's exponent, w^2 = 1 / (P + 1) the square of its width, rad^2.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.rays import MISS, Tracer
 from refgi.scene import DirectionalLight, Light, LightTable, Scene
-from refgi.truth.light_grid import rays_through
-from refgi.truth.light_square import LightSquares, light_squares
+from refgi.truth.light_grid import LightSquares, light_squares, rays_through
 from refgi.truth.light_vertices import closest_of, light_vertices
 from refgi.truth.lobe_tree import Lobe, LobeTree, tree_of
 from refgi.truth.surfaces import Surfaces
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 FIRST_CELLS, MOST_CELLS = 1 << 12, 1 << 16  # before any is split by its lobes; at the most
 DEEPEST = 20  # level of the smallest cell: halved so often

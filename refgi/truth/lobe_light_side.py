@@ -15,7 +15,6 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
@@ -23,8 +22,7 @@ from refgi.pairs.shadow_rays import RayReceivers
 from refgi.truth.light_side import BELOW_1, PART, PARTS, TILE, aim, part_of, random_shift
 from refgi.truth.light_vertices import BLOCK, LightVertices
 from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, density_on_axis
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 NEAREST = np.float32(1e-12)  # m^2; smaller squared distances count as this one: no term of the sharpest lobe overflows
 LANES = 16  # receivers of a tile are filled up to a multiple of that

@@ -14,16 +14,14 @@ and the rays of a light put on a unit of area at the sender, A = r^2 n_a / n_b.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel
 from refgi.scene import Scene, material_table
 from refgi.truth.surfaces import Surfaces, surfaces
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 BLURRED = 4.0  # times the receiver's exponent: senders' lobes as sharp as that, or sharper, come by photons
 WIDE = 60.0  # exponent of receivers up to which, or to 1 / BLURRED of the sharpest sender's, they pick cells

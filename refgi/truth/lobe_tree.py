@@ -8,9 +8,8 @@ import heapq
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 TOPS = 1024  # groups that a receiver looks at before it goes into one
 HALVED = 40  # level from which groups are split by number: lobes of one place and axis

@@ -1,16 +1,13 @@
 """Imperfect shadow maps one step after the other: points of each light's map, their splats, filled holes, look-up."""
 
 import math
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.draws import IMPERFECT_MAPS, draws
 from refgi.jit import kernel
 from refgi.pairs.pixel_lights import PixelLights
-from refgi.pairs.ray_steps import facing, placed, shadow_rays, shadowed_sum, visible
-from refgi.sampling import FIRST_STEP, SECOND_STEP
+from refgi.pairs.steps import facing, placed, shadow_rays, shadowed_sum, visible
+from refgi.sampling import FIRST_STEP, IMPERFECT_MAPS, SECOND_STEP, draws
 from refgi.scene import Geometry
 from refgi.stages import stage
 from refgi.truth.imperfect import (
@@ -23,8 +20,7 @@ from refgi.truth.imperfect import (
     fill_holes,
     splat_box,
 )
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 
 @stage("vpl.scattered_points", kept=False)

@@ -6,11 +6,10 @@ At a surface a path passes through (without visibility), or scatters by the surf
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.lobes import inverse_fraction, lobe_direction
 from refgi.pairs.shadow_rays import RayReceivers
+from refgi.radiometry import inverse_fraction, lobe_direction
 from refgi.rays import MISS
 from refgi.sampling import hash_bits
 from refgi.truth.camera_visibility import hidden_from_camera
@@ -20,12 +19,10 @@ from refgi.truth.cell_pass import add_cells, beside_of
 from refgi.truth.hemisphere import cosine_direction, gather, scrambled_points, send
 from refgi.truth.light_grid import footprint
 from refgi.truth.light_pass import add_light_side
-from refgi.truth.paths import Paths, dot, hit_point, pass_through, paths_for, row
+from refgi.truth.paths import Paths, diffuse_at, dot, hit_point, pass_through, paths_for, row
 from refgi.truth.surfaces import Surfaces, around, face_normal, lift, shading_normal
 from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
-from refgi.truth.textured import diffuse_at
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 
 @kernel(parallel=True)

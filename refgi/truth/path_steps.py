@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.rays import Tracer
 from refgi.scene import Scene
@@ -14,8 +13,7 @@ from refgi.scene.model import Light
 from refgi.stages import stage
 from refgi.truth.settings import TruthSettings
 from refgi.truth.truth import averaged, without_pilot
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 
 class Lamps(NamedTuple):

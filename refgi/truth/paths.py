@@ -1,20 +1,26 @@
-"""Paths and shadow rays of a batch, as arrays, and the small vector algebra of their kernels.
+"""Paths and shadow rays of a batch, reflectance where they meet, next-event estimation (NEE).
 
 Parallel loops over paths only call a kernel for each chunk: Numba silently drops what a parallel loop itself
 writes into arrays that it reached through a NamedTuple's attribute. Inside, scalars are loaded one by one: a row loaded
 as a view counts references, and over that count threads wait for each other.
+
+Paths sample points, so textures are looked up between the texels of the image itself, without any footprint; what a
+pixel or a light's map means over is meant over by the paths. Scenes without textures or
+vertex colours compile none of it.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
+from numba import types
 
-from refgi.jit import kernel, prange
-from refgi.rays import MISS
+from refgi.jit import by_type, kernel, prange
+from refgi.radiometry import DIRECTIONAL
+from refgi.rays import MISS, STEPS, ray_offset
+from refgi.scene import LightTable
+from refgi.scene.texture.lookup import colour_at, coordinates_at, point_sample
 from refgi.truth.surfaces import Surfaces, face_normal, lift
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 CHUNK = 1024  # paths or receivers that one parallel iteration owns
 
@@ -118,3 +124,81 @@ def paths_for(count: int) -> Paths:
     origin, direction, weight = (np.empty((count, 3), np.float32) for _ in range(3))
     reach, travelled, cosine, distance = (np.empty(count, np.float32) for _ in range(4))
     return Paths(origin, direction, reach, travelled, cosine, np.empty(count, np.int32), distance, weight)
+
+
+@kernel
+def aim_at_light(
+    lights: LightTable, k: int, hit: tuple[Any, Any, Any], far: float, offset: float, grain: float, shadows: Shadows,
+    ray: int,
+) -> None:
+    """Write the shadow ray from a hit point to a light.
+
+    `hit`: the point, its face normal on the light's side, and the vector to the light. `far`: distance of the light, m.
+    `offset`: how far above the face the ray starts, m. A lamp may lie in a surface itself: rays end short of it.
+    """
+    y, g, toward = hit
+    directional = lights.kind[k] == DIRECTIONAL
+    for c in range(3):
+        shadows.origin[ray, c] = y[c] + offset * g[c]
+        shadows.direction[ray, c] = toward[c] if directional else toward[c] - offset * g[c]
+    short = ray_offset(lights.position[k, 0], lights.position[k, 1], lights.position[k, 2], grain) / far
+    shadows.reach[ray] = np.inf if directional else max(0.0, 1.0 - STEPS - short)
+
+
+@kernel
+def toward_light(lights: LightTable, k: int, y: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return the vector from a point to a light, of length 1 if that is infinitely far."""
+    if lights.kind[k] == DIRECTIONAL:
+        return -lights.direction[k, 0], -lights.direction[k, 1], -lights.direction[k, 2]
+    return lights.position[k, 0] - y[0], lights.position[k, 1] - y[1], lights.position[k, 2] - y[2]
+
+
+def diffuse_at(textures: Any, surfaces: Any, triangle: int, y: tuple[float, float, float]) -> Any:
+    """Return the diffuse reflectance at a point of a triangle.
+
+    `textures`: those of `surfaces`, which choose what is compiled. `y`: the point, m. Result: three numbers.
+    """
+    return _chosen(textures is not None, surfaces.colours is not None)(textures, surfaces, triangle, y)
+
+
+def _chosen(painted: bool, tinted: bool) -> Any:
+    return ((_painted_and_tinted if tinted else _painted) if painted else (_tinted if tinted else _plain))
+
+
+def _plain(textures: Any, surfaces: Any, triangle: Any, y: Any) -> Any:  # noqa: ARG001
+    return row(surfaces.diffuse, surfaces.material_of_face[triangle])
+
+
+def _painted(textures: Any, surfaces: Any, triangle: Any, y: Any) -> Any:
+    return _times_texture(textures, surfaces, triangle, y, row(surfaces.diffuse, surfaces.material_of_face[triangle]))
+
+
+def _tinted(textures: Any, surfaces: Any, triangle: Any, y: Any) -> Any:  # noqa: ARG001
+    return _times_colours(surfaces, triangle, y, row(surfaces.diffuse, surfaces.material_of_face[triangle]))
+
+
+def _painted_and_tinted(textures: Any, surfaces: Any, triangle: Any, y: Any) -> Any:
+    diffuse = row(surfaces.diffuse, surfaces.material_of_face[triangle])
+    return _times_texture(textures, surfaces, triangle, y, _times_colours(surfaces, triangle, y, diffuse))
+
+
+@kernel
+def _times_texture(textures: Any, surfaces: Any, triangle: int, y: Any, diffuse: Any) -> Any:
+    texture = textures.of_material[surfaces.material_of_face[triangle]]
+    if texture < 0:
+        return diffuse
+    u, v = coordinates_at(surfaces.vertices, surfaces.faces, surfaces.uv, triangle, y[0], y[1], y[2])
+    r, g, b = point_sample(textures, texture, u, v)
+    return diffuse[0] * r, diffuse[1] * g, diffuse[2] * b
+
+
+@kernel
+def _times_colours(surfaces: Any, triangle: int, y: Any, diffuse: Any) -> Any:
+    r, g, b = colour_at(surfaces.vertices, surfaces.faces, surfaces.colours, triangle, y[0], y[1], y[2])
+    return diffuse[0] * r, diffuse[1] * g, diffuse[2] * b
+
+
+@by_type(diffuse_at)
+def _by_type(textures: Any, surfaces: Any, triangle: Any, y: Any) -> Any:  # noqa: ARG001
+    colours = surfaces.types[surfaces.fields.index("colours")]
+    return _chosen(not isinstance(textures, types.NoneType), not isinstance(colours, types.NoneType))

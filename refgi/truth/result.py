@@ -13,12 +13,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.truth.tails import BINS, TRUSTED, count_tails, doubt_of, share_in_doubt, tail_index
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 BLOCK_SIDE = 8  # pixels
 

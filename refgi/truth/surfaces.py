@@ -14,16 +14,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.lobes import lobe_gap, lobe_norm, lobe_power
-from refgi.radiometry import orthonormal_basis
+from refgi.radiometry import lobe_gap, lobe_norm, lobe_power, orthonormal_basis
 from refgi.rays import ray_offset
 from refgi.scene import LightTable, Scene, light_table, material_table
 from refgi.scene.texture.table import TextureTable
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 ROUNDING = 2.0**-25  # of a float32 sum
 
@@ -39,7 +36,7 @@ class Surfaces(NamedTuple):
     specular: Array  # (k, 3) float64
     exponent: Array  # (k,) float64
     uv: Array | None = None  # (m, 3, 2) float64 texture coordinates, where there are textures
-    textures: TextureTable | None = None  # that multiply `diffuse`: `refgi.truth.textured.diffuse_at`
+    textures: TextureTable | None = None  # that multiply `diffuse`: `refgi.truth.paths.diffuse_at`
     colours: Array | None = None  # (m, 3, 3) float64 vertex colours that multiply `diffuse`, where there are some
 
 

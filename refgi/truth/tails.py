@@ -13,11 +13,9 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 DOUBTED = 0.2  # share of a picture's light in blocks of heavy tails; diffuse scenes come to 0.08 at most
 TRUSTED = 0.7  # largest tail index of an error that can be trusted (Vehtari et al.)

@@ -1,10 +1,9 @@
 """Inputs of every pass of the ground truth, and batches of its shadow rays."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.pairs.shadow_rays import RayReceivers, add_unoccluded
 from refgi.rays import Tracer
@@ -18,9 +17,7 @@ from refgi.truth.lobe_receivers import Lobes
 from refgi.truth.paths import Shadows, Sides
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import Surfaces
-
-Array = npt.NDArray[Any]
-
+from refgi.types import Array
 
 SOFT = 8.0  # exponent up to which directions of the hemisphere do as well as those around the lights' images
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import RefgiWarning
 from refgi.method import Approximation, Method
@@ -40,11 +39,10 @@ from refgi.truth.result import (
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import lights_of, surfaces
 from refgi.truth.task import Task, sets_of
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-
-Array = npt.NDArray[Any]
 Prepare = Callable[[Scene, Any, Array, Array, Array, TruthSettings], Task]
 
 STOPPING = {"samples", "seconds", "target_error", "checkpoint", "batch"}  # settings that change no pass

@@ -9,15 +9,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.diagnostics import SamplingError, asked
 from refgi.lights.settings import LightSettings, MapLights, most_lights
 from refgi.method import Approximation, Extent, Method
+from refgi.pairs.estimates import error_of_halves, half_of, sample_pixels, warn_of_sampling, with_seen_light
 from refgi.pairs.irradiance import Receivers
-from refgi.pairs.loss import sample_pixels
-from refgi.pairs.mirrors import warn_of_mirrors
-from refgi.pairs.sampling import error_of_halves, half_of, warn_of_sampling, with_seen_light
+from refgi.pairs.pixel_lights import warn_of_mirrors
 from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, Hidden, receivers, shadowed_sum
 from refgi.rays import Tracer
@@ -25,12 +23,11 @@ from refgi.scene import Geometry
 from refgi.settings import Settings, setting
 from refgi.stages import stage
 from refgi.truth.imperfect import Imperfect, ImperfectDepth, fill_hidden, imperfect_maps
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.lights import PixelLights
-
-Array = npt.NDArray[Any]
 
 FLOAT32 = 4  # bytes
 SAMPLED = 512  # pixels of which the sampling error is estimated
@@ -146,8 +143,8 @@ def vpl_lobes(frame: "Frame", settings: VplSettings) -> Array:
 
     (3, h, w) radiance towards the eye in the frame's dtype, W/m^2/sr, linear RGB; 0 where there is no lobe.
     """
-    from refgi.pairs.glossy_rays import shadowed_radiance
-    from refgi.rsm.buffers.glossy import spread_over_picture
+    from refgi.pairs.glossy import shadowed_radiance
+    from refgi.rsm.buffers.leaving import spread_over_picture
 
     lights, maps = _lights(frame, settings)
     points = frame.glossy_points

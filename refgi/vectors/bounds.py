@@ -21,7 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from refgi.vectors.spec import Array, Arrays, Case, Stage, as_read, outputs_of, stored
+from refgi.types import Array
+from refgi.vectors.spec import Arrays, Case, Stage, as_read, outputs_of, stored
 
 SAFETY = 4.0  # a handful of runs sees a third to all of what a rounding can do
 SIGMAS = 4.0  # of an estimate's mean, and of a pixel but for a few of them

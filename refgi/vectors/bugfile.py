@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pydantic
 
-from refgi.vectors.spec import Array
+from refgi.types import Array
 
 BUGS = "bugs.npz"
 

@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from refgi.types import Array
 from refgi.vectors.bounds import distance, large_value
 from refgi.vectors.manifest import ArrayEntry, Cause
-from refgi.vectors.spec import Array, axes_of
+from refgi.vectors.spec import axes_of
 
 EXPLAINED = 0.9  # share of the differing elements from which on a hypothesis counts
 SEEN = EXPLAINED  # share of what is seen without a hypothesis: one that explains more comes first

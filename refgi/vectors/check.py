@@ -12,19 +12,25 @@ from typing import Any
 import numpy as np
 
 from refgi.errors import InputError
+from refgi.types import Array
 from refgi.vectors.bounds import MOST_SPARED, distance, large_value
 from refgi.vectors.bugfile import BugEntry, Bugs
 from refgi.vectors.causes import EXPLAINED, Difference, explain, explained, places_of
-from refgi.vectors.expected import is_line_of, is_required, lines_of, passing_lines, require_lines_known
-from refgi.vectors.findings import CAUSES, findings
 from refgi.vectors.judge import Judged, judge, judge_estimate, unlike
 from refgi.vectors.kit import Asked, DamagedError, Kit, fits, places_of_case
-from refgi.vectors.lists import list_axis
 from refgi.vectors.manifest import ArrayVerdict, CaseManifest, Cause, Result, StageEntry, StageVerdict, Verdict
 from refgi.vectors.port import IN_ORDER, Got, Port
-from refgi.vectors.spec import Array
-from refgi.vectors.storage import PACKED, can_pack, depth_from, planes_of
-from refgi.vectors.words import did_you_mean
+from refgi.vectors.report import (
+    CAUSES,
+    did_you_mean,
+    findings,
+    is_line_of,
+    is_required,
+    lines_of,
+    passing_lines,
+    require_lines_known,
+)
+from refgi.vectors.storage import PACKED, can_pack, depth_from, list_axis, planes_of
 
 __all__ = ["ALL_WITHIN", "DAMAGED", "NOT_COMPARABLE", "OUT", "TIERS", "Asked", "DamagedError", "Kit",
            "check_output", "stage_of_array"]

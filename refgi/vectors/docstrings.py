@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from refgi import stages
-from refgi.vectors.spec import Array, Spec
+from refgi.types import Array
+from refgi.vectors.spec import Spec
 
 UNIT = re.compile(r"(?<![\w^/])(W/m\^2/sr|W/m\^2|W/sr|W|m\^2|m|sr|rad)(?![\w^/])")
 SHAPE = re.compile(r"^\(([^()]*)\)")

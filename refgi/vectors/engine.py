@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from refgi.types import Array
 from refgi.vectors.forms import described
 from refgi.vectors.recorded import leaves, rebuilt
-from refgi.vectors.spec import Array
 
 
 class Timed(NamedTuple):

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from refgi.errors import InputError, expect
+from refgi.types import Array
 from refgi.vectors.bounds import Bound, Budget, chained_budgets, distance, isolated_bounds, stored_budgets
 from refgi.vectors.bugfile import BUGS, BugEntry, BugWriter, Told
 from refgi.vectors.cases import kit_cases
@@ -35,7 +36,7 @@ from refgi.vectors.manifest import (
     text_of,
 )
 from refgi.vectors.scenefile import is_plain, write_scene
-from refgi.vectors.spec import Array, Arrays, Bug, Case, Stage, expected_of, kind_of, outputs_of, stored
+from refgi.vectors.spec import Arrays, Bug, Case, Stage, expected_of, kind_of, outputs_of, stored
 from refgi.vectors.standalone import standalone_text
 from refgi.vectors.wiring import ANOTHER, wirings
 

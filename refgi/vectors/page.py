@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from refgi.image.whole import write_text
+from refgi.types import Array
 from refgi.vectors.kit import Asked, Kit
 from refgi.vectors.manifest import ArrayVerdict, Result, StageVerdict
 from refgi.vectors.port import Got, Port
-from refgi.vectors.spec import Array
 
 FILES = Path(__file__).with_name("files")
 MOST_BYTES = 24_000_000  # of arrays in a page; beyond that only those that are out are shown

@@ -10,12 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from refgi.types import Array
 from refgi.vectors.bounds import HALF_ROUNDING, SAFETY, large_value
 from refgi.vectors.kit import Asked, DamagedError, Kit, find_array, fits, read_array
-from refgi.vectors.lists import order_of, reordered
 from refgi.vectors.manifest import CaseManifest, StageEntry, Tolerance
-from refgi.vectors.spec import Array
-from refgi.vectors.storage import PACKED, PACKED_ROUNDING, can_pack, packed_steps, planes_of
+from refgi.vectors.storage import PACKED, PACKED_ROUNDING, can_pack, order_of, packed_steps, planes_of, reordered
 
 IN_ORDER = "its elements matched with those of the kit, as --unordered says"
 

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from refgi.vectors.spec import Array, Arrays, Bug, Case, Run, Spec, Stage, expected_of
+from refgi.types import Array
+from refgi.vectors.spec import Arrays, Bug, Case, Run, Spec, Stage, expected_of
 
 Change = Callable[[Array], Array]
 

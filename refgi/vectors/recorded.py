@@ -21,12 +21,13 @@ from refgi.frame import Frame
 from refgi.methods import find_method, render
 from refgi.scene import Scene
 from refgi.settings import flat
+from refgi.types import Array
 from refgi.vectors.docstrings import field_description, returned, spec_of, summary, taken
 from refgi.vectors.forms import described
 from refgi.vectors.forms.beside import Described
 from refgi.vectors.inputs import input_spec
 from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Array, Arrays, Bug, Case, Run, Spec
+from refgi.vectors.spec import Arrays, Bug, Case, Run, Spec
 
 LEFT_OUT = frozenset({"scene.load", "rays.build", "rsm.resolve", "rsm.rasterize", "rsm.solid_angles",
                       "rsm.lamp_irradiance", "lights.shares", "lights.map_flux", "cluster.blockers",

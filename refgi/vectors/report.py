@@ -1,12 +1,144 @@
-"""What a check says: the text that people read, annotations of GitHub Actions, JUnit XML."""
+"""What a check says: verdicts in words, what is wrong over all cases, what was expected, JUnit XML."""
 
+from collections.abc import Callable, Iterable
+from fnmatch import fnmatchcase
 from pathlib import Path
 from xml.etree import ElementTree
 
-from refgi.errors import InputError, printable
+from refgi.errors import InputError, nearest, printable
 from refgi.texts import annotation, table
-from refgi.vectors.manifest import Result, StageVerdict
-from refgi.vectors.words import stories, story
+from refgi.vectors.kit import Asked, Kit, fits
+from refgi.vectors.manifest import ArrayVerdict, Cause, CommonCause, Finding, Result, StageVerdict
+from refgi.vectors.spec import kind_of
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return a hint at the nearest name, or nothing where none is near."""
+    near = nearest(name, known)
+    return f"; did you mean {near!r}?" if near else ""
+
+
+def story(stage: StageVerdict) -> list[str]:
+    """Return what is wrong with a stage of one case, line by line: arrays, worst elements, causes."""
+    return [f"{stage.case}: {stage.stage} is {stage.verdict}", *_faults(stage),
+            *(_likely(one, f"{one.share:.0%} of what differs" if one.share else "") for one in stage.causes)]
+
+
+def stories(result: Result) -> list[list[str]]:
+    """Return what is wrong with each kind of stage over all cases, line by line; its faults in the first case."""
+    verdicts = {(one.case, one.stage): one for one in result.stages}
+    return [[f"{one.stage} is wrong in {one.wrong} of {one.ran}, first {one.first[1]} of {one.first[0]}",
+             *_faults(verdicts[one.first]),
+             *(_likely(cause, f"explains {cause.explained} of {cause.tried}" if cause.explained else "")
+               for cause in one.causes)]
+            for one in result.findings]
+
+
+def _faults(stage: StageVerdict) -> list[str]:
+    return [f"  {fault(one)}" for one in stage.arrays if one.verdict in ("out", "invalid", "not-judged")]
+
+
+def _likely(cause: Cause | CommonCause, fit: str) -> str:
+    paper = f"; {cause.paper}" if cause.paper else ""
+    return f"  likely: {cause.cause} ({fit}{paper})" if fit else f"  {cause.cause}"
+
+
+def fault(array: ArrayVerdict) -> str:
+    """Return what is wrong with an array: its worst element with both values, or why it cannot be compared."""
+    if array.verdict in ("invalid", "not-judged"):
+        return f"{array.name}: {array.said}"
+    place = ", ".join(map(str, array.element or ()))
+    values = " and ".join(f"{'NaN or infinity' if value is None else f'{value:.9g}'} {word}" for value, word in (
+        (array.expected, "expected"), (array.got, "here")))
+    said = f" ({array.said})" if array.said else ""
+    bound = "" if array.bound is None else f", bound {array.bound:.2g}"
+    count = "1 element" if array.outside == 1 else f"{array.outside} elements"
+    return f"{array.name}[{place}]: {values}{bound}; {count} out{said}"
+
+
+def lines_of(file: str) -> tuple[str, ...]:
+    """Return the stages that a file of expected failures names: [CASE/]STAGE a line, # begins a remark.
+
+    InputError if it cannot be read.
+    """
+    try:
+        text = Path(file).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: cannot be read: {error}", file=file) from error
+    return tuple(line for one in text.splitlines() if (line := one.partition("#")[0].strip()))
+
+
+def is_line_of(line: str, case: str, stage: str) -> bool:
+    """Return whether a line of expected failures names a stage of a case; * and ? stand for any letters."""
+    return fnmatchcase(f"{case}/{stage}" if "/" in line else stage, line)
+
+
+def is_required(starts: Iterable[str], case: str, stage: str) -> bool:
+    """Return whether a stage of a case must have run: by the start of CASE/STAGE or of the stage's name."""
+    return any(f"{case}/{stage}".startswith(start) or fits(stage, (start,)) for start in starts)
+
+
+def require_lines_known(kit: Kit, asked: Asked) -> None:
+    """Refuse what names no stage of the whole kit: a line of expected failures that is stale, a start of none."""
+    if not (asked.expect or asked.require):
+        return
+    known = [(case.id, step.name) for case in kit.cases(Asked()) for step in case.stages]
+    names = {f"{case}/{stage}" for case, stage in known} | {stage for _, stage in known} | {case for case, _ in known}
+    for line in asked.expect:
+        if not any(is_line_of(line, *one) for one in known):
+            raise InputError(f"--expect: expected [CASE/]STAGE, got {line!r}, which no stage has"
+                             f"{did_you_mean(line, names)}")
+    for start in asked.require:
+        if not any(is_required((start,), *one) for one in known):
+            raise InputError(f"--require: expected the start of a case's id or of a stage's name, got {start!r}"
+                             f"{did_you_mean(start, names)}")
+
+
+def passing_lines(lines: Iterable[str], verdicts: Iterable[StageVerdict]) -> tuple[str, ...]:
+    """Return the lines of expected failures whose stages have run and none of which fails."""
+    ran = [one for one in verdicts if one.verdict != "not-run"]
+    named = {line: [one for one in ran if is_line_of(line, one.case, one.stage)] for line in lines}
+    return tuple(line for line, own in named.items()
+                 if own and not any(one.excused or one.verdict == "not-judged" for one in own))
+
+
+CAUSES = 3  # that are told
+
+
+def findings(verdicts: Iterable[StageVerdict], tried: Callable[[StageVerdict], set[str]]) -> tuple[Finding, ...]:
+    """Return one finding a kind of stage that is wrong by itself, in the order in which they are met.
+
+    Those made from wrong inputs are not blamed. `tried` gives the likely bugs of a verdict's stage that its case can
+    tell: causes go by the share of wrong verdicts that they explain, of those that could know them.
+    """
+    ran: dict[str, int] = {}
+    wrong: dict[str, list[StageVerdict]] = {}
+    for one in verdicts:
+        kind = kind_of(one.stage)
+        ran[kind] = ran.get(kind, 0) + (one.verdict != "not-run")
+        if one.verdict in ("out", "invalid") and one.upstream != "dirty":
+            wrong.setdefault(kind, []).append(one)
+    return tuple(Finding(stage=kind, first=(own[0].case, own[0].stage), wrong=len(own), ran=ran[kind],
+                         causes=_common(own, [tried(one) for one in own])) for kind, own in wrong.items())
+
+
+def _common(wrong: list[StageVerdict], tried: list[set[str]]) -> tuple[CommonCause, ...]:
+    """Return the causes that explain most, the best fit first where they explain as much."""
+    fits: dict[str, list[Cause]] = {}
+    for one in wrong:
+        for cause in one.causes:
+            if cause.share > 0:
+                fits.setdefault(cause.cause, []).append(cause)
+    likely = set().union(*tried)
+    told = []
+    for name, own in fits.items():
+        knowing = sum(name in known for known in tried) if name in likely else len(wrong)
+        told.append((-len(own) / (knowing + 1), -round(sum(one.share for one in own) / len(own), 2), CommonCause(
+            cause=name, paper=own[0].paper, explained=len(own), tried=knowing)))
+    remarks = [CommonCause(cause=one.cause, explained=0, tried=len(wrong)) for one in wrong[0].causes]
+    best = [one for *_, one in sorted(told, key=lambda one: one[:2])]
+    return tuple(best or remarks)[:CAUSES]
+
 
 KINDS = ("exact", "within", "not-judged", "out", "invalid")
 

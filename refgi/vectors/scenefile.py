@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from refgi.scene import DirectionalLight, Material, PointLight, Scene, SpotLight
-from refgi.vectors.spec import Array
+from refgi.types import Array
 
 
 def is_plain(scene: Scene) -> bool:

@@ -18,18 +18,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from refgi.types import Array
 from refgi.vectors.bounds import distance
 from refgi.vectors.cases import kit_cases
 from refgi.vectors.causes import EXPLAINED, explained
 from refgi.vectors.changes import Change, changes_of
 from refgi.vectors.check import differences_of
-from refgi.vectors.edits import Function, called_by, code_of, compiled
-from refgi.vectors.findings import CAUSES
 from refgi.vectors.kit import Asked, Kit
 from refgi.vectors.manifest import CaseManifest, Cause, CommonCause, Result, StageVerdict
 from refgi.vectors.port import Port
-from refgi.vectors.rows import Form
-from refgi.vectors.spec import Array, as_read, kind_of, stored
+from refgi.vectors.report import CAUSES
+from refgi.vectors.rows import Form, Function, called_by, code_of, compiled
+from refgi.vectors.spec import as_read, kind_of, stored
 
 MOST_CASES = 3  # that a change must explain
 MOST_KEPT = 40  # changes that explain the first case and are tried in others

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[Any]
+from refgi.types import Array
+
 Arrays = Mapping[str, Array]
 Tier = Literal["T0", "T1", "T3"]
 Run = Callable[[Arrays, Any], Arrays]  # inputs by name in the dtype of the second argument -> outputs by name

@@ -11,9 +11,10 @@ from itertools import takewhile
 
 import numpy as np
 
+from refgi.types import Array
 from refgi.vectors.bounds import is_estimate
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Array, Arrays, Bug, Case, Run, Stage, axes_of, kind_of
+from refgi.vectors.spec import Arrays, Bug, Case, Run, Stage, axes_of, kind_of
 
 Layout = Callable[[Array], Array]
 ANOTHER = "that of another lamp, level or round"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from refgi.batch.baseline import first_change, read_baseline, worse
+from refgi.batch.outcome import first_change, read_baseline, worse
 from refgi.errors import InputError
 from tests.batch.made import result_of, run_of, scene_of
 

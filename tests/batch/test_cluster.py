@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from refgi.batch.cluster import absolute, run_on_cluster
+from refgi.batch.schedule import absolute, run_on_cluster
 from refgi.batch.shared import Common
 from refgi.batch.work import Chunk
 from refgi.errors import InputError

@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from refgi.batch import estimate as module
-from refgi.batch.estimate import estimate
+from refgi.batch import schedule as module
 from refgi.batch.jobs import jobs_of
 from refgi.batch.plan import read_plan
+from refgi.batch.schedule import estimate
 from refgi.batch.shared import Common
 from refgi.errors import InputError
 

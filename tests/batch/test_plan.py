@@ -2,8 +2,7 @@
 
 import pytest
 
-from refgi.batch.plan import read_plan
-from refgi.batch.thresholds import Threshold
+from refgi.batch.plan import Threshold, read_plan
 from refgi.errors import InputError
 from refgi.sssil.settings import TemporalSettings
 from refgi.truth import TruthSettings

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from refgi.batch.temporal import Still, over_time
+from refgi.batch.outcome import Still, over_time
 
 SHAPE = (3, 20, 30)
 FRAMES = 8

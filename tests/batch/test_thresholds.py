@@ -2,7 +2,7 @@
 
 import pytest
 
-from refgi.batch.thresholds import broken, figure_of, read_threshold
+from refgi.batch.plan import broken, figure_of, read_threshold
 from tests.batch.made import path_of, result_of, run_of, scene_of
 
 RESULT = result_of(

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from refgi import stages
-from refgi.batch import filtered, work
+from refgi.batch import work
 from refgi.batch.jobs import jobs_of
-from refgi.batch.outcome import is_done, read_outcome
+from refgi.batch.outcome import is_done, read_outcome, read_outcomes, result_of
 from refgi.batch.plan import read_plan
-from refgi.batch.results import read_outcomes, result_of
 from refgi.batch.shared import Common
 from refgi.batch.work import Chunk, forget, run_chunk
 from refgi.bench import measure
@@ -264,7 +263,7 @@ def test_without_the_frame_before_there_is_no_filtered_frame(tmp_path):
     plan = planned(tmp_path, PLAN.replace("rounds = 2", 'path = "way.toml"\nframes = 2\ntemporal = {}'))
     job = [job for job in jobs_of(plan) if job.choice.method == "hssil"][1]
     common = common_of(tmp_path, plan)
-    filtered._left.clear()
+    work._left.clear()
     done([job], common)
     assert "a picture of the frame before" in read_outcome(common.folder, job).message
 

@@ -5,10 +5,9 @@ import warnings
 import numpy as np
 import pytest
 
-from refgi.bench.chain import REST, Renderer, chain_of
 from refgi.bench.grid import TRUTH, Choice
 from refgi.bench.measure import REFERENCE_SEED
-from refgi.bench.split import split_of
+from refgi.bench.split import REST, Renderer, chain_of, split_of
 from refgi.errors import RefgiWarning
 from refgi.methods import METHODS
 from refgi.provenance.frames import StillFrames
@@ -185,7 +184,7 @@ def test_frames_of_a_resting_scene_are_the_last_part(evidence):
 
 def test_truths_have_seeds_of_their_own_and_are_traced_once(tmp_path, monkeypatch):
     asked = []
-    monkeypatch.setattr("refgi.bench.chain.trace_truth", lambda frame, settings: asked.append(settings) or frame)
+    monkeypatch.setattr("refgi.bench.split.trace_truth", lambda frame, settings: asked.append(settings) or frame)
     made = Renderer(load_scene("cornell_box"), TruthSettings(samples=7, checkpoint=tmp_path / "a file"), **OPTIONS)
     for limits in ({}, {"visibility": False}, {"emitters": "visible"}, {"emitters": "visible", "visibility": False},
                    {"visibility": False, "emitters": "visible"}, {}):
@@ -204,7 +203,7 @@ def test_truths_have_seeds_of_their_own_and_are_traced_once(tmp_path, monkeypatc
 
 def test_a_method_that_declares_none_has_one_part(small, monkeypatch):
     bare = METHODS["sii"]._replace(approximations=())
-    monkeypatch.setattr("refgi.bench.chain.METHODS", {"sii": bare})
+    monkeypatch.setattr("refgi.bench.split.METHODS", {"sii": bare})
     chain = chain_of(small, Choice("sii", (), settings_of("sii", 0)), 1)
     assert [link.name for link in chain.links] == [TRUTH, REST]
     assert np.array_equal(chain.links[-1].pictures[0], small.picture("sii", settings_of("sii", 0), small.options))

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from refgi.bench.curves import error_in, front, knee
+from refgi.bench.error import error_in, front, knee
 
 
 def test_the_front_is_what_nothing_beats():

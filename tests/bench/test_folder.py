@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from refgi.bench import overview, report
+from refgi.bench import report
 from refgi.bench.folder import INDEX, RESULTS, folders_of, read_result, remake, watch
 from refgi.bench.results import write_results
 from refgi.errors import InputError
@@ -27,7 +27,7 @@ def made(tmp_path_factory):
 def _without_plots(monkeypatch):
     """Plots have tests of their own; here they would take most of the time."""
     monkeypatch.setattr(report, "plot_of", lambda *_: "")
-    monkeypatch.setattr(overview, "curves_plot", lambda *_: "")
+    monkeypatch.setattr(report, "curves_plot", lambda *_: "")
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import re
 
-from refgi.bench.overview import Place, overview
+from refgi.bench.report import Place, overview
 from tests.bench.folders import make_scene
 
 

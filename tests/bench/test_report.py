@@ -6,8 +6,8 @@ import pytest
 
 from refgi.bench import report
 from refgi.bench.report import page, plot_of
-from refgi.compare.maps import luminance
 from refgi.compare.page.album import album
+from refgi.compare.pictures import luminance
 from tests.bench.folders import HEIGHT, WIDTH, light, make_folder, make_scene, radiance
 from tests.compare.page.browser import clicked
 from tests.compare.page.test_viewer import DIGITS, HALF, RADIANCE, shown

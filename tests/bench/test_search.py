@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from refgi.bench.grid import Choice
-from refgi.bench.search import FURTHEST, JUDGED, MARGIN, TIME_MARGIN, for_error, for_time
-from refgi.bench.tracks import Track
+from refgi.bench.choose import FURTHEST, JUDGED, MARGIN, TIME_MARGIN, for_error, for_time
+from refgi.bench.grid import Choice, Track
 from refgi.settings import Settings
 
 VALUES = tuple(dict.fromkeys(round(16 * math.sqrt(2) ** step) for step in range(25)))

@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from refgi.bench.chain import Alone, Chain, Link
 from refgi.bench.grid import Choice, Grid
-from refgi.bench.results import Figures, Part, Run, Split
-from refgi.bench.split import chosen_for_split, small_size, split_of
-from refgi.bench.split_plot import bars, splits_of
-from refgi.bench.split_text import percent, rows_of_split, said_of_split, tables_of
+from refgi.bench.report import bars, splits_of
+from refgi.bench.results import Figures, Part, Run, Split, percent, rows_of_split, said_of_split, tables_of
+from refgi.bench.split import Chain, Link, Without, chosen_for_split, small_size, split_of
 from refgi.cluster.settings import ValSettings
 from refgi.settings import of
 from refgi.splat.sii import SiiSettings
@@ -84,7 +82,7 @@ def test_bias_and_spread_of_a_step_are_apart_and_the_truth_s_noise_is_in_the_fir
 def test_what_each_costs_alone():
     """Without a the error is 0.5 u, judged by another truth without b 0.2: noise of 0.3 is in both truths."""
     u, truth, noise = ramp(1), np.full(SHAPE, MEAN), np.full(SHAPE, 0.09)
-    alone = {"a": Alone((truth + 0.5 * u,), truth, noise), "b": Alone((truth + 1.2,), truth + 1, 0 * noise)}
+    alone = {"a": Without((truth + 0.5 * u,), truth, noise), "b": Without((truth + 1.2,), truth + 1, 0 * noise)}
     found = split_of(chain(("a", [0.4 + 0 * u]), ("b", [0.6 * u]), truth_noise=0.3, alone=alone), CHOICE)
     whole = (0.4**2 + 0.6**2 - 0.09) / 4
     a, b = (part.alone for part in found.parts)
@@ -97,7 +95,7 @@ def test_what_each_costs_alone():
 def test_black_truths_and_broken_pictures_are_not_known():
     nothing = np.zeros(SHAPE)
     black = Chain((Link("truth", "", (nothing,), nothing), Link("a", "", (nothing + 1,), nothing)),
-                  {"a": Alone((nothing,), nothing, nothing)}, COVERED)
+                  {"a": Without((nothing,), nothing, nothing)}, COVERED)
     for made in (black, chain(("a", [np.full(SHAPE, np.inf)]))):
         found = split_of(made, CHOICE)
         assert found.squares is found.parts[0].mean is found.cross_alone is None
@@ -135,7 +133,7 @@ def test_views_that_are_split_are_small(size, small):
 def split(**changes):
     u, v = ramp(1), ramp(2)
     truth = np.full(SHAPE, MEAN)
-    alone = {"visibility": Alone((truth + 0.1 * u,), truth, np.zeros(SHAPE))}
+    alone = {"visibility": Without((truth + 0.1 * u,), truth, np.zeros(SHAPE))}
     made = chain(("visibility", [0.4 + 0.3 * u]), ("cut", [-0.1 - 0.3 * u + 0.2 * v]), alone=alone)
     return split_of(made, CHOICE).model_copy(update=changes)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from refgi.bench.tracks import built_in_tracks, read_tracks
+from refgi.bench.grid import built_in_tracks, read_tracks
 from refgi.errors import InputError
 from refgi.methods import METHODS
 

@@ -6,9 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from refgi.bench.chain import Chain, Link, Renderer, chain_of
 from refgi.bench.grid import Choice
-from refgi.bench.split import split_of
+from refgi.bench.split import Chain, Link, Renderer, chain_of, split_of
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.scene import load_scene

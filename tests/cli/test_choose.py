@@ -8,10 +8,10 @@ import pytest
 from click.testing import CliRunner
 
 from refgi.batch.plan import read_plan
-from refgi.bench import choose, tracks
-from refgi.bench.grid import Choice
-from refgi.bench.search import Probe
-from refgi.bench.tracks import Track
+from refgi.bench import choose
+from refgi.bench import grid as tracks
+from refgi.bench.choose import Probe
+from refgi.bench.grid import Choice, Track
 from refgi.cli.group import VerbGroup
 from refgi.truth import TruthSettings
 

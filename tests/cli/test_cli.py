@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 import refgi
-from refgi.cli import memory
+from refgi.cli import view
 from refgi.cli.group import VERBS, VerbGroup
 from refgi.image import read_exr
 
@@ -249,7 +249,7 @@ def test_explain_warns_of_the_frame_asked_for_alone(tmp_path):
 
 
 def test_explain_refuses_maps_that_do_not_fit(monkeypatch):
-    monkeypatch.setattr(memory, "available_bytes", lambda: 10**9)
+    monkeypatch.setattr(view, "available_bytes", lambda: 10**9)
     told = run("explain", "cornell_box", *TINY, "--method", "val", "--set", "maps.resolution=4096")
     assert told.exit_code == 2
     assert "for the settings of val" in told.stderr

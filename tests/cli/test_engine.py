@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from refgi.cli.group import VerbGroup
 from refgi.image import read_exr
 from refgi.literal import direct, pairs
-from refgi.vectors.edits import edited
+from refgi.vectors.rows import edited
 
 SMALL = ["cornell_box", "--size", "20x15", "--rsm-resolution", "24", "--set"]
 SETTINGS = {"sii": ["lights=40"], "hssil": ["samples=12"]}

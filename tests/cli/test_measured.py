@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from refgi.bench.dim_lights import DimLights
 from refgi.bench.skips import MeasuredSkip, SkipReport, Unmeasured
-from refgi.bench.trades import Trade
+from refgi.bench.trades import DimLights, Trade
+from refgi.cli.explain import measured_text
 from refgi.cli.group import VerbGroup
-from refgi.cli.measured import measured_text
 from refgi.pairs import irradiance as pairs
 
 SMALL = ("--rsm-resolution", "64", "--threads", "1", "--rounds", "2")

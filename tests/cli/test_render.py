@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from refgi.cli import memory
+from refgi.cli import view as memory
 from refgi.cli.group import VerbGroup
 from refgi.cli.view import read_lights
 from refgi.cluster import ValSettings

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 import refgi.methods
 from refgi.cli.group import VerbGroup
-from refgi.stress.rows import read_rows
+from refgi.stress.promises import read_rows
 
 ONE = ("--methods", "hssil", "--change", "flux x 2^27", "--size", "16x12")
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel, ConfigDict
 
-from refgi.compare import maps
+from refgi.compare import pictures
 from refgi.compare.results import as_json, file_names, signed_error, write_results
 from refgi.image import is_from_refgi, read_exr, read_png_attributes
 from refgi.provenance import plain
@@ -229,29 +229,29 @@ def test_infinite_figures_keep_the_schema(comparison):
 def test_a_signed_error_is_positive_where_the_method_is_too_bright(comparison):
     """Analytic: sii is 1.3 times the ideal picture, whose noise is 2 %."""
     error = signed_error(comparison, comparison.results["sii"])[comparison.covered]
-    truth = maps.luminance(comparison.truth.irradiance)[comparison.covered]
+    truth = pictures.luminance(comparison.truth.irradiance)[comparison.covered]
     assert (error / truth).mean() == pytest.approx(0.3, abs=0.01)
 
 
 def test_error_maps_are_red_where_too_bright_and_blue_where_too_dark(comparison):
     sii = comparison.results["sii"]
-    scale = maps.error_scale([signed_error(comparison, sii)], comparison.covered)
+    scale = pictures.error_scale([signed_error(comparison, sii)], comparison.covered)
     assert scale.low == -scale.high
     values = np.array([[-scale.high, 0.0, scale.high, np.nan]])
-    dark, none, bright, bad = maps.paint(values, np.ones((1, 4), bool), scale)[0].astype(int)
+    dark, none, bright, bad = pictures.paint(values, np.ones((1, 4), bool), scale)[0].astype(int)
     assert dark[2] > dark[0] + 50
     assert bright[0] > bright[2] + 50
     assert none.min() > 230
     assert bad.tolist() == [255, 0, 255]
-    assert maps.paint(values, np.zeros((1, 4), bool), scale)[0].tolist() == [[128] * 3] * 4
+    assert pictures.paint(values, np.zeros((1, 4), bool), scale)[0].tolist() == [[128] * 3] * 4
 
 
 def test_the_scale_holds_95_percent_and_is_round():
     errors = np.linspace(0, 3, 1000).reshape(20, 50)
-    assert maps.error_scale([errors], np.ones((20, 50), bool)).high == 5.0
-    assert maps.error_scale([errors * 0.6], np.ones((20, 50), bool)).high == 2.0
-    assert maps.error_scale([0 * errors], np.ones((20, 50), bool)).high == 1.0
-    assert maps.error_scale([np.full((2, 2), np.nan)], np.ones((2, 2), bool)).high == 1.0
+    assert pictures.error_scale([errors], np.ones((20, 50), bool)).high == 5.0
+    assert pictures.error_scale([errors * 0.6], np.ones((20, 50), bool)).high == 2.0
+    assert pictures.error_scale([0 * errors], np.ones((20, 50), bool)).high == 1.0
+    assert pictures.error_scale([np.full((2, 2), np.nan)], np.ones((2, 2), bool)).high == 1.0
 
 
 WRITER = """

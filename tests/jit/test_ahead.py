@@ -9,7 +9,7 @@ import pytest
 from numba import types
 
 from refgi.jit.ahead import LIST, read_list
-from refgi.jit.typetext import text_of, types_of
+from refgi.jit.kernelfile import text_of, types_of
 from refgi.methods import BUILT_IN
 
 ROOT = Path(__file__).parents[2]
@@ -64,7 +64,7 @@ def test_what_is_compiled_ahead_is_kept(tmp_path):
 def test_a_list_that_is_out_of_date_stops_nothing():
     out = run("from refgi.jit.ahead import *\n"
               "old = [Specialisation('refgi.gone.kernel', 'int64', frozenset()),"
-              " Specialisation('refgi.draws.gone', 'int64', frozenset()),"
-              " Specialisation('refgi.draws.Any', 'nothing', frozenset())]\n"
+              " Specialisation('refgi.sampling.gone', 'int64', frozenset()),"
+              " Specialisation('refgi.sampling.Any', 'nothing', frozenset())]\n"
               "print(missing(old))")
     assert out.strip() == "[]"

@@ -15,8 +15,8 @@ from types import ModuleType
 import pytest
 
 import refgi
+from refgi.jit.cache import code_key
 from refgi.jit.dispatch import Kernel
-from refgi.jit.key import code_key
 
 BASE = """
     import math
@@ -193,7 +193,7 @@ def test_editing_materials_recompiles_nothing(tmp_path: Path):
 @pytest.mark.parametrize("name", ["NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_LOOP_VECTORIZE", "NUMBA_OPT"])
 def test_what_numba_compiles_for_changes_the_key(monkeypatch, name):
     """A kernel of another target would have other code under the same name."""
-    from refgi.jit.key import _platform
+    from refgi.jit.cache import _platform
 
     monkeypatch.delenv(name, raising=False)
     plain = _platform.__wrapped__()

@@ -15,7 +15,7 @@ from refgi.rsm.raster.projection import CUBE_FORWARD, CUBE_UP
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
 from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
-from refgi.splat.sii.ledger import sii_ledger
+from refgi.splat.sii.approximations import sii_ledger
 from refgi.stages import observe
 from tests.form_factors import polygon_form_factor
 from tests.naive import ledger as naive

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from refgi.cluster import ValSettings, val
-from refgi.cluster.ledger import val_ledger
+from refgi.cluster.approximations import val_ledger
 from refgi.frame import Frame
 from refgi.ledger import pixel_areas
 from refgi.lights.selection import choose_lights
 from refgi.scene import SpotLight, load_scene
 from refgi.settings import of
 from refgi.splat.multires import MultiresSettings, multires
-from refgi.splat.multires.ledger import multires_ledger
+from refgi.splat.multires.approximations import multires_ledger
 from tests.naive import eq2
 from tests.naive.truth import nearest_hit
 from tests.truth.scenes import corner_room, rectangle, scene

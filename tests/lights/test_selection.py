@@ -7,8 +7,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.lights import Warp, choose_pixel_lights, importance
-from refgi.lights.openness_flux import roulette, scale_flux
-from refgi.lights.selection import choose_lights
+from refgi.lights.selection import choose_lights, roulette, scale_flux
 from refgi.lights.settings import LightSettings
 from refgi.rays import Tracer, openness
 from refgi.rsm import reflective_shadow_map

@@ -8,16 +8,15 @@ import pytest
 from refgi.errors import InputError
 from refgi.jit import threads
 from refgi.lights import PixelLights
-from refgi.pairs.glossy import block_order, glossy_radiance, summed
-from refgi.pairs.glossy_sum import load_lobes, receiver_lobes_of
-from refgi.pairs.glossy_tile import FARTHEST, TILE_ROWS, M
+from refgi.pairs.glossy import block_order, glossy_radiance, glossy_summed
+from refgi.pairs.glossy_sum import FARTHEST, TILE_ROWS, M, load_lobes, receiver_lobes_of
+from refgi.pairs.lobe_culling import CORNERS, bound_receivers, lights_in_lobes
 from refgi.pairs.packing import pack
 from refgi.pairs.pair_sum import GROUP, load_tile
 from refgi.pairs.pixel_lights import Range
 from refgi.pairs.ranged_sum import LANES
-from refgi.pairs.receiver_culling import CORNERS, bound_receivers, lights_in_lobes
 from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, LobeSettings, PairSettings, SphereClamp
-from refgi.rsm.buffers.glossy import GlossyPoints
+from refgi.rsm.buffers.leaving import GlossyPoints
 from refgi.skips import count_skips, without_skip
 from tests.glossy import defined
 from tests.pairs.sets import random_directions
@@ -252,7 +251,7 @@ def test_a_range_weighs_pairs_by_what_arrives_at_most(outside, rng):
         return 1 - kept if outside else kept
 
     assert (lights.lobe_exponent > 0).all()
-    np.testing.assert_allclose(summed(points, packed, reach), defined(points, lights, w_o, PLAIN, factor=factor),
+    np.testing.assert_allclose(glossy_summed(points, packed, reach), defined(points, lights, w_o, PLAIN, factor=factor),
                                rtol=1e-9, atol=1e-12)
 
 

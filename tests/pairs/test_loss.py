@@ -13,8 +13,8 @@ from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import LightSettings
+from refgi.pairs.estimates import sample_pixels
 from refgi.pairs.irradiance import Receivers, irradiance
-from refgi.pairs.loss import sample_pixels
 from refgi.pairs.settings import PairSettings
 from refgi.scene import PointLight, load_scene
 from refgi.settings import of

@@ -8,7 +8,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.jit import threads
-from refgi.pairs.sphere_pair import cone_term, cut_cone_term
+from refgi.pairs.sphere_sum import cone_term, cut_cone_term
 from refgi.settings import of
 from refgi.splat import PairSettings, irradiance
 from tests.naive import eq2

@@ -11,8 +11,7 @@ from refgi import load_scene
 from refgi.frame import Frame
 from refgi.pairs.shadow_rays import receivers
 from refgi.rays import MISS, Tracer, openness
-from refgi.rays.offsets import GRAIN, STEPS, far_offset, grain_of, ray_offset
-from refgi.rays.watertight import REACH, cut
+from refgi.rays.watertight import GRAIN, REACH, STEPS, cut, far_offset, grain_of, ray_offset
 from refgi.scene import Camera, Geometry, Material, Mesh, SpotLight, light_table, material_table
 from refgi.settings import of
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
@@ -93,7 +92,7 @@ def shares_of_rays(frame):
 
 
 def cameras_sight(frame):
-    from refgi.sssil.camera_transport import unoccluded
+    from refgi.sssil.cameras import unoccluded
 
     position, normal = (part[:, frame.gbuffer.covered].T.astype(float)
                         for part in (frame.gbuffer.position, frame.gbuffer.normal))

@@ -13,7 +13,7 @@ from refgi.provenance.record import scene_record
 from refgi.rsm import direct_irradiance, gbuffer, reflective_shadow_map
 from refgi.scene import Camera, Image, Material, PointLight, SpotLight, Texture, load_scene, material_table, merge
 from refgi.scene.builtin.surfaces import rectangle, sphere
-from refgi.scene.emissive import emissive_lamps, emissive_parts
+from refgi.scene.placed import emissive_lamps, emissive_parts
 from tests.rsm.shapes import sphere as ball
 from tests.scene.samples import glb_bytes, gltf_tree, write_scene
 

@@ -15,8 +15,8 @@ from refgi.errors import InputError, RefgiWarning
 from refgi.frame import Frame
 from refgi.rsm import direct_irradiance
 from refgi.scene import Camera, DirectionalLight, PointLight, SpotLight, load_scene
+from refgi.scene.files import LightUnit
 from refgi.scene.gltf import read_gltf
-from refgi.scene.reading import LightUnit
 from tests.scene.samples import BUFFER, FACES, TRIANGLES, glb_bytes, gltf_tree
 
 Edit = Callable[[dict[str, Any]], Any]

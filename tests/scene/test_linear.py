@@ -15,8 +15,8 @@ import pytest
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene import Material, Mesh, load_scene
 from refgi.scene.model import merge
+from refgi.scene.motion import transformed_all
 from refgi.scene.repair import repaired, repaired_all
-from refgi.scene.transform import transformed_all
 from tests.scene.samples import SCENE, glb_bytes, gltf_tree, ply_bytes
 
 FEW, MANY = 700, 2800

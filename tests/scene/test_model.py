@@ -23,9 +23,9 @@ from refgi.scene import (
     material_table,
     merge,
 )
+from refgi.scene.motion import affine, transformed_all
 from refgi.scene.placed import default_camera, default_light
 from refgi.scene.repair import lights_with_power, repaired, zero_area
-from refgi.scene.transform import affine, transformed_all
 
 VERTICES = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
 FACES = np.array([[0, 1, 2]])

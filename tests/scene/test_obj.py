@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError, RefgiWarning
+from refgi.scene.files import reading_as
 from refgi.scene.obj import read_obj
-from refgi.scene.reading import reading_as
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 

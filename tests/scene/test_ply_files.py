@@ -12,9 +12,9 @@ import pytest
 from benchmarks.stability.mutations import spoiled, with_odd_line, with_odd_token, with_odd_word
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene import load_scene
+from refgi.scene.files import reading_as
 from refgi.scene.model import Mesh
 from refgi.scene.ply import read_ply
-from refgi.scene.reading import reading_as
 
 VERTICES = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 1.5, 0)]
 CODES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d"}

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import refgi.stress
-from refgi.stress.rows import Row, Stability, markdown, over_scenes, read_rows, schema_text, strain, write_rows
+from refgi.stress.promises import Row, Stability, markdown, over_scenes, read_rows, schema_text, strain, write_rows
 
 
 def row(figure=1.0, limit=2.0, **other):

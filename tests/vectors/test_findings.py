@@ -1,7 +1,7 @@
 """Findings over all cases: kinds of stages in order, causes that explain most of them first."""
 
-from refgi.vectors.findings import findings as found_in
 from refgi.vectors.manifest import Cause, StageVerdict
+from refgi.vectors.report import findings as found_in
 from refgi.vectors.spec import kind_of
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from refgi import literal
 from refgi.literal import pairs
-from refgi.vectors import edits, rows
+from refgi.vectors import rows
 
 MODULES = tuple(importlib.import_module(f"refgi.literal.{file.stem}")
                 for file in sorted(Path(literal.__file__).parent.glob("*.bugs")))
@@ -28,8 +28,8 @@ def test_each_row_edits_one_place_of_some_function(module):
 def fits(function, row):
     """Return whether an edit matches once and leaves a program."""
     try:
-        return edits.edited(function, row.edits) is not None
-    except edits.StaleEditError:
+        return rows.edited(function, row.edits) is not None
+    except rows.StaleEditError:
         return False
 
 
@@ -43,7 +43,7 @@ def test_literal_text_imports_numpy_alone(module):
 
 def test_an_edit_changes_the_function_alone_that_it_is_asked_of():
     w, m = np.array([[0.0], [0.0], [1.0]]), np.array([[0.0], [0.0], [1.0]])
-    doubled = edits.edited(pairs.lobe_intensity, (("(exponent + 1) / (2 * np.pi) /", "(exponent + 1) / np.pi /"),))
+    doubled = rows.edited(pairs.lobe_intensity, (("(exponent + 1) / (2 * np.pi) /", "(exponent + 1) / np.pi /"),))
     right = pairs.lobe_intensity(w, m, m, np.array([7.0]))
     assert right == pytest.approx(8 / (2 * np.pi))  # a lobe along the normal lies above the surface as a whole
     assert doubled(w, m, m, np.array([7.0])) == pytest.approx(2 * right)
@@ -52,13 +52,13 @@ def test_an_edit_changes_the_function_alone_that_it_is_asked_of():
 
 @pytest.mark.parametrize("wrong", [(("no such text", "0"),), (("np", "0"),), (("r = np.sqrt(", "r = = np.sqrt("),)])
 def test_an_edit_that_does_not_fit_once_or_leaves_no_program_is_refused(wrong):
-    with pytest.raises(edits.StaleEditError, match=r"refgi\.literal\.pairs\.pair"):
-        edits.edited(pairs.pair, wrong)
+    with pytest.raises(rows.StaleEditError, match=r"refgi\.literal\.pairs\.pair"):
+        rows.edited(pairs.pair, wrong)
 
 
 def test_text_that_stands_twice_in_one_function_is_not_edited():
-    with pytest.raises(edits.StaleEditError, match="got 2"):
-        edits.edited(pairs.lobe_share, (("(high - low)", "1"),))
+    with pytest.raises(rows.StaleEditError, match="got 2"):
+        rows.edited(pairs.lobe_share, (("(high - low)", "1"),))
 
 
 def test_a_stage_has_the_rows_of_the_lists_that_it_names_alone():
@@ -89,7 +89,7 @@ def test_a_line_that_is_no_row_is_refused(line, monkeypatch):
     monkeypatch.setattr(rows.resources, "files", lambda _: Text(line))
     rows.rows.cache_clear()
     try:
-        with pytest.raises(edits.StaleEditError, match=r"pairs\.bugs:1: expected"):
+        with pytest.raises(rows.StaleEditError, match=r"pairs\.bugs:1: expected"):
             rows.rows("refgi.literal.pairs")
     finally:
         rows.rows.cache_clear()

@@ -12,7 +12,7 @@ from refgi.errors import InputError
 from refgi.image import read_exr
 from refgi.testing import assert_image_close, assert_stage_close, kit_folder, stages
 from refgi.vectors.check import Asked
-from refgi.vectors.pictures import judge_picture
+from refgi.vectors.judge import judge_picture
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "port_tests"
 

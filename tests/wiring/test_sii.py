@@ -9,7 +9,7 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import LightSettings
 from refgi.settings import replaced
 from refgi.splat import Receivers, SiiSettings, cut_irradiance, sii
-from refgi.splat.sii.ledger import sii_ledger
+from refgi.splat.sii.approximations import sii_ledger
 from refgi.splat.sii.reach.fragments import fragments
 from tests.literal.whole import sii as literal
 from tests.literal.whole.pairs import with_clamp

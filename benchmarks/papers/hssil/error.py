@@ -15,17 +15,18 @@ from benchmarks.papers.hssil.subjects import (
     smaller,
     standard_error,
 )
-from benchmarks.papers.records import Array, Cell, Figure, Picture, Plot, Table
+from benchmarks.papers.records import Cell, Figure, Picture, Plot, Table
 from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, interleaved, mean_of
-from refgi.bench.chain import Renderer, chain_of
 from refgi.bench.grid import Choice
-from refgi.compare.maps import error_scale, luminance
+from refgi.bench.split import Renderer, chain_of
+from refgi.compare.pictures import error_scale, luminance
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.compare.report import number
 from refgi.frame import Frame
 from refgi.settings import replaced
 from refgi.sssil import HssilSettings
 from refgi.truth import TruthSettings
+from refgi.types import Array
 
 FREE = "none"
 NAMES: dict[str, str] = {FREE: "v = 1, as published", "bitmask": "bitmask of the screen",

@@ -19,14 +19,15 @@ from benchmarks.papers.hssil.subjects import (
     standard_error,
     wide_frame,
 )
-from benchmarks.papers.records import Array, Cell, Figure, Picture, Plot, Table
+from benchmarks.papers.records import Cell, Figure, Picture, Plot, Table
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of, mean_of, seconds_of
-from refgi.compare.maps import luminance
+from refgi.compare.pictures import luminance
 from refgi.compare.plot import Axes, curves_plot
 from refgi.frame import Frame
 from refgi.settings import replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.settings import PRESETS
+from refgi.types import Array
 
 POINT, DISC, POINT_LIMIT, DISC_LIMIT = "point", "disc", "point_limit", "disc_limit"
 NAMES = {POINT: "Eq. 3, 64 samples", DISC: "Eq. 4, 64 samples", POINT_LIMIT: "Eq. 3, every texel",

@@ -13,9 +13,9 @@ from benchmarks.papers.hssil.subjects import (
     settings_of,
     wide_frame,
 )
-from benchmarks.papers.records import Array, Cell, Figure, Picture, Plot, Table
+from benchmarks.papers.records import Cell, Figure, Picture, Plot, Table
 from benchmarks.papers.workbench import Gallery, Workbench, mapped, mean_of, palette
-from refgi.compare.maps import DIVERGING, Scale, luminance
+from refgi.compare.pictures import DIVERGING, Scale, luminance
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.settings import replaced
@@ -23,6 +23,7 @@ from refgi.sssil import HssilSettings
 from refgi.sssil.crown.pattern import samples_at
 from refgi.sssil.crown.reach import coverage
 from refgi.sssil.settings import PRESETS
+from refgi.types import Array
 
 ROWS = 256  # of receivers whose samples are counted, in units of a run's repeats
 GROUND, RINGS = 0.08, 0.3  # grey values

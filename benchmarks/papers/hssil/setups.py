@@ -18,11 +18,12 @@ from benchmarks.papers.hssil.subjects import (
     settings_of,
     wide_frame,
 )
-from benchmarks.papers.records import Array, Bar, Figure, Ratios, Table, relative
+from benchmarks.papers.records import Bar, Figure, Ratios, Table, relative
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of, mean_of
 from refgi.frame import Frame, compose
 from refgi.sssil import HssilSettings
 from refgi.stages import observe
+from refgi.types import Array
 
 CARDS = ("8800 GTS", "GTX 260")
 INNER = 1 / 3  # samples of the first level's disc, of those of a crown

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.papers.records import Array
 from benchmarks.papers.val.subjects import atrium, horse
 from benchmarks.papers.workbench import Subjects, Workbench, mean_of
 from refgi.errors import RefgiWarning
@@ -32,6 +31,7 @@ from refgi.sssil import HssilSettings
 from refgi.sssil.hssil import hssil
 from refgi.sssil.settings import PRESETS
 from refgi.truth import TruthResult
+from refgi.types import Array
 
 HALL, SPOT, BASKET, HORSE, BOX = "hall", "spot", "basket", "horse", "box"
 TITLES = {BOX: "Cornell Box", HORSE: "Cornell Horse", HALL: "hall", SPOT: "hall with a spot", BASKET: "basket"}

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.papers.hssil.subjects import WIDE, expected_light, frame_of, light_of, scene_of, smaller
-from benchmarks.papers.records import Array, Figure, Plot, Table
+from benchmarks.papers.records import Figure, Plot, Table
 from benchmarks.papers.workbench import Gallery, Workbench, changes, errors_of
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
@@ -15,6 +15,7 @@ from refgi.sssil import HssilSettings
 from refgi.sssil.settings import TemporalSettings
 from refgi.sssil.temporal.sequence import Sequence
 from refgi.stages import observe
+from refgi.types import Array
 
 RAW, PRINTED, RECURSIVE = "each frame alone", "as printed", "recursive"
 WAYS = {RAW: None, PRINTED: TemporalSettings(form="printed"), RECURSIVE: TemporalSettings(warm_up=False)}

@@ -19,9 +19,9 @@ from benchmarks.papers.multires.subjects import (
     settings_of,
     unclamped,
 )
-from benchmarks.papers.records import Array, Case, Figure, Picture, Table, relative
+from benchmarks.papers.records import Case, Figure, Picture, Table, relative
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of, interleaved, seen_by
-from refgi.compare.maps import DIVERGING, Scale, luminance
+from refgi.compare.pictures import DIVERGING, Scale, luminance
 from refgi.frame import Frame
 from refgi.lights.footprints import with_equal_solid_angles
 from refgi.pairs.settings import DistanceClamp
@@ -31,6 +31,7 @@ from refgi.scene.model import Mesh, merge
 from refgi.settings import of, replaced
 from refgi.splat.gather import GatherSettings, gather
 from refgi.splat.multires import MultiresSettings, multires
+from refgi.types import Array
 
 WHOLE_MAP = 1.4143  # map widths: a disc past every corner
 WHITE, RED = Material("white", (0.7, 0.7, 0.7)), Material("sender", (0.8, 0.5, 0.35))

@@ -20,7 +20,7 @@ from benchmarks.papers.multires.subjects import (
     subsplats_of,
     unclamped,
 )
-from benchmarks.papers.records import Array, Cell, Figure, Picture, Plot, Rows, Table
+from benchmarks.papers.records import Cell, Figure, Picture, Plot, Rows, Table
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of, interleaved, seen_by
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
@@ -29,6 +29,7 @@ from refgi.scene import Scene
 from refgi.settings import flat, replaced
 from refgi.splat.multires import ByError, MultiresSettings, multires
 from refgi.splat.multires.error_target.error_driven import error_driven
+from refgi.types import Array
 
 # eye and target on the way, m: towards the body, close past it, over it and back
 WAY = np.array([

@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from benchmarks.papers.records import Array
 from benchmarks.papers.workbench import Subjects, Workbench, seen_by, whole_frame
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
@@ -33,6 +32,7 @@ from refgi.scene.repair import mean_face_normals
 from refgi.settings import of, replaced
 from refgi.splat.multires import ByGeometry, ByIrradiance, MultiresSettings, multires, shared_subsplats
 from refgi.splat.multires.refinement.grid import Subsplats
+from refgi.types import Array
 
 TEAPOT, BUDDHA, DRAGON, BUNNIES = "simple", "carved", "serpent", "flock"
 CLAMP = 0.04  # least distance, share of the diagonal

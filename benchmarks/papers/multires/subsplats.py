@@ -19,9 +19,9 @@ from benchmarks.papers.multires.subjects import (
     subsplats_of,
     unclamped,
 )
-from benchmarks.papers.records import Array, Cell, Figure, Picture, Table
+from benchmarks.papers.records import Cell, Figure, Picture, Table
 from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, interleaved
-from refgi.compare.maps import Scale
+from refgi.compare.pictures import Scale
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.settings import replaced
@@ -31,6 +31,7 @@ from refgi.splat.multires.refinement.grid import Subsplats, level_picture
 from refgi.splat.multires.settings import Criterion, Upsampling
 from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
+from refgi.types import Array
 
 PICTURE_LIGHTS = 256  # of Table 1's pictures
 

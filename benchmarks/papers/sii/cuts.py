@@ -9,14 +9,13 @@ import numpy as np
 from benchmarks.papers.records import Bar, Case, Cell, Figure, Ratios, Table, relative
 from benchmarks.papers.sii.subjects import counted, full_sum, reference_length, splats
 from benchmarks.papers.workbench import Gallery, Redrawing, Workbench, errors_of, interleaved
-from refgi.compare.maps import Scale
+from refgi.compare.pictures import Scale
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.settings import of, replaced
 from refgi.splat import GatherSettings, SiiSettings, gather, sii
 from refgi.splat.sii.reach.fragments import FRAGMENT_BITS, SAMPLE_BITS, Fragments, gather_bits
-from refgi.splat.sii.reach.reference_length import PAPER_LIGHTS, PAPER_OVERDRAW
-from refgi.splat.sii.reach.threshold import low_irradiance
+from refgi.splat.sii.reach.threshold import PAPER_LIGHTS, PAPER_OVERDRAW, low_irradiance
 from refgi.stages import observe
 
 PAPER_PIXELS = 512 * 512

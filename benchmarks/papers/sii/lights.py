@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.papers.records import Array, Case, Figure, Picture, Table, relative
+from benchmarks.papers.records import Case, Figure, Picture, Table, relative
 from benchmarks.papers.sii.subjects import full_sum
 from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, interleaved, whole_frame
 from refgi.frame import Frame
@@ -19,6 +19,7 @@ from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.sampling import halton
 from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
+from refgi.types import Array
 
 BLOCK = 8  # pixels along a side, by whose means caustics are judged
 WARPS: list[tuple[Any, int]] = [("none", 0), *((method, n) for method in "AB" for n in range(1, 5))]

@@ -7,7 +7,6 @@ lights a pixel, from a picture of one size so that all figures of a scene share 
 
 from typing import Any
 
-from benchmarks.papers.records import Array
 from benchmarks.papers.workbench import Workbench
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
@@ -15,9 +14,10 @@ from refgi.lights.settings import with_clamp
 from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.reach.fragments import Fragments, fragments
-from refgi.splat.sii.reach.reference_length import PAPER_CUT, PAPER_LIGHTS
-from refgi.splat.sii.reach.reference_length import reference_length as reference_length_of
+from refgi.splat.sii.reach.threshold import PAPER_CUT, PAPER_LIGHTS
+from refgi.splat.sii.reach.threshold import reference_length as reference_length_of
 from refgi.splat.sii.settings import RelativeCut
+from refgi.types import Array
 
 BOX = "cornell_sphere:faces=17000"  # as many faces as the scenes of a game in 2006
 CAUSTIC = of(SiiSettings, lights=4096, warp="B", warp_levels=3, importance="peak", cut_share=PAPER_CUT,

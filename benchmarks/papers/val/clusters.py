@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from benchmarks.papers.records import Array, Cell, Figure, Picture, Plot, Table
+from benchmarks.papers.records import Cell, Figure, Picture, Plot, Table
 from benchmarks.papers.val.moving import mean_motion, motion
 from benchmarks.papers.val.subjects import (
     AREA_LIGHTS,
@@ -28,11 +28,12 @@ from benchmarks.papers.workbench import Gallery, Workbench, errors_of, palette, 
 from refgi.cluster.clustering.kmeans import in_use, mean_angle
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
-from refgi.compare.maps import luminance
+from refgi.compare.pictures import luminance
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.image import tone_map
 from refgi.scene import Scene
+from refgi.types import Array
 
 BENT = 30.0  # degrees from its cluster's normal to a light's: such a cluster lies around an edge
 TARGET, VFOV = (0.4, 0.42, 0.4), math.radians(20)  # m and rad, of Figure 6's camera: at the corner

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.papers.records import Array, Cell, Figure, Plot, Table
+from benchmarks.papers.records import Cell, Figure, Plot, Table
 from benchmarks.papers.val.subjects import (
     AREA_LIGHTS,
     HORSE,
@@ -22,14 +22,14 @@ from benchmarks.papers.val.subjects import (
     shadowed,
 )
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of
-from refgi.bench.chain import Renderer, chain_of
 from refgi.bench.grid import Choice
 from refgi.bench.results import Part, Split
-from refgi.bench.split import split_of
+from refgi.bench.split import Renderer, chain_of, split_of
 from refgi.cluster.val import val
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.truth import TruthSettings
+from refgi.types import Array
 
 SIZE = MOVING / 2  # pixels a side in units of the run's: references are slow
 

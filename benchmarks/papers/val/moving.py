@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from benchmarks.papers.records import Array, Figure, Picture, Rows, Table, relative
+from benchmarks.papers.records import Figure, Picture, Rows, Table, relative
 from benchmarks.papers.val.subjects import (
     AREA_LIGHTS,
     ATRIUM,
@@ -32,6 +32,7 @@ from refgi.lights import PixelLights
 from refgi.scene import Scene
 from refgi.settings import replaced
 from refgi.stages import Memory, observe
+from refgi.types import Array
 
 FEW = 8  # area lights
 EXACT = "a ray to each light"

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.papers.records import Array, Figure, Picture, Table
+from benchmarks.papers.records import Figure, Picture, Table
 from benchmarks.papers.val.subjects import (
     JUDGED,
     SMALL,
@@ -29,12 +29,13 @@ from refgi.cluster.clustering.kmeans import cluster
 from refgi.cluster.clustering.rectangle import area_lights
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
-from refgi.compare.maps import luminance
+from refgi.compare.pictures import luminance
 from refgi.frame import Frame
 from refgi.lights import PixelLights
 from refgi.scene import Camera, Material, Scene, SpotLight
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.scene.model import merge
+from refgi.types import Array
 
 Vector = tuple[float, float, float]
 

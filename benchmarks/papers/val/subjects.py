@@ -20,7 +20,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.papers.records import Array
 from benchmarks.papers.workbench import Subjects, Workbench, whole_frame
 from refgi.cluster.clustering.kmeans import Clustering, cluster
 from refgi.cluster.clustering.rectangle import AreaLights, area_lights
@@ -41,6 +40,7 @@ from refgi.scene.builtin.metaballs import HALF_SIZE, MIDDLE, Balls, blob, metaba
 from refgi.scene.model import merge
 from refgi.settings import of
 from refgi.truth.vpl import VplSettings, vpl
+from refgi.types import Array
 
 HORSE, CORNER, BOX, ATRIUM, BLOB, MARCH = "horse", "corner", "plain box", "atrium", "blob", "march"
 TITLES = {BOX: "Cornell Box", HORSE: "Cornell Horse", ATRIUM: "Sponza", BLOB: "Metaballs"}  # of Table 1

@@ -7,7 +7,6 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.clustering.rounds import LINES, TILE, Metric, Rounds, iterate, move_to_means, sort_lights
 from refgi.cluster.settings import Distance, KMeansSettings
@@ -15,11 +14,10 @@ from refgi.errors import expect
 from refgi.jit import thread_count, threads
 from refgi.skips import left_out
 from refgi.stages import skip, stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rsm.buffers.extent import Extent
-
-Array = npt.NDArray[Any]
 
 SMALL = 1 << 20  # pairs of lights and area lights up to which waking other threads costs more than it brings
 SLACK = 1e-12  # share of the largest distance: thousands of roundings

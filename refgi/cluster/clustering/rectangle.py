@@ -10,17 +10,15 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.clustering.kmeans import Clustering
 from refgi.cluster.settings import AreaLightSettings, Axes, Extent
 from refgi.errors import expect
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.lights import PixelLights
-
-Array = npt.NDArray[Any]
 
 ROUND = 1e-9  # a spread this near to that of a disc has no direction
 # (area light, points (3, n), facing (3, n)) -> V (n,); one with a parameter `shading` takes the cosines' normals

@@ -5,10 +5,8 @@
 - axis (3, cluster): Their unit normals.
 """
 
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.clustering.kmeans import Clustering, assigned, cluster, first_lights, moved
 from refgi.cluster.clustering.rectangle import rectangles
@@ -17,8 +15,7 @@ from refgi.cluster.settings import Extent as Size
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.rsm.buffers.extent import Extent
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 ROUNDS = 2  # of k-means that are shown one by one
 

@@ -10,18 +10,31 @@ channels are; then sums of 8 receivers and 8 channels are transposed in register
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from numba import types
 
-from refgi.cluster.filters.eight import EIGHT, add, load, scale, stack_array, store_at, transpose
 from refgi.cluster.filters.mip_build import build_mip, build_mips
-from refgi.cluster.filters.pyramid import CHUNK, DIRECT, LEVEL, MAP, Mip, add_level_0, mip_of, mips
+from refgi.cluster.filters.pyramid import (
+    CHUNK,
+    DIRECT,
+    EIGHT,
+    LEVEL,
+    MAP,
+    Mip,
+    add,
+    add_level_0,
+    load,
+    mip_of,
+    mips,
+    scale,
+    stack_array,
+    store_at,
+    transpose,
+)
 from refgi.elementary import log2p1
 from refgi.jit import kernel
+from refgi.types import Array
 
 __all__ = ["Mip", "build_mip", "build_mips", "mip_means", "mip_of", "mips"]
-
-Array = npt.NDArray[Any]
 
 WIDEST = 4.0  # radius from which on a disc holds the whole map
 FINE, COARSE, FINE_SIDE, COARSE_SIDE = range(4)  # rows of whole numbers, before LEVEL and DIRECT

@@ -7,10 +7,10 @@ as it is nearly everywhere on many, they are all alike and copied. Channels are 
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from numba import types
 
 from refgi.cluster.filters.basis import (
+    DepthScale,
     eight_bits,
     fill_beyond,
     half_precision,
@@ -18,12 +18,9 @@ from refgi.cluster.filters.basis import (
     sine_cosine,
     turned,
 )
-from refgi.cluster.filters.depth_scale import DepthScale
-from refgi.cluster.filters.eight import EIGHT, add, load, scale, stack_array, store, transpose
-from refgi.cluster.filters.pyramid import Mip, mip_of
+from refgi.cluster.filters.pyramid import EIGHT, Mip, add, load, mip_of, scale, stack_array, store, transpose
 from refgi.jit import kernel, prange
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 GROUPS = 8  # of 8 texels of level 1, made at once
 LANES = GROUPS * EIGHT

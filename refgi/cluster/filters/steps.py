@@ -12,18 +12,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.cluster.filters.basis import beyond_disc, fill_basis, fill_beyond, normalise
-from refgi.cluster.filters.brute import brutes
-from refgi.cluster.filters.depth_scale import DepthScale
-from refgi.cluster.filters.eight import EIGHT
+from refgi.cluster.filters.basis import DepthScale, beyond_disc, fill_basis, fill_beyond, normalise
 from refgi.cluster.filters.mip_build import halve, round_texels
-from refgi.cluster.filters.prefilter import LEVEL_SHIFT, filter_means
-from refgi.cluster.filters.pyramid import Mip, level_offsets, mip_of, mips
+from refgi.cluster.filters.prefilter import LEVEL_SHIFT, brutes, filter_means
+from refgi.cluster.filters.pyramid import EIGHT, Mip, level_offsets, mip_of, mips
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 
 @stage("cluster.map_depths", kept=False)

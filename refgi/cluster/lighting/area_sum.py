@@ -7,7 +7,6 @@ is found for them alone. What lies in no member's reach is not even loaded.
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.lighting.interleave import FIRST, SIZE, SUBSET
 from refgi.cluster.visibility.search_region import SCRATCH_ROWS, Scratch
@@ -15,8 +14,7 @@ from refgi.cluster.visibility.shadow import shadow_tile
 from refgi.jit import kernel, prange
 from refgi.pairs.pair_sum import GROUP, ROWS, TILE, TOTAL, Clamp, X, add_listed, load_tile
 from refgi.pairs.tiles import bound_tile, lights_in_reach
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 TASKS = 64  # parts that tiles are split into, whatever the number of threads
 DENSE = 0.75  # share of the lanes from which on moving them together costs more than it saves

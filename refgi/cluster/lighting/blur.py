@@ -12,21 +12,31 @@ say that all pixels around a tile count for each other, nothing is compared.
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.cluster.lighting.blur_subsets import add_missing, places_of_subsets
-from refgi.cluster.lighting.blur_tile import COLUMNS, END, FAR, TALL, WIDE, E, N, X, is_one_surface, load_pixels
+from refgi.cluster.lighting.blur_tile import (
+    COLUMNS,
+    END,
+    FAR,
+    TALL,
+    WIDE,
+    E,
+    N,
+    X,
+    add_missing,
+    is_one_surface,
+    load_pixels,
+    places_of_subsets,
+)
 from refgi.cluster.settings import MOST_BLOCK, GeometryBlur
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers
 from refgi.rsm.buffers.extent import Extent
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.cluster.settings import BoxBlur
-
-Array = npt.NDArray[Any]
 
 TASKS = 64  # parts that tiles are split into, whatever the number of threads
 NOWHERE = np.zeros((0, 0, 0, 2), np.int64)  # places of missing subsets where these are left out

@@ -10,7 +10,6 @@ from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
 from refgi.cluster.filters.prefilter import allocate_mips, build_several
@@ -33,24 +32,21 @@ from refgi.cluster.lighting.interleave import (
     subsets,
 )
 from refgi.cluster.settings import BY_MAPS, Csm
-from refgi.cluster.visibility.evaluate import visibility
-from refgi.cluster.visibility.search_region import scale_of
-from refgi.cluster.visibility.series import series
-from refgi.cluster.visibility.shadow import filter_channels, shadow_of
+from refgi.cluster.visibility.search_region import scale_of, series
+from refgi.cluster.visibility.shadow import filter_channels, shadow_of, visibility
 from refgi.errors import expect
 from refgi.jit import thread_count
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.pairs.tiles import clear, receiving
 from refgi.skips import left_out
 from refgi.stages import report_progress, stage, tally
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.cluster.maps.shadow_maps import ShadowMaps
     from refgi.cluster.settings import ValSettings
     from refgi.lights import PixelLights
     from refgi.rays import Tracer
-
-Array = npt.NDArray[Any]
 
 BEYOND_REACH = 1e15  # m: bounds of a tile that every light reaches
 

@@ -4,28 +4,25 @@ The pixel lights of an area light are summed one by one, each with f_s in its ow
 light, as for irradiance. Every glossy pixel sums all lights: nothing is interleaved or blurred.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
 from refgi.cluster.lighting.clustered import asks_shading, places_with_light, visibility_by
 from refgi.cluster.lighting.interleave import member_lights, some_lights
 from refgi.errors import expect
-from refgi.pairs.glossy import as_receivers, block_order, summed
+from refgi.pairs.glossy import as_receivers, block_order, glossy_summed
 from refgi.pairs.irradiance import checked
-from refgi.rsm.buffers.glossy import GlossyPoints
+from refgi.rsm.buffers.leaving import GlossyPoints
 from refgi.stages import report_progress, stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.cluster.maps.shadow_maps import ShadowMaps
     from refgi.cluster.settings import ValSettings
     from refgi.lights import PixelLights
     from refgi.rays import Tracer
-
-Array = npt.NDArray[Any]
-
 
 @stage("cluster.glossy")
 def clustered_radiance(
@@ -61,7 +58,7 @@ def clustered_radiance(
     for m, (start, lobe_start) in enumerate(zip(members.start, members.lobe_start, strict=True)):
         some = some_lights(members.packed, start, lobe_start)
         if some.diffuse.shape[1] > 1 or some.lobes is not None:
-            part = summed(here, some, (None, None))
+            part = glossy_summed(here, some, (None, None))
             places = places_with_light(part)
             if len(places):
                 beside = {"shading": here.normal[:, places]} if shading else {}

@@ -9,21 +9,19 @@ The packed lights of each area light and each subset, next to each other.
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.settings import MOST_BLOCK
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import add_lights
-from refgi.pairs.lobe_shape import Widening
 from refgi.pairs.packing import Packed, PackedLobes
 from refgi.pairs.pair_sum import TILE, Clamp
+from refgi.pairs.pixel_lights import Widening
 from refgi.pairs.tiles import BLOCK
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.cluster.settings import Assignment
-
-Array = npt.NDArray[Any]
 
 RUNS = 3  # of lights next to each other that a pixel takes where they are assigned by cluster
 FIRST, SIZE, SUBSET = 0, 1, 2  # rows of tiles

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
 from refgi.cluster.lighting.clustered import asks_shading, visibility_by
@@ -17,7 +16,7 @@ from refgi.cluster.lighting.interleave import (
     subsets,
 )
 from refgi.cluster.maps.shadow_maps import ShadowMaps
-from refgi.cluster.reference.steps import back_projection
+from refgi.cluster.reference.back_projection import back_projection
 from refgi.cluster.settings import Assignment, BackProjection, Csm, Hard, Pcf, Pcss, ValSettings
 from refgi.cluster.visibility.csm_steps import series, visibility_of_map
 from refgi.cluster.visibility.search_region import filter_sizing
@@ -26,12 +25,10 @@ from refgi.pairs.irradiance import Receivers, checked
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import PairSettings
 from refgi.stages import of_steps, stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rays import Tracer
-
-Array = npt.NDArray[Any]
-
 
 @stage("cluster.interleaving", kept=False)
 def subset_of_lights(of: Array, side: int, assignment: Assignment) -> Array:

@@ -9,21 +9,18 @@ import dataclasses
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.buffers.extent import Extent, joined
-from refgi.rsm.raster.depth_maps import whole_chunks
-from refgi.rsm.raster.paraboloid import CutChunks, cut_chunks
+from refgi.rsm.raster.paraboloid import CutChunks, cut_chunks, whole_chunks
 from refgi.rsm.raster.triangle import Chunks, chunks
 from refgi.scene.model import Geometry
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.lights import PixelLights
-
-Array = npt.NDArray[Any]
 
 # Share of the extent's diagonal by which points may lie beyond a plane that still counts as the border; below what ends
 # of rays are kept from surfaces.

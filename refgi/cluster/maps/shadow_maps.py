@@ -19,16 +19,14 @@ from refgi.cluster.settings import ShadowMapSettings
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.rsm.buffers.extent import Extent
-from refgi.rsm.raster.depth_maps import distance_maps
-from refgi.rsm.raster.paraboloid import Ignored
+from refgi.rsm.raster.paraboloid import Ignored, distance_maps
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.scene.model import Geometry
 from refgi.stages import skip, stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rays import Tracer
-
-Array = npt.NDArray[Any]
 LIFT = 4e-6  # share of what is lit's largest coordinate: twice what ends of rays are lifted, above float32's rounding
 BACKWARD = np.diag([-1.0, 1.0, -1.0])  # the frame of the hemisphere behind: right and forward turned round
 

@@ -15,12 +15,10 @@ from refgi.cluster.settings import ShadowMapSettings
 from refgi.rsm.buffers.extent import Extent, joined
 from refgi.scene.model import Geometry
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rays import Tracer
-
-Array = npt.NDArray[Any]
-
 
 @stage("cluster.map_views", kept=False)
 def map_views(

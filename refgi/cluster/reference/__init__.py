@@ -5,7 +5,6 @@ shadows for every light to the published one, each takes one approximation more:
 """
 
 from refgi.cluster.reference.back_projection import back_projection_visibility
-from refgi.cluster.reference.rays import rectangle_visibility
-from refgi.cluster.reference.vpls import reference_visibility, vpl_visibility
+from refgi.cluster.reference.rays import rectangle_visibility, reference_visibility, vpl_visibility
 
 __all__ = ["back_projection_visibility", "rectangle_visibility", "reference_visibility", "vpl_visibility"]

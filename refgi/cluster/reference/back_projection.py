@@ -9,17 +9,18 @@ Coordinates: those of the rectangle, along its two sides and its normal, from th
 
 import math
 from functools import lru_cache
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
 from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
 from refgi.cluster.visibility.pcf import SLACK
+from refgi.cluster.visibility.steps import Places, maps_of, planes
 from refgi.jit import kernel, prange
-
-Array = npt.NDArray[Any]
+from refgi.stages import stage
+from refgi.types import Array
 
 CELLS = 32  # of the grid along each side of the rectangle
 AT_ONCE = 32  # receivers that share scratch
@@ -189,3 +190,31 @@ def _share(hidden: Array, x: Array, up: Array, horizon: Array, i: int, low: Arra
                 above = u * up[0, i] + v * up[1, i] + w * up[2, i] > 0.0
                 free += 1 if above and not hidden[row, column] else 0
     return free / whole if whole > 0 else 1.0
+
+
+@stage("cluster.back_projection", kept=False)
+def back_projection(
+    places: Places, facing: Array, depth: Array, axes: Array, side: Array, offset: Array, center: Array, normal: Array,
+    scene_far: Array,
+) -> Array:
+    """Project texels back onto the rectangle: V is the share of cells that none hides (docs/methods/val_visibility).
+
+    depth (area light, row, column): Distances to the nearest blocker, m.
+    axes (area light, side, 3): Axes of the rectangles, unit vectors.
+    side (side, area light): How long they are, m.
+    offset (side, area light): Their middles from the centres, m.
+    center (3, area light): Centres of clusters, m.
+    normal (3, area light): Their unit normals.
+    scene_far (area light,): To the farthest place there is, m.
+    -> (area light, h, w): V of the cells above the pixel's plane, 0 hidden to 1 seen; 1 behind the light's plane, on
+        empty maps, without surface.
+    """
+    areas: Any = SimpleNamespace(**{name: np.asarray(one, np.float64) for name, one in (
+        ("axes", axes), ("side", side), ("offset", offset), ("center", center), ("normal", normal))})
+    maps = maps_of(places, np.asarray(depth, np.float64))._replace(scene_far=np.asarray(scene_far, np.float64))
+    visible = back_projection_visibility(areas, maps)
+    points, normals = (np.ascontiguousarray(one.reshape(3, -1), np.float64) for one in (places.position, facing))
+    covered, made = places.covered.reshape(-1), planes(places, fill=1)
+    for k in range(len(made)):
+        made[k].reshape(-1)[covered] = visible(k, points[:, covered], normals[:, covered])
+    return made

@@ -9,12 +9,9 @@ SZ_k, CZ_k, Z means of sin(c_k z), cos(c_k z), of their products with z, and of 
 
 from typing import Any, NamedTuple
 
-import numpy.typing as npt
-
-from refgi.cluster.filters.basis import sine_cosine
-from refgi.cluster.filters.depth_scale import DepthScale, series_depths, series_distance
+from refgi.cluster.filters.basis import DepthScale, series_depths, series_distance, sine_cosine
 from refgi.cluster.filters.prefilter import filter_means
-from refgi.cluster.visibility.kernel_size import cone_tangent, published_tangent
+from refgi.cluster.visibility.pcf import cone_tangent, published_tangent
 from refgi.cluster.visibility.search_region import (
     BIAS,
     COSINE,
@@ -40,8 +37,7 @@ from refgi.cluster.visibility.search_region import (
     place_filters,
 )
 from refgi.jit import kernel
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 DENSE = 0.75  # share of the lanes from which on moving them together costs more than it saves
 LEAST_BLOCKED = 0.02  # of the search disc: less is the series' ripple, not a blocker

@@ -3,20 +3,17 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.filters import steps as filters
-from refgi.cluster.filters.depth_scale import DepthScale
-from refgi.cluster.filters.depth_scale import depth_scale as scale_of_map
+from refgi.cluster.filters.basis import DepthScale
+from refgi.cluster.filters.basis import depth_scale as scale_of_map
 from refgi.cluster.settings import Csm, DepthScaleName
 from refgi.cluster.visibility.csm import compare_filtered, find_penumbra
-from refgi.cluster.visibility.search_region import BIAS, CONSTANTS, GAIN, ON_SERIES, SCRATCH_ROWS, FilterSizing
-from refgi.cluster.visibility.series import Series
-from refgi.cluster.visibility.series import series as series_of
+from refgi.cluster.visibility.search_region import BIAS, CONSTANTS, GAIN, ON_SERIES, SCRATCH_ROWS, FilterSizing, Series
+from refgi.cluster.visibility.search_region import series as series_of
 from refgi.cluster.visibility.steps import Places, lanes, planes, put, put_penumbra
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 
 @stage("cluster.series", kept=False)

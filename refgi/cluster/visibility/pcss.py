@@ -12,12 +12,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.cluster.filters.depth_scale import DepthScale
+from refgi.cluster.filters.basis import DepthScale
 from refgi.cluster.settings import Pcss
-from refgi.cluster.visibility.kernel_size import cone_tangent, disc, published_square, published_tangent
-from refgi.cluster.visibility.pcf import SLACK
+from refgi.cluster.visibility.pcf import SLACK, cone_tangent, disc, published_square, published_tangent
 from refgi.cluster.visibility.search_region import (
     DEPTH,
     EXTENT,
@@ -35,9 +33,7 @@ from refgi.cluster.visibility.search_region import (
     find_search_regions,
 )
 from refgi.jit import kernel
-
-Array = npt.NDArray[Any]
-
+from refgi.types import Array
 
 LEAST_COSINE = math.cos(math.radians(80.0))  # of a direction that is searched
 

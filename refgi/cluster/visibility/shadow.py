@@ -1,24 +1,32 @@
-"""The shadow of one area light as kernels read it: PCF, PCSS or CSM, chosen by its type when kernels are compiled."""
+"""The shadow of one area light as kernels read it, PCF, PCSS or CSM; its visibility at any points (Sec. 4.1, 5.1)."""
 
 from typing import TYPE_CHECKING, Any
 
-import numpy.typing as npt
+import numpy as np
 
 from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.filters.prefilter import build_filters
 from refgi.cluster.maps.shadow_maps import ShadowMaps
-from refgi.cluster.settings import ConstantBias, Csm, Hard, Pcf, Pcss
+from refgi.cluster.reference.rays import Ball, free_share, rectangle_points
+from refgi.cluster.settings import BY_MAPS, ConstantBias, Csm, Hard, Pcf, Pcss, ValSettings
 from refgi.cluster.visibility.csm import CsmShadow, csm_tile
 from refgi.cluster.visibility.pcf import PcfShadow, pcf_shadow, pcf_tile
 from refgi.cluster.visibility.pcss import PcssShadow, blocker_test, pcss_tile
-from refgi.cluster.visibility.search_region import filter_sizing, light_constants, scale_of
-from refgi.cluster.visibility.series import series
-from refgi.jit import by_type
+from refgi.cluster.visibility.search_region import (
+    SCRATCH_ROWS,
+    Scratch,
+    filter_sizing,
+    light_constants,
+    scale_of,
+    series,
+)
+from refgi.errors import expect
+from refgi.jit import by_type, kernel, prange
+from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
-    from refgi.cluster.settings import ValSettings
-
-Array = npt.NDArray[Any]
+    from refgi.rays import Tracer
 
 TILES: dict[Any, Any] = {PcfShadow: pcf_tile, PcssShadow: pcss_tile, CsmShadow: csm_tile}
 
@@ -77,3 +85,78 @@ def _by_type(
         tile(shadow, points, facing, size, active, visible, scratch)
 
     return call
+
+
+TILE = 256  # receivers a thread works on at once
+BESIDE = (np.arange(4) + 0.5) / 4  # points along a side of the rectangle that rays from behind end at
+
+
+@stage("cluster.visibility", kept=False)
+def visibility(
+    maps: ShadowMaps, areas: AreaLights, m: int, points: Array, facing: Array, settings: ValSettings,
+    tracer: "Tracer | None" = None, shading: Array | None = None,
+) -> Array:
+    """Return how much of one area light each point sees.
+
+    areas: The area lights that the maps were drawn for.
+    m: Which area light.
+    points (3, n): World space, m.
+    facing (3, n): Normals of their faces; on the lit side for rays, else on either.
+    settings: `visibility` is one of `BY_MAPS` or None; `maps.behind` says what points behind the area light see.
+    tracer: Rays against the scene, for points behind the area light and ``maps.behind == "raytrace"``.
+    shading (3, n): Normals that cosines are taken with, for the same; the faces' where absent.
+    -> (n,): V, 0 to 1, in the dtype of the maps.
+
+    Raises
+    ------
+    InputError
+        If there is no such area light, a mode is asked for that works without maps, or rays without a tracer.
+
+    Notes
+    -----
+    An area light without extent casts a hard shadow. Points behind its plane see it whole (Sec. 5.1), unless a second
+    map or rays to its rectangle say otherwise; nothing within `near_distance` of the centre blocks such rays.
+    """
+    expect(0 <= m < len(areas.members), "m", f"an area light, 0 to {len(areas.members) - 1}", m)
+    kind = settings.visibility
+    expect(kind is None or isinstance(kind, BY_MAPS), "visibility", "none, csm, pcss, pcf or hard",
+           kind and kind.name())
+    traced = settings.maps.behind == "raytrace" and kind is not None
+    expect(not traced or tracer is not None, "tracer", "rays where behind is 'raytrace'", tracer)
+    points = np.ascontiguousarray(points, maps.depth.dtype)
+    facing = np.ascontiguousarray(facing, maps.depth.dtype)
+    visible, k = np.ones(points.shape[1], points.dtype), int(maps.map_of[m])
+    if kind is not None and k >= 0:  # the maps ahead and behind: each sees its own hemisphere alone
+        for near, behind in ((maps.near, False), (maps.near_behind, True)):
+            if near is not None and np.isfinite(near[k]):
+                shadow = shadow_of(maps, areas, m, settings, behind)
+                _shadow_tiles(shadow, filter_channels(shadow), points, facing, visible)
+    if traced and tracer is not None:
+        back = areas.normal[:, m] @ (points - areas.center[:, m, None]) <= 0
+        radius = settings.drawn_maps.near_share * float(areas.radius[m])
+        visible[back] = _by_rays(tracer, areas, m, radius, points[:, back], facing[:, back],
+                                 None if shading is None else shading[:, back])
+    return visible
+
+
+def _by_rays(tracer: "Tracer", areas: AreaLights, m: int, radius: float, points: Array, facing: Array,
+             shading: Array | None) -> Array:
+    targets = rectangle_points(areas, m, np.array(np.meshgrid(BESIDE, BESIDE)).reshape(2, -1))
+    ball = Ball(areas.center[:, m], radius)
+    return free_share(tracer, points, facing, targets, -areas.normal[:, m, None], None, tracer.grain, ball, shading)
+
+
+@kernel(parallel=True)
+def _shadow_tiles(shadow: Any, channels: int, points: Array, facing: Array, visible: Array) -> None:
+    """Lower `visible` to V where that is less."""
+    count, real = points.shape[1], points.dtype
+    for tile in prange((count + TILE - 1) // TILE):
+        first = np.int64(tile) * TILE
+        size = min(TILE, count - first)
+        active, here = np.ones(TILE, np.bool_), np.empty(TILE, real)
+        scratch = Scratch(np.empty(TILE, np.bool_), np.empty((SCRATCH_ROWS, TILE), real),
+                          np.empty((channels, TILE), real))
+        part, normals = points[:, first : first + size], facing[:, first : first + size]
+        shadow_tile(shadow, part, normals, size, active, here, scratch)
+        for i in range(size):
+            visible[first + i] = min(visible[first + i], here[i])

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.visibility.pcf import pcf_shadow, pcf_tile
@@ -22,13 +21,12 @@ from refgi.cluster.visibility.search_region import (
     FilterSizing,
     S,
     Scratch,
+    Series,
     find_search_regions,
     light_constants,
 )
-from refgi.cluster.visibility.series import Series
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 
 class Places(NamedTuple):

@@ -1,22 +1,116 @@
-"""The pictures of a page as data for its script.
+"""The pictures of a page as data for its script: irradiance to radiance, worst places, planes.
+
+All pictures of a view share L_0 (emission and reflected direct light) and k (albedo / pi), so a page holds them once
+and each picture's irradiance alone. Both are found from the pictures by least squares, with 0 <= k <= 1 / pi.
 
 A view is one scene from one camera: references, pictures judged by them, and what turns irradiance into radiance.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.compare import maps
+from refgi.compare import pictures as maps
 from refgi.compare.outcome import TRUTH, UNOCCLUDED
-from refgi.compare.page.budget import FIRST, Store
-from refgi.compare.page.crops import worst_crops
 from refgi.compare.page.detectors import Finding, findings
-from refgi.compare.page.surface import SurfaceFit, follows
+from refgi.compare.page.floats import FIRST, Store
+from refgi.errors import expect
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
+PLACES = 3
+SHARE_OF_SIDE = 8  # a square is an eighth of the shorter side
+LEAST_SIDE = 8  # pixels
+NEGLIGIBLE = 1e-9  # of the whole: what rounding leaves in sums over windows without error
+
+
+class Crop(NamedTuple):
+    """A square of a picture, in pixels from the upper left corner."""
+
+    x: int
+    y: int
+    side: int
+    share: float  # of the squared error of the whole picture
+
+
+def worst_crops(error: Array, covered: Array) -> tuple[Crop, ...]:
+    """Return up to `PLACES` squares with the most squared error, (h, w), worst first, none over another.
+
+    An error that is not finite counts as the largest that is; no square where there is no error on covered pixels.
+    """
+    squares = _squares(error, covered)
+    side = min(*error.shape, max(LEAST_SIDE, min(error.shape) // SHARE_OF_SIDE))
+    sums, whole = _window_sums(squares, side), float(squares.sum())
+    found: list[Crop] = []
+    while len(found) < PLACES and sums.max() > NEGLIGIBLE * whole:
+        y, x = (int(i) for i in np.unravel_index(np.argmax(sums), sums.shape))
+        found.append(Crop(x, y, side, float(sums[y, x]) / whole))
+        sums[max(0, y - side + 1):y + side, max(0, x - side + 1):x + side] = 0  # windows over this one
+    return tuple(found)
+
+
+def _squares(error: Array, covered: Array) -> Array:
+    finite = np.isfinite(error) & covered
+    squares = np.where(finite, np.where(finite, error, 0.0).astype(np.float64) ** 2, 0.0)
+    squares[covered & ~finite] = squares.max(initial=0.0) or 1.0
+    return squares
+
+
+def _window_sums(values: Array, side: int) -> Array:
+    sums = np.pad(values, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
+    windows: Array = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
+    return windows
+
+
+TOLERANCE = 2.0**-10  # of the radiance: two roundings to half floats
+
+
+class SurfaceFit:
+    """Sums over the pictures of a view, (3, h, w), taken one after the other."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self._count: Array = np.zeros(shape, np.int64)
+        self._sums = np.zeros((4, *shape))  # of E, L, E^2, E L
+
+    def add(self, irradiance: Array, radiance: Array) -> None:
+        """Count a picture: indirect irradiance, W/m^2, and the radiance that the camera receives.
+
+        Pixels that are not finite do not count.
+        """
+        expect(irradiance.shape == radiance.shape == self._sums.shape[1:], "picture", f"shape {self._sums.shape[1:]}",
+               irradiance.shape)
+        e, light = irradiance.astype(np.float64), radiance.astype(np.float64)
+        finite = np.isfinite(e) & np.isfinite(light)
+        e, light = np.where(finite, e, 0.0), np.where(finite, light, 0.0)
+        self._count += finite
+        self._sums += np.stack([e, light, e * e, e * light])
+
+    def solve(self) -> tuple[Array, Array]:
+        """Return L_0, W/m^2/sr, and k, 1/sr, each (3, h, w)."""
+        count = np.maximum(self._count, 1)
+        e, light, squares, products = self._sums / count
+        spread = squares - e * e
+        least = 1e-12 * squares  # below it pictures agree, and any k that leaves L_0 >= 0 serves
+        slope = np.divide(products - e * light, spread, out=np.zeros_like(e), where=spread > least)
+        steepest = np.divide(light, e, out=np.full_like(e, np.inf), where=e > 0)
+        slope = np.clip(slope, 0.0, np.minimum(1 / math.pi, np.maximum(steepest, 0.0)))
+        return light - slope * e, slope
+
+
+def follows(irradiance: Array, radiance: Array, surface: tuple[Array, Array]) -> bool:
+    """Return whether a picture's radiance is what the surface, L_0 and k, makes of its irradiance.
+
+    True where every finite pixel differs by less than a rounding to half floats.
+    """
+    emitted, reflectance = surface
+    finite = np.isfinite(irradiance) & np.isfinite(radiance)
+    made = np.where(finite, emitted + reflectance * np.where(finite, irradiance, 0.0), 0.0)
+    right = np.where(finite, radiance, 0.0)
+    floor = np.abs(right).max(initial=0.0) * 2.0**-24
+    return bool((np.abs(made - right) <= TOLERANCE * np.abs(right) + floor).all())
+
+
 Surface = tuple[Array, Array]
 
 LIMIT = 14_000_000  # characters of pictures; a page of 100 runs then stays under 15 MB

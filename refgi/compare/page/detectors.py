@@ -6,15 +6,13 @@ reference's own noise nothing is found.
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.compare.maps import luminance
 from refgi.compare.outcome import NOISE_MARGIN
-
-Array = npt.NDArray[Any]
+from refgi.compare.pictures import luminance
+from refgi.types import Array
 
 STREAKS, SPIKES, BLOCKS, FACTOR = 0.12, 3.0, 1.3, 0.5  # thresholds of the figures
 TILE, LEAST_TILES = 32, 16  # pixels: the median over tiles leaves out edges of objects, which lie in few of them

@@ -21,7 +21,6 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel
 from refgi.pairs.lightcuts.tree import (
@@ -39,8 +38,7 @@ from refgi.pairs.lightcuts.tree import (
     WEIGHT,
 )
 from refgi.pairs.pair_sum import LEAST_SQUARE, NX, X
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 CURVATURE = 3.0 + 1.5 * math.sqrt(6.0)  # largest second derivative of the pair term along a line, times r^4
 SLOPE = 2.0  # largest first derivative, times r^3

@@ -8,29 +8,30 @@ halves lower their threshold until S suffices; where what was accepted before th
 from the top.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.lightcuts.bounds import bound_group
 from refgi.pairs.lightcuts.groups import group_receivers, half_of
-from refgi.pairs.lightcuts.node_list import (
+from refgi.pairs.lightcuts.nodes import (
     Nodes,
+    add_nodes,
+    copy_totals,
     empty_list,
     evaluate,
+    extremes,
     largest_error,
     list_top,
     refine,
+    restore_totals,
     sum_of_errors,
 )
-from refgi.pairs.lightcuts.node_sum import add_nodes, copy_totals, extremes, restore_totals
 from refgi.pairs.lightcuts.tree import LightTree
 from refgi.pairs.pair_sum import NX, ROWS, TILE, TOTAL, X
 from refgi.stages import stage, tally
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 DEPTHS = 4  # of halving
 UNDIVIDED = 96  # receivers of a group that is not halved

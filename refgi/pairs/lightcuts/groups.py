@@ -9,12 +9,10 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.pair_sum import TILE
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 STRETCH = 16 * TILE  # receivers that follow each other in a call, among which groups are formed
 LANES = 8  # the least part of a group; all but a group's last part are multiples of it

@@ -1,4 +1,4 @@
-"""Attribute resolve, the second pass of rasterization: position, normal and albedo of each texel, in float64.
+"""Attribute resolve, the second pass of rasterization: position, normal, albedo and vertex colour of each texel.
 
 Every texel of every projection has a ray: an origin o and a direction d, where d reaches depth 1 (planar maps) or has
 unit length (paraboloid). With v_i relative to o and N = (v1 - v0) x (v2 - v0) the hit is o + t d,
@@ -6,16 +6,18 @@ t = v0 . N / (d . N), and t is the depth itself. Positions therefore lie on the 
 rounding, before the cast to the buffer's type. `surfaces` has how normals are interpolated.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.buffers.lines import (
     LINE,
     LINES,
     SIDE,
+    TABLE,
+    Runs,
+    find_runs,
     mix_normals,
     spread,
     store,
@@ -28,13 +30,24 @@ from refgi.rsm.buffers.lines import (
     write_ray,
     write_rays,
 )
-from refgi.rsm.buffers.runs import TABLE, Runs, find_runs
-from refgi.rsm.buffers.surfaces import ALBEDO, BATCH, COLUMNS, INPUTS, NORMAL, Records, Surface, describe
-from refgi.rsm.buffers.texel_rays import row_view
+from refgi.rsm.buffers.surfaces import (
+    ALBEDO,
+    BATCH,
+    COLUMNS,
+    INPUTS,
+    NORMAL,
+    Records,
+    Surface,
+    cross,
+    describe,
+    image_ray,
+    row_view,
+)
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection
-
-Array = npt.NDArray[Any]
+from refgi.scene.model import Geometry
+from refgi.scene.texture.lookup import Colour, colour_at
+from refgi.types import Array
 
 ROWS = 16  # of a tile: its records stay in cache, and most of a triangle's runs lie in one tile
 
@@ -212,3 +225,67 @@ def _fill(
             store(row, left, columns, line, planes.albedo)
         if channels.material_id:
             store_material(row, left, y, count, first, record, material, planes.material_id)
+
+
+class Coloured(NamedTuple):
+    """Triangles and the colours of their corners."""
+
+    vertices: Array  # (n, 3) float64, m
+    faces: Array  # (m, 3) int32
+    colours: Array  # (m, 3, 3) float64
+
+
+def tint(
+    geometry: Geometry, projection: Projection, triangle_id: Array, albedo: Array, texel: Array | None = None
+) -> None:
+    """Multiply albedo by the vertex colours, in place; scenes without any are left alone.
+
+    `projection`: the maps that `triangle_id` (H, W) was drawn on. `albedo` (3, H, W), or of `texel` (n,) alone; empty
+    where it is not wanted.
+    """
+    if geometry.colours is None or not albedo.size:
+        return
+    surface = Coloured(geometry.vertices, geometry.faces, geometry.colours)
+    if texel is None:
+        _tint_rows(surface, projection, triangle_id, albedo)
+    else:
+        _tint_texels(surface, projection, triangle_id, texel, albedo.reshape(3, -1))
+
+
+@kernel(parallel=True)
+def _tint_rows(surface: Coloured, projection: Projection, triangle_id: Array, albedo: Array) -> None:
+    for row in prange(triangle_id.shape[0]):
+        for column in range(triangle_id.shape[1]):
+            face = triangle_id[row, column]
+            if face >= 0:
+                r, g, b = _colour(surface, projection, face, row, column)
+                albedo[0, row, column] *= r
+                albedo[1, row, column] *= g
+                albedo[2, row, column] *= b
+
+
+@kernel
+def _tint_texels(surface: Coloured, projection: Projection, triangle_id: Array, texel: Array, albedo: Array) -> None:
+    width = triangle_id.shape[1]
+    for k in range(len(texel)):
+        row, column = texel[k] // width, texel[k] % width
+        face = triangle_id[row, column]
+        if face >= 0:
+            r, g, b = _colour(surface, projection, face, row, column)
+            albedo[0, k] *= r
+            albedo[1, k] *= g
+            albedo[2, k] *= b
+
+
+@kernel
+def _colour(surface: Coloured, projection: Projection, face: int, row: int, column: int) -> Colour:
+    """Return the colour where the ray o + t d of a texel meets its triangle: t = N . (v_0 - o) / (N . d)."""
+    view, y = row_view(projection, row)
+    x = ((column + 0.5) * (2.0 / projection.width) - 1.0) * projection.half[0]
+    ox, oy, oz, dx, dy, dz = image_ray(projection.kind, view, x, y)
+    vertices, (i, j, k) = surface.vertices, (surface.faces[face, 0], surface.faces[face, 1], surface.faces[face, 2])
+    px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+    nx, ny, nz = cross(vertices[j, 0] - px, vertices[j, 1] - py, vertices[j, 2] - pz,
+                       vertices[k, 0] - px, vertices[k, 1] - py, vertices[k, 2] - pz)
+    t = (nx * (px - ox) + ny * (py - oy) + nz * (pz - oz)) / (nx * dx + ny * dy + nz * dz)
+    return colour_at(vertices, surface.faces, surface.colours, face, ox + t * dx, oy + t * dy, oz + t * dz)

@@ -8,21 +8,19 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange, thread_count
 from refgi.radiometry import DIRECTIONAL, FOR_FLOAT32, POINT, SPOT, falloff_in_float64, incident_light
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.reflective import Rsm
-from refgi.rsm.buffers.texel_rays import row_view
+from refgi.rsm.buffers.surfaces import row_view
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection, image_of_view, texel_coordinates
-from refgi.scene.lamps import Lamp, lamp_of, light_of
+from refgi.scene.light import Lamp, lamp_of, light_of
 from refgi.scene.model import Light, LightTable, light_table
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 PLANE_BIAS = 0.1  # texels, also per unit of slope: how far above a receiver's plane its own surface may be stored
 LARGEST_SLOPE = 10.0  # largest slope, depth per sideways distance, that the bias follows

@@ -5,18 +5,16 @@ none either. Of a light's map a grid of texels is sampled, so that no other texe
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.scene.model import Geometry
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 SAMPLES = 96  # texels along a side of a light's map: the box is then short of 1 % of what the map shows at either end
 

@@ -1,14 +1,11 @@
 """Boxes of a scene's extent from planes of its views."""
 
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.rsm.buffers.extent import SAMPLES, bounds_of, texel_grid
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 
 @stage("rsm.visible_extent", kept=False)

@@ -8,8 +8,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import thread_count
-from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, resolve_at, resolve_materials
-from refgi.rsm.buffers.colours import tint
+from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, resolve_at, resolve_materials, tint
 from refgi.rsm.buffers.facing import facing_normals
 from refgi.rsm.buffers.surfaces import Surface
 from refgi.rsm.buffers.textures import paint
@@ -19,8 +18,7 @@ from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
 from refgi.scene.model import Camera, Geometry, MaterialTable
 from refgi.skips import left_out
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 MANY = 8  # as soon as one texel in so many is asked for, all are computed
 OF_MATERIALS = {"albedo", "material_id"}  # channels that need no geometry but the triangle

@@ -1,20 +1,26 @@
-"""Radiance that leaves towards the camera, the picture: L = L_e + albedo/pi E.
+"""Radiance that leaves towards the camera, L = L_e + albedo/pi E, and receivers that reflect by a Phong lobe.
 
 L_e is a material's emission, times its texture's mean over the pixel.
+
+L_s = sum over lights of f_s(w, w_o) E, with f_s = specular (P + 2) / (2 pi) <m . w>^P (`refgi.radiometry`) and E the
+irradiance that a light gives the point. Clear glass has no lobe.
+
+Symbols: n the G-buffer's normal, w_o unit vector to the eye, m that mirrored in the surface, w unit vector to a light.
 """
 
-from typing import Any
+import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.jit import kernel, prange
+from refgi.radiometry import incident_light, mirrored, receiver_lobe
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.pool import plane
-from refgi.scene.model import MaterialTable
+from refgi.scene.model import Light, LightTable, MaterialTable, light_table
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 NONE = np.zeros((0, 0), np.int32)
 
@@ -106,3 +112,111 @@ def _emit(emission: Array, material_id: Array, radiance: Array) -> None:
             if material >= 0:
                 for channel in range(3):
                     radiance[channel, row, x] += emission[material, channel]
+
+
+class GlossyPoints(NamedTuple):
+    """The n pixels whose surface reflects by a lobe towards the eye, in picture order, in the buffer's dtype."""
+
+    pixel: Array  # (n,) int64, flat index into the picture
+    position: Array  # (3, n) m, world space
+    normal: Array  # (3, n) unit vectors: the G-buffer's
+    mirrored: Array  # (3, n) unit vectors m
+    exponent: Array  # (n,)
+    specular: Array  # (3, n) reflectance of the lobe
+
+
+def glossy_materials(materials: MaterialTable) -> Array:
+    """Return, (m,) bool, which materials reflect by a lobe; clear glass does not."""
+    glossy: Array = (materials.specular > 0).any(axis=1) & (materials.ior == 0)
+    return glossy
+
+
+def shows_glossy(buffer: GBuffer, materials: MaterialTable, material_of_face: Array) -> bool:
+    """Return whether any visible surface reflects by a lobe; resolves no channel.
+
+    `material_of_face`: (m,), by triangle. Looks at no pixel where no material has a lobe.
+    """
+    glossy = glossy_materials(materials)
+    return bool(glossy.any()) and bool(_any_glossy(glossy, material_of_face, buffer.triangle_id))
+
+
+@kernel
+def _any_glossy(glossy: Array, material_of_face: Array, triangle_id: Array) -> bool:
+    for row in range(triangle_id.shape[0]):
+        for column in range(triangle_id.shape[1]):
+            face = triangle_id[row, column]
+            if face >= 0 and glossy[material_of_face[face]]:
+                return True
+    return False
+
+
+@stage("rsm.glossy_points")
+def glossy_points(buffer: GBuffer, materials: MaterialTable, eye: npt.ArrayLike) -> GlossyPoints:
+    """Return the pixels whose surface reflects by a lobe towards the eye.
+
+    eye (3,): Where the camera is, m.
+    -> GlossyPoints: Without points whose normal faces away from the eye, as interpolated normals may.
+    """
+    material_id, position, normal = buffer.resolve("material_id", "position", "normal")
+    glossy = np.append(glossy_materials(materials), False)  # the last one stands for no surface, -1
+    pixel = np.flatnonzero(glossy[material_id])
+    at, up = (np.ascontiguousarray(plane.reshape(3, -1)[:, pixel]) for plane in (position, normal))
+    mirror, faces_eye = np.empty_like(at), np.empty(len(pixel), np.bool_)
+    _mirror(at, up, np.asarray(eye, np.float64), mirror, faces_eye)
+    material = material_id.reshape(-1)[pixel]
+    found = GlossyPoints(pixel, at, up, mirror, materials.exponent.astype(at.dtype)[material],
+                         materials.specular.astype(at.dtype)[material].T)
+    return GlossyPoints(*(np.ascontiguousarray(part[..., faces_eye]) for part in found))
+
+
+@kernel(parallel=True)
+def _mirror(position: Array, normal: Array, eye: Array, mirror: Array, faces_eye: Array) -> None:
+    """Fill m, computed in float64, and whether n . w_o > 0."""
+    for i in prange(position.shape[1]):
+        x, y, z = eye[0] - position[0, i], eye[1] - position[1, i], eye[2] - position[2, i]
+        nx, ny, nz = np.float64(normal[0, i]), np.float64(normal[1, i]), np.float64(normal[2, i])
+        length = math.sqrt(x * x + y * y + z * z)
+        faces_eye[i] = x * nx + y * ny + z * nz > 0.0
+        scale = 1.0 / length if length > 0.0 else 0.0
+        mirror[0, i], mirror[1, i], mirror[2, i] = mirrored(x * scale, y * scale, z * scale, nx, ny, nz)
+
+
+@stage("rsm.direct_lobes")
+def direct_lobes(points: GlossyPoints, light: Light, visible: Array) -> Array:
+    """Return the radiance towards the eye that receivers' lobes make of a light: f_s I(w) cos / d^2.
+
+    visible (h, w) bool: Where the light arrives.
+    -> (3, n): W/m^2/sr. Computed in float64 from the receivers as they are stored, and rounded once.
+    """
+    radiance = np.zeros_like(points.position)
+    _add_direct(light_table((light,)), points, np.ascontiguousarray(visible).reshape(-1), radiance)
+    return radiance
+
+
+@kernel(parallel=True)
+def _add_direct(lights: LightTable, points: GlossyPoints, visible: Array, radiance: Array) -> None:
+    for i in prange(len(points.pixel)):
+        if visible[points.pixel[i]]:
+            position, normal, mirror = points.position, points.normal, points.mirrored
+            wx, wy, wz, _, red, green, blue = incident_light(lights, 0, position[0, i], position[1, i], position[2, i])
+            cosine = wx * normal[0, i] + wy * normal[1, i] + wz * normal[2, i]
+            if cosine > 0.0:
+                # f_s E
+                reflected = cosine * receiver_lobe(np.float64(mirror[0, i]), np.float64(mirror[1, i]),
+                                                   np.float64(mirror[2, i]), wx, wy, wz, np.float64(points.exponent[i]))
+                radiance[0, i] = points.specular[0, i] * (reflected * red)
+                radiance[1, i] = points.specular[1, i] * (reflected * green)
+                radiance[2, i] = points.specular[2, i] * (reflected * blue)
+
+
+@stage("rsm.spread_over_picture", kept=False)
+def spread_over_picture(points: GlossyPoints, radiance: Array, shape: tuple[int, int]) -> Array:
+    """Return radiance of glossy receivers as a picture.
+
+    radiance (3, n): W/m^2/sr.
+    shape: Height and width of the picture.
+    -> (3, h, w): 0 elsewhere.
+    """
+    picture = np.zeros((3, *shape), points.position.dtype)
+    picture.reshape(3, -1)[:, points.pixel] = radiance
+    return picture

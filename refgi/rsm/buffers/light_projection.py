@@ -6,7 +6,7 @@ orthographic map.
 
 import math
 from collections.abc import Callable
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -22,11 +22,11 @@ from refgi.rsm.raster.projection import (
     spot_projection,
 )
 from refgi.scene.model import DirectionalLight, Geometry, Light, PointLight, SpotLight
+from refgi.types import Array
 
 MapShape = Literal["auto", "perspective", "cube", "paraboloid", "orthographic"]
 
 WIDEST_PERSPECTIVE = math.radians(75)  # beyond, texels on the axis span over 60 times the solid angle of the rim's
-Array = npt.NDArray[Any]
 
 
 def light_projection(light: Light, geometry: Geometry, resolution: int, shape: MapShape = "auto") -> Projection:

@@ -17,15 +17,14 @@ from refgi.jit import kernel, prange
 from refgi.rsm.buffers.gbuffer import GBuffer, values_at
 from refgi.rsm.buffers.light_projection import MapShape, incident_flux, light_projection
 from refgi.rsm.buffers.solid_angle import texel_solid_angles, texel_solid_angles_at
-from refgi.rsm.buffers.texel_rays import texel_ray
+from refgi.rsm.buffers.surfaces import texel_ray
 from refgi.rsm.raster.projection import Projection, project
 from refgi.rsm.raster.visibility_buffer import rasterize
 from refgi.scene.model import Geometry, Light, MaterialTable
 from refgi.stages import stage
+from refgi.types import Array
 
 __all__ = ["Rsm", "reflective_shadow_map"]
-
-Array = npt.NDArray[Any]
 
 VIEW_CHANNELS = ("depth", "position", "normal")  # channels of the light's view
 LOBE = ("lobe_flux", "lobe_axis", "lobe_exponent")

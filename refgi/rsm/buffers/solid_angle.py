@@ -15,7 +15,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.radiometry import (
@@ -28,8 +27,7 @@ from refgi.radiometry import (
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
 from refgi.scene.light import SHAPES, Falloff, cone_row
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 # Gauss-Legendre rules of 4 and of 8 nodes on [0, 1]
 FEW_NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263)

@@ -11,12 +11,11 @@ from refgi.rsm.buffers.light_projection import MapShape, light_projection
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.raster.projection import Projection
 from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
-from refgi.scene.lamps import Lamp, lamp_of, light_of
+from refgi.scene.light import Lamp, lamp_of, light_of
 from refgi.scene.material import MaterialTable
 from refgi.scene.model import Geometry, Light
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 
 def _visible_triangles(geometry: Geometry, projection: Projection) -> Array:

@@ -1,4 +1,4 @@
-"""What the texels of a triangle have in common: its plane, its normal, its albedo, and how its normals are mixed.
+"""What the texels of a triangle have in common, and the rays through texels' centres that meet it.
 
 With q = v0 - o for the centre of projection o, e1 = v1 - v0, e2 = v2 - v0 and N = e1 x e2, a ray o + t d meets the
 triangle's plane at t = q . N / (d . N). There the barycentric coordinates of v1 and v2 are, times d . N,
@@ -19,12 +19,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 BATCH = 64  # triangles described at once
 # columns of `Records.fixed`: corner v0; N; unit normal on the visible side; albedo; least and greatest t; M by axis; K
@@ -205,3 +203,46 @@ def _mix_parallel(projection: Projection, m: int, batch: Array) -> None:
             batch[(at + 1) * BATCH + b] = uy * second + vy * third
             batch[(at + 2) * BATCH + b] = uz * second + vz * third
             batch[(INPUTS + CONSTANT + axis) * BATCH + b] = facing * first
+
+
+@kernel
+def texel_ray(projection: Projection, row: int, column: int) -> tuple[float, float, float, float, float, float]:
+    """Return the ray through a texel centre of the stacked maps.
+
+    `row`, `column`: texel of the stacked maps. Result: origin (m) and direction in world space; the direction's length
+    is one unit of depth.
+    """
+    view, v = row_view(projection, row)
+    u = ((column + 0.5) * (2.0 / projection.width) - 1.0) * projection.half[0]
+    return image_ray(projection.kind, view, u, v)
+
+
+@kernel
+def row_view(projection: Projection, row: int) -> Any:
+    """Return what the rays of a row have in common.
+
+    `row`: row of the stacked maps. Result: origin, right, down and forward of the row's map; the row's coordinate on
+    the image plane.
+    """
+    m = row // projection.height
+    v = ((row - m * projection.height + 0.5) * (2.0 / projection.height) - 1.0) * projection.half[1]
+    o, f = projection.origin, projection.frame
+    return (o[m, 0], o[m, 1], o[m, 2], f[m, 0, 0], f[m, 0, 1], f[m, 0, 2], f[m, 1, 0], f[m, 1, 1], f[m, 1, 2],
+            f[m, 2, 0], f[m, 2, 1], f[m, 2, 2]), v  # fmt: skip
+
+
+@kernel
+def image_ray(kind: int, view: Any, u: float, v: float) -> tuple[float, float, float, float, float, float]:
+    """Return origin and direction at a point of the image plane.
+
+    `kind`: kind of the projection. `view`: as `row_view` gives it. `u`, `v`: coordinates on the image plane.
+    """
+    ox, oy, oz, rx, ry, rz, qx, qy, qz, fx, fy, fz = view
+    if kind == ORTHOGRAPHIC:
+        return ox + u * rx + v * qx, oy + u * ry + v * qy, oz + u * rz + v * qz, fx, fy, fz
+    ahead = 1.0
+    if kind == PARABOLOID:
+        scale = 1.0 / (1.0 + u * u + v * v)
+        ahead = (1.0 - u * u - v * v) * scale
+        u, v = 2.0 * u * scale, 2.0 * v * scale
+    return ox, oy, oz, u * rx + v * qx + ahead * fx, u * ry + v * qy + ahead * fy, u * rz + v * qz + ahead * fz

@@ -10,17 +10,14 @@ asked.
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.rsm.buffers.surfaces import cross
-from refgi.rsm.buffers.texel_rays import image_ray, row_view
+from refgi.rsm.buffers.surfaces import cross, image_ray, row_view
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.scene.model import Geometry, MaterialTable
 from refgi.scene.texture.footprint import PLACE, TOGETHER, Looks, footprint_means, looks
 from refgi.scene.texture.table import TextureTable
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 
 class Painted(NamedTuple):

@@ -4,7 +4,7 @@
 paraboloid ones, `visibility_buffer` on either kind, several maps at once. `depth_maps` keeps distances alone.
 """
 
-from refgi.rsm.raster.depth_maps import paraboloid_depth_maps
+from refgi.rsm.raster.paraboloid import paraboloid_depth_maps
 from refgi.rsm.raster.projection import Projection, camera_projection, project
 from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
 

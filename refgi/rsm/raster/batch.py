@@ -15,14 +15,12 @@ the right, and a smaller one downwards (the top-left rule).
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel
 from refgi.rsm.raster.triangle import LANES, SMALLEST, SPAN_CUT
 from refgi.scene.cutouts import CutFaces
-from refgi.scene.texture.alpha import is_opaque, lent
-
-Array = npt.NDArray[Any]
+from refgi.scene.texture.lookup import is_opaque, lent
+from refgi.types import Array
 
 IN_PLANE = 1e-7  # share of a triangle's size: a corner not farther from the plane through the eye is taken to lie in it
 NEAREST = 1e-9  # share of a triangle's size under which a hit is rounding: its plane holds the eye

@@ -10,10 +10,9 @@ may count as inside, so they are drawn row by row, by the code of maps without c
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.jit.borrowed import borrowed
+from refgi.jit.dispatch import borrowed
 from refgi.rsm.raster.batch import (
     BATCH,
     CORNERS,
@@ -31,8 +30,7 @@ from refgi.rsm.raster.placed_clusters import Placed, is_hidden, is_sound
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, view_coordinates
 from refgi.rsm.raster.triangle import BOX_PAD, LANES, SMALLEST_W, crossing_box
 from refgi.scene.clusters import CLUSTER, Clusters
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 SMALL = 2  # columns and rows of a box whose triangle is drawn in a lane
 NOT_DRAWN, IN_LANES, BY_ROWS = np.int32(0), np.int32(1), np.int32(2)

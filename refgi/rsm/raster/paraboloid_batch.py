@@ -7,12 +7,10 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel
 from refgi.rsm.raster.triangle import BOX_PAD, CHUNK, SMALLEST, centres_between
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 NEAREST = 1e-9  # share of a triangle's size under which a hit is rounding: its plane holds the centre
 

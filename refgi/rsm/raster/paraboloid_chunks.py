@@ -14,13 +14,11 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel
 from refgi.rsm.raster.paraboloid_batch import is_behind
 from refgi.rsm.raster.triangle import BOX_PAD, CHUNK, Chunks
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 KINDS = 4  # triangles that cover up to 1, 2 and 4 texels along a side; last ANY
 ANY = KINDS - 1

@@ -8,7 +8,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel
 from refgi.rsm.raster.batch import EMPTY, key_of
@@ -29,9 +28,8 @@ from refgi.rsm.raster.paraboloid_batch import (
 from refgi.rsm.raster.paraboloid_chunks import KINDS
 from refgi.rsm.raster.triangle import CHUNK, LANES, SPAN_CUT
 from refgi.scene.cutouts import CutFaces
-from refgi.scene.texture.alpha import is_opaque, lent
-
-Array = npt.NDArray[Any]
+from refgi.scene.texture.lookup import is_opaque, lent
+from refgi.types import Array
 
 
 class Scratch(NamedTuple):

@@ -14,17 +14,15 @@ What is seen almost edge-on or has almost no area is not sound.
 has of texels in a unit of its image plane: bounded from planes in float32, without projecting a vertex.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.raster.batch import EMPTY, key_of
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, view_coordinates
 from refgi.scene.clusters import Clusters
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 SLACK = 1e-3  # share by which a sound triangle's nearness may exceed its nearest corner's
 ROUNDING = 2.0**-53

@@ -19,8 +19,7 @@ import numpy.typing as npt
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.scene.model import Camera, DirectionalLight, SpotLight
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 PERSPECTIVE, ORTHOGRAPHIC, PARABOLOID = 0, 1, 2
 LARGEST_SIDE = 65536  # texels; boxes of triangles are kept as 16-bit integers

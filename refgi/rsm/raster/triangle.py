@@ -10,13 +10,11 @@ eye, the box is that of its forward part.
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import has_wide_registers, kernel, prange
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, view_coordinates
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 SMALLEST_W = 1e-30  # stands for a vertex in the plane of the eye, m
 BOX_PAD = 1e-3  # texels; far above the rounding of a projected vertex

@@ -7,13 +7,10 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 
 from refgi.errors import InputError, expect
-from refgi.scene.builtin.atrium import atrium
-from refgi.scene.builtin.closed_forms import integrating_sphere, parallel_plates, wedge
-from refgi.scene.builtin.cornell import cornell_box, cornell_sphere
-from refgi.scene.builtin.leaf_grid import leaf_grid
+from refgi.scene.builtin.atrium import atrium, textured_atrium
+from refgi.scene.builtin.cornell import cornell_box, cornell_sphere, integrating_sphere, parallel_plates, wedge
 from refgi.scene.builtin.metaballs import metaballs
-from refgi.scene.builtin.stage import glass_ball, ring, stage
-from refgi.scene.builtin.textured_atrium import textured_atrium
+from refgi.scene.builtin.stage import glass_ball, leaf_grid, ring, stage
 from refgi.scene.files import did_you_mean
 from refgi.scene.model import Scene
 

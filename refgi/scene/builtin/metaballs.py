@@ -14,7 +14,8 @@ import numpy as np
 
 from refgi.errors import expect
 from refgi.scene.builtin.stage import walls
-from refgi.scene.model import Array, Camera, Material, Mesh, Scene, SpotLight, merge
+from refgi.scene.model import Camera, Material, Mesh, Scene, SpotLight, merge
+from refgi.types import Array
 
 CLAY = Material("metaballs", (0.6, 0.58, 0.52))
 MIDDLE = np.array([0.0, 0.24, -0.02])  # m

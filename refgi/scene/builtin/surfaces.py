@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from refgi.scene.model import Array, Material, Mesh
+from refgi.scene.model import Material, Mesh
+from refgi.types import Array
 
 
 def grid_faces(rows: int, columns: int, *, closed: bool = False) -> Array:

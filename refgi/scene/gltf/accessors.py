@@ -7,7 +7,7 @@ import numpy as np
 from refgi.errors import expect
 from refgi.scene.gltf.container import Document
 from refgi.scene.mesh import expect_memory
-from refgi.scene.values import Array
+from refgi.types import Array
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}

@@ -15,7 +15,7 @@ from refgi.scene.gltf.accessors import accessor
 from refgi.scene.gltf.container import Document
 from refgi.scene.gltf.nodes import Nodes, all_nodes
 from refgi.scene.mesh import as_float64
-from refgi.scene.values import Array
+from refgi.types import Array
 
 INFLUENCES = 4  # in one set, JOINTS_n and WEIGHTS_n
 

@@ -15,18 +15,16 @@ import numpy as np
 from refgi.errors import InputError, RefgiWarning, expect
 from refgi.scene.files import Contents
 from refgi.scene.gltf.accessors import accessor
-from refgi.scene.gltf.container import Document
+from refgi.scene.gltf.container import DRACO, Document, packed, unread
 from refgi.scene.gltf.deform import Deformer, Pose, pose_of
-from refgi.scene.gltf.extensions import DRACO, packed, unread
-from refgi.scene.gltf.instances import instances
-from refgi.scene.gltf.materials import UNPAINTED, read_material
+from refgi.scene.gltf.materials import UNPAINTED, Look, base_colour, emissive, read_material, transformed
 from refgi.scene.gltf.nodes import EXTENSION as LIGHTS
-from refgi.scene.gltf.nodes import node_camera, node_light, scene_nodes
-from refgi.scene.gltf.textures import Look, base_colour, emissive, transformed
+from refgi.scene.gltf.nodes import instances, node_camera, node_light, scene_nodes
+from refgi.scene.material import factors
 from refgi.scene.mesh import as_float64, expect_memory
-from refgi.scene.model import Array, Camera, Light, Material, Mesh
-from refgi.scene.transform import IDENTITY, invertible, transformed_all
-from refgi.scene.vertexcolours import factors
+from refgi.scene.model import Camera, Light, Material, Mesh
+from refgi.scene.motion import IDENTITY, invertible, transformed_all
+from refgi.types import Array
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 COLOURS = "COLOR_0"

@@ -5,6 +5,6 @@ lies at (i + 1/2) / n. Images are decoded texel by texel; everything after that,
 """
 
 from refgi.scene.texture.image import Image
-from refgi.scene.texture.texture import Texture
+from refgi.scene.texture.table import Texture
 
 __all__ = ["Image", "Texture"]

@@ -13,14 +13,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.elementary import log2
 from refgi.jit import kernel
 from refgi.scene.texture.lookup import neighbours_of
 from refgi.scene.texture.table import FILTER, FIRST, LEVELS, NEAREST, TRILINEAR, WRAP_U, WRAP_V, TextureTable
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 MOST = 32  # probes along the longer side
 STRETCH, TEXEL = 1.2, 0.93  # of these pairs the best on a checkered floor

@@ -20,7 +20,7 @@ import numpy as np
 
 from refgi.errors import InputError, expect
 from refgi.memory import available_bytes
-from refgi.scene.values import Array
+from refgi.types import Array
 
 MOST_TEXELS = 1 << 27  # of one image: 16384 x 8192
 FORMATS = ("PNG", "JPEG", "BMP")

@@ -1,16 +1,74 @@
-"""All textures of a scene as arrays for kernels: every image with its mip levels once, in linear light."""
+"""`Texture`, mip levels that keep the energy, and all textures of a scene as arrays for kernels.
 
+So the mean of every level is the image's. A level has half the texels of the one below along each axis, rounded down,
+at least 1. Where that does not divide, a texel covers parts of texels, which count with their area.
+"""
+
+import dataclasses
 import weakref
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from refgi.errors import expect
 from refgi.scene.texture.image import Image
-from refgi.scene.texture.pyramid import level_sizes, next_level
-from refgi.scene.texture.texture import Texture
-from refgi.scene.values import Array
+from refgi.types import Array
+
+Wrap = Literal["repeat", "clamp", "mirror"]
+Filter = Literal["nearest", "bilinear", "trilinear"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Texture:
+    """An image that multiplies a reflectance, looked up at the texture coordinates (u, v) of its triangles.
+
+    `wrap` of u and of v: "repeat", "clamp" to the edge's texels, or "mirror" (every other repetition turned round).
+    `filter`: "nearest" texel; "bilinear" between the four around; "trilinear": the mean over what a pixel covers, from
+    mip levels. At the hits of rays both latter are bilinear.
+    """
+
+    image: Image
+    wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
+    filter: Filter = "trilinear"
+
+    def __post_init__(self) -> None:
+        expect(isinstance(self.image, Image), "texture: image", "an Image", type(self.image).__name__)
+        good = isinstance(self.wrap, tuple) and len(self.wrap) == 2 and all(one in get_args(Wrap) for one in self.wrap)
+        expect(good, "texture: wrap", f"two of {', '.join(get_args(Wrap))}", self.wrap)
+        expect(self.filter in get_args(Filter), "texture: filter", f"one of {', '.join(get_args(Filter))}",
+               self.filter)
+
+
+def level_sizes(width: int, height: int) -> list[tuple[int, int]]:
+    """Return (width, height) of each level, the image itself first, down to 1 x 1."""
+    sizes = [(width, height)]
+    while sizes[-1] != (1, 1):
+        width, height = max(1, width // 2), max(1, height // 2)
+        sizes.append((width, height))
+    return sizes
+
+
+def next_level(level: Array) -> Array:
+    """Return the level above (h', w', 3) of one (h, w, 3), in its dtype; summed in float64."""
+    halved = _halved(level.astype(np.float64), 0)
+    return _halved(halved, 1).astype(level.dtype)
+
+
+def _halved(level: Array, axis: int) -> Array:
+    """Return area-weighted means along an axis."""
+    count = level.shape[axis]
+    if count == 1:
+        return level
+    level = np.moveaxis(level, axis, 0)
+    fewer = count // 2
+    if count == 2 * fewer:
+        return np.moveaxis((level[0::2] + level[1::2]) / 2, 0, axis)
+    # texel k of n covers from k (2 n + 1) / n on: the rest of texel 2 k, all of 2 k + 1, and what 2 k + 2 still has
+    k = np.arange(fewer).reshape(-1, *(1,) * (level.ndim - 1))
+    parts = (fewer - k) * level[0:-1:2] + fewer * level[1::2] + (k + 1) * level[2::2]
+    return np.moveaxis(parts / count, 0, axis)
+
 
 REPEAT, CLAMP, MIRROR = 0, 1, 2
 NEAREST, BILINEAR, TRILINEAR = 0, 1, 2

@@ -5,8 +5,7 @@
 """
 
 from refgi.method import Method
-from refgi.splat.gather.approximations import APPROXIMATIONS
-from refgi.splat.gather.gather import PRESETS, DiscSettings, GatherSettings, Interpolation, gather
+from refgi.splat.gather.gather import APPROXIMATIONS, PRESETS, DiscSettings, GatherSettings, Interpolation, gather
 from refgi.splat.gather.lobes import gather_lobes
 
 __all__ = [

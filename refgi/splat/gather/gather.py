@@ -7,29 +7,28 @@ runs the sum itself.
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.diagnostics import SamplingError, asked, is_due
+from refgi.lights.settings import RSM_RESOLUTION, VISIBILITY
+from refgi.method import Approximation
+from refgi.pairs.estimates import LEAST_SAMPLED, error_of_halves, sample_pixels, warn_of_loss, warn_of_sampling
 from refgi.pairs.irradiance import Receivers
-from refgi.pairs.loss import LEAST_SAMPLED, sample_pixels, warn_of_loss
-from refgi.pairs.sampling import error_of_halves, warn_of_sampling
 from refgi.pairs.tiles import clear, receiving
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
 from refgi.splat.gather.gather_sum import GatherMap, centers, disc_loss, disc_pattern, gather_discs
 from refgi.splat.gather.interpolation import SimilarityLimits, coarse_pixels, interpolate
 from refgi.stages import skip, stage, tally
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.rsm import Rsm
     from refgi.rsm.buffers.extent import Extent
-
-Array = npt.NDArray[Any]
 
 WIDEST = 1000.0  # map widths; any disc past sqrt 2 covers the whole map
 
@@ -221,3 +220,28 @@ def disc_texels(rsm: "Rsm", disc: DiscSettings, dtype: np.dtype[Any]) -> tuple[G
     texels = (rsm.position - disc.offset * rsm.normal, rsm.normal, rsm.flux)
     source = GatherMap(*(np.ascontiguousarray(part, dtype) for part in texels))
     return source, pattern, dtype.type(scale)
+
+
+WHOLE_MAP = 1.42  # map widths: more than sqrt 2
+MANY = 1 << 15  # texels of a disc
+
+
+def _whole_map(settings: GatherSettings, _: Mapping[str, Any]) -> GatherSettings:
+    disc = dataclasses.replace(settings.disc, radius=max(WHOLE_MAP, settings.disc.radius))
+    return dataclasses.replace(settings, disc=disc)
+
+
+def _many(settings: GatherSettings, _: Mapping[str, Any]) -> GatherSettings:
+    disc = dataclasses.replace(settings.disc, samples=max(MANY, settings.disc.samples), seed=0)
+    return dataclasses.replace(settings, disc=disc)
+
+
+def _every_pixel(settings: GatherSettings, _: Mapping[str, Any]) -> GatherSettings:
+    return dataclasses.replace(settings, interpolation=None)
+
+
+APPROXIMATIONS = (
+    VISIBILITY, RSM_RESOLUTION,
+    Approximation("cut", "texels beyond a disc around the pixel's place in the map are left out", _whole_map),
+    Approximation("few samples", f"S texels of the disc; off: {MANY}", _many),
+    Approximation("upsampling", "pixels of a coarse grid are evaluated, similar ones interpolated", _every_pixel))

@@ -11,20 +11,17 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.draws import GATHERING, draws
 from refgi.jit import kernel, prange
+from refgi.pairs.estimates import lost_share, sample_pixels
 from refgi.pairs.irradiance import Receivers
-from refgi.pairs.loss import lost_share, sample_pixels
 from refgi.pairs.pair_sum import geometry_term
-from refgi.sampling import halton
+from refgi.sampling import GATHERING, draws, halton
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rsm import Projection, Rsm
-
-Array = npt.NDArray[Any]
 TEXELS = 1024  # of each map
 SAMPLED = 512  # pixels
 CORNER = math.sqrt(2)  # map widths: a disc of that radius holds the whole map, wherever its centre lies

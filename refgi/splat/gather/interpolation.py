@@ -3,12 +3,10 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 LEAST_SIMILAR = 3  # of the four coarse neighbours that must be similar to a pixel
 

@@ -3,22 +3,19 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.lobes import lobe_gap, lobe_power, receiver_norm
 from refgi.pairs.pair_sum import geometry_term
-from refgi.rsm.buffers.glossy import GlossyPoints, spread_over_picture
+from refgi.radiometry import lobe_gap, lobe_power, receiver_norm
+from refgi.rsm.buffers.leaving import GlossyPoints, spread_over_picture
 from refgi.splat.gather.gather import DiscSettings, GatherSettings, disc_texels
 from refgi.splat.gather.gather_sum import GatherMap, centers, sample_texel
 from refgi.stages import stage, tally
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.rsm import Rsm
-
-Array = npt.NDArray[Any]
-
 
 def gather_lobes(frame: "Frame", settings: GatherSettings) -> Array:
     """Return the radiance towards the eye that receivers' lobes make of the texels in their discs.

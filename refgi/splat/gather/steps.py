@@ -2,10 +2,9 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.pairs.irradiance import Receivers
 from refgi.rsm.buffers.extent import Extent
@@ -14,13 +13,11 @@ from refgi.splat.gather import gather_sum, interpolation
 from refgi.splat.gather.gather_sum import GatherMap, disc_offsets, disc_points, fill_texels, gather_discs
 from refgi.splat.gather.interpolation import SimilarityLimits, coarse_pixels
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rsm import Rsm
     from refgi.splat.gather.gather import DiscSettings, Interpolation
-
-Array = npt.NDArray[Any]
-
 
 @stage("gather.pattern", kept=False)
 def pattern(xi: Array, weight_squared: bool) -> tuple[Array, Array]:

@@ -6,8 +6,7 @@
 """
 
 from refgi.method import Method
-from refgi.splat.multires.approximations import APPROXIMATIONS
-from refgi.splat.multires.ledger import multires_ledger
+from refgi.splat.multires.approximations import APPROXIMATIONS, multires_ledger
 from refgi.splat.multires.lobes import multires_lobes
 from refgi.splat.multires.multires import extra_bytes, multires, shared_subsplats
 from refgi.splat.multires.settings import (

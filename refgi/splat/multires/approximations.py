@@ -1,15 +1,22 @@
-"""What `multires` approximates, in the order of its pipeline."""
+"""What `multires` approximates, in the order of its pipeline, and where the light goes that it loses."""
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from refgi.cluster.settings import ClusteredShadows
-from refgi.lights.approximations import CLAMP, LIGHT_SAMPLING, OPENNESS, RSM_RESOLUTION, VISIBILITY, without_clamp
+from refgi.ledger import Ledger, account
+from refgi.lights.selection import choose_lights
+from refgi.lights.settings import CLAMP, LIGHT_SAMPLING, OPENNESS, RSM_RESOLUTION, VISIBILITY, without_clamp
 from refgi.method import Approximation
+from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
+from refgi.splat.multires.multires import light_areas, multires
 from refgi.splat.multires.settings import MOST_CELLS, ByError, ByGeometry, MultiresSettings, Rays
+from refgi.stages import stage
 
+if TYPE_CHECKING:
+    from refgi.frame import Frame
 
 def _ignores_visibility(settings: MultiresSettings) -> Mapping[str, Any]:
     return {} if settings.visibility is not None else {"visibility": False}
@@ -57,3 +64,31 @@ APPROXIMATIONS = (
     Approximation("lightcuts", "clusters stand for their lights where the sum's error is bounded", _every_pair),
     Approximation("detail", "surfaces that turn away from the camera are darkened (Eq. 3)", _undarkened),
     Approximation("supersampling", "a pixel is the mean of four, not its centre", _at_pixels))
+
+
+@stage("multires.ledger")
+def multires_ledger(frame: "Frame", settings: MultiresSettings) -> Ledger:
+    """Account for the power of the lights under `multires`.
+
+    -> Ledger: Its lines sum to `emitted` but for the rounding of the frame's dtype.
+
+    Notes
+    -----
+    Lights are summed in full, without lightcuts.
+    `interpolated` is every pixel's sum less the picture before Eq. 3, and so holds twice the size and the printed
+    forms of subsplats as well. It sums all lights at every pixel three times or more: on the Cornell box at 512 x 512
+    it takes 17 times as long as the picture.
+    """
+    settings = dataclasses.replace(settings, lightcuts=None)
+    lights, pairs = choose_lights(frame, settings.lights), settings.effective_pairs
+    footprint = light_areas(frame, lights, settings)
+    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    unblocked = every = irradiance(receivers, lights, pairs, footprint)
+    if settings.visibility is not None:
+        finest = ByGeometry(coarsest=MOST_CELLS, visibility=settings.visibility)
+        every = multires(frame, MultiresSettings(settings.lights, settings.pairs, finest))
+    picture = plain = multires(frame, settings)
+    if settings.detail > 0:
+        plain = multires(frame, dataclasses.replace(settings, detail=0.0))
+    return account(frame, settings.lights, pairs, footprint, picture,
+                   {"shadowed": unblocked - every, "interpolated": every - plain, "darkened": plain - picture})

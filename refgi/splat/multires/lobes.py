@@ -6,17 +6,15 @@ says of them that only diffuse materials are properly handled. Lists of each lig
 reflects of it, and catch highlights that are not narrower than a coarsest cell.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.val import cluster_lights, glossy_under
 from refgi.lights.selection import choose_lights
-from refgi.pairs.glossy import glossy_radiance
-from refgi.pairs.glossy_rays import shadowed_radiance
+from refgi.pairs.glossy import glossy_radiance, shadowed_radiance
 from refgi.pairs.shadow_rays import receivers
-from refgi.rsm.buffers.glossy import GlossyPoints, glossy_points, spread_over_picture
+from refgi.rsm.buffers.leaving import GlossyPoints, glossy_points, spread_over_picture
 from refgi.splat.multires.light_lists.per_light import covered_by, per_light_lobes
 from refgi.splat.multires.multires import doubled, halved, light_areas
 from refgi.splat.multires.refinement.criteria import discontinuities
@@ -24,14 +22,12 @@ from refgi.splat.multires.refinement.grid import Subsplats, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.settings import ByError, ByGeometry, ByIrradiance, MultiresSettings
 from refgi.splat.multires.subsplats.upsample import upsample
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.lights import PixelLights
     from refgi.rsm import GBuffer
-
-Array = npt.NDArray[Any]
-
 
 def multires_lobes(frame: "Frame", settings: MultiresSettings) -> Array:
     """Return the radiance towards the eye that receivers' lobes make of the pixel lights of `multires`.

@@ -1,9 +1,8 @@
 """Adaptive multiresolution splatting (Nichols and Wyman 2009): the method."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.val import extra_bytes as bytes_of_shadows
 from refgi.jit import most_threads
@@ -11,12 +10,11 @@ from refgi.lights.footprints import demo_footprints
 from refgi.lights.selection import choose_lights, drawn_from_maps, footprints, light_maps
 from refgi.lights.settings import MapLights, most_lights
 from refgi.method import Extent
+from refgi.pairs.estimates import report_sampling, thinned, warn_of_clamp
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.lightcuts.tree import tree_bytes
-from refgi.pairs.loss import thinned, warn_of_clamp
-from refgi.pairs.sampling import report_sampling
 from refgi.splat.multires.error_target.error_driven import MANY, clusters, error_driven
-from refgi.splat.multires.error_target.pixel_sum import PixelSum, shadowed_by_clusters, shadowed_by_rays
+from refgi.splat.multires.error_target.near import PixelSum, shadowed_by_clusters, shadowed_by_rays
 from refgi.splat.multires.light_lists.per_light import per_light
 from refgi.splat.multires.refinement.criteria import discontinuities
 from refgi.splat.multires.refinement.grid import Subsplats, top_level
@@ -32,14 +30,12 @@ from refgi.splat.multires.subsplats.evaluate import (
 )
 from refgi.splat.multires.subsplats.upsample import upsample
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.lights import PixelLights
     from refgi.rsm import GBuffer
-
-Array = npt.NDArray[Any]
-
 
 def multires(frame: "Frame", settings: MultiresSettings) -> Array:
     """Compute indirect irradiance from pixel lights that are evaluated at subsplats.

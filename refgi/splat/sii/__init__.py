@@ -8,8 +8,7 @@ the pixels.
 """
 
 from refgi.method import Method
-from refgi.splat.sii.approximations import APPROXIMATIONS
-from refgi.splat.sii.ledger import sii_ledger
+from refgi.splat.sii.approximations import APPROXIMATIONS, sii_ledger
 from refgi.splat.sii.lobes import sii_lobes
 from refgi.splat.sii.settings import (
     PRESETS,

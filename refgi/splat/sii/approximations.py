@@ -1,13 +1,22 @@
-"""What `sii` approximates, in the order of its pipeline."""
+"""What `sii` approximates, in the order of its pipeline, and where the light goes that it loses."""
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from refgi.lights.approximations import CLAMP, LIGHT_SAMPLING, OPENNESS, RSM_RESOLUTION, VISIBILITY, every_light
+from refgi.ledger import Ledger, account
+from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import CLAMP, LIGHT_SAMPLING, OPENNESS, RSM_RESOLUTION, VISIBILITY, every_light, with_clamp
 from refgi.method import Approximation
-from refgi.splat.sii.settings import SiiSettings
+from refgi.pairs.irradiance import Receivers
+from refgi.settings import replaced
+from refgi.splat.sii.settings import MeshBound, SiiSettings
+from refgi.splat.sii.sii import cut_irradiance, sii
+from refgi.stages import stage
+from refgi.types import Array
 
+if TYPE_CHECKING:
+    from refgi.frame import Frame
 
 def _sampled(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
     reach = settings.reach if settings.reach.cut else dataclasses.replace(settings.reach, seed=0)  # draws none
@@ -33,3 +42,34 @@ APPROXIMATIONS = (
     Approximation("cut", "pairs whose irradiance is below a threshold are left out", _uncut),
     Approximation("lightcuts", "clusters stand for their lights where the sum's error is bounded", _every_pair),
     Approximation("upsampling", "one pixel of 2 x 2 is evaluated, the others are upsampled", _full_resolution))
+
+
+@stage("sii.ledger")
+def sii_ledger(frame: "Frame", settings: SiiSettings) -> Ledger:
+    """Account for the power of the lights under `sii`.
+
+    -> Ledger: Its lines sum to `emitted` but for the rounding of the frame's dtype.
+
+    Notes
+    -----
+    Lights are summed in full, without lightcuts.
+    On the Cornell box at 512 x 512 it takes six times as long as the picture.
+    """
+    settings = dataclasses.replace(with_clamp(settings), lightcuts=None)
+    footprint = footprints(frame, settings.lights, settings.pairs)
+    picture = sii(frame, settings)
+    between = sii(frame, replaced(settings, {"half_resolution": False})) - picture if settings.half_resolution else None
+    return account(frame, settings.lights, settings.pairs, footprint, picture,
+                   {"cut": _cut(frame, settings, footprint), "interpolated": between})
+
+
+def _cut(frame: "Frame", settings: SiiSettings, footprint: Array | None) -> Array | None:
+    """Return what the range leaves out, and what a mesh that does not enclose it leaves out besides."""
+    if settings.reach.cut is None:
+        return None
+    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    cut = cut_irradiance(receivers, choose_lights(frame, settings.lights), settings, footprint)
+    bound = settings.reach.bound
+    if isinstance(bound, MeshBound) and not bound.inflate:
+        cut = cut + sii(frame, replaced(settings, {"bound_inflate": True})) - sii(frame, settings)
+    return cut

@@ -17,13 +17,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 LEAST_WEIGHT = 0.05  # of 1, sum of weights below which a pixel is evaluated by itself
 

@@ -1,27 +1,24 @@
 """Lobes of glossy receivers by pixel lights: L_s = sum over lights of f_s I cos / r^2, over the pairs that count."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import with_clamp
-from refgi.pairs.glossy import as_receivers, glossy_radiance, summed
+from refgi.pairs.glossy import as_receivers, glossy_radiance, glossy_summed
 from refgi.pairs.irradiance import Receivers, checked
-from refgi.rsm.buffers.glossy import GlossyPoints, spread_over_picture
+from refgi.rsm.buffers.leaving import GlossyPoints, spread_over_picture
 from refgi.settings import replaced
 from refgi.splat.sii.reach.lists import LightLists
-from refgi.splat.sii.reach.reference_length import with_reference_length
+from refgi.splat.sii.reach.threshold import with_reference_length
 from refgi.splat.sii.settings import FullBound, SiiSettings, TangentBound
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.lights import PixelLights
-
-Array = npt.NDArray[Any]
-
 
 def sii_lobes(frame: "Frame", settings: SiiSettings) -> Array:
     """Return the radiance towards the eye that receivers' lobes make of the pixel lights of `sii`.
@@ -60,7 +57,7 @@ def glossy_in_range(
     lists = LightLists(packed, settings, False, 1, None)
     ranges = lists.diffuse, lists.lobes
     if isinstance(settings.reach.bound, FullBound):
-        return summed(points, packed, ranges, width)
+        return glossy_summed(points, packed, ranges, width)
 
     def listed(position: Array, normal: Array) -> tuple[Array | None, Array | None]:
         diffuse = lobes = None
@@ -71,4 +68,4 @@ def glossy_in_range(
             ((_, lobes),) = lists.of_lobes(position, normal, places)
         return diffuse, lobes
 
-    return summed(points, packed, ranges, width, listed)
+    return glossy_summed(points, packed, ranges, width, listed)

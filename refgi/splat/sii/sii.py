@@ -8,33 +8,28 @@ the same to the bit for every bound. `cut_irradiance` sums what the cut removes.
 Symbols: B = I(w) / r^2 (W/m^2), the irradiance a light causes at most, I_low the threshold (W/m^2).
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import with_clamp
+from refgi.pairs.estimates import report_sampling, thinned, warn_of_clamp
 from refgi.pairs.irradiance import Receivers, checked, irradiance, over_receivers
 from refgi.pairs.lobe_sum import add_lobes
-from refgi.pairs.loss import thinned, warn_of_clamp
 from refgi.pairs.ranged_sum import LANES, sum_pairs_in_range, sum_weighted_pairs
-from refgi.pairs.sampling import report_sampling
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.splat.sii.half_resolution import half_resolution
 from refgi.splat.sii.reach.lists import EVERY, LightLists, Some, listed_pairs
-from refgi.splat.sii.reach.reference_length import with_reference_length
-from refgi.splat.sii.reach.threshold import warn_of_cut
+from refgi.splat.sii.reach.threshold import warn_of_cut, with_reference_length
 from refgi.splat.sii.settings import SiiSettings
 from refgi.stages import skip, stage, tally
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.lights import PixelLights
     from refgi.rsm import Projection
-
-Array = npt.NDArray[Any]
-
 
 def sii(frame: "Frame", settings: SiiSettings) -> Array:
     """Light every pixel by pixel lights.

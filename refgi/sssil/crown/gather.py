@@ -10,21 +10,40 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
 from refgi.skips import left_out
-from refgi.sssil.crown.add import DISC, ROWS, TEXEL, WIDE, add_two, close_group, disc_texels, form_of
-from refgi.sssil.crown.emitters import BLOCK, PLANES, Emitters, dark_ends, pack
-from refgi.sssil.crown.pattern import shared_offsets
-from refgi.sssil.crown.points import level_key, pixel_key, row_key, sample_points, sample_weight, shift_of, shifted
+from refgi.sssil.crown.form_factor import (
+    BLOCK,
+    DISC,
+    PLANES,
+    ROWS,
+    TEXEL,
+    WIDE,
+    Emitters,
+    add_two,
+    close_group,
+    dark_ends,
+    disc_texels,
+    form_of,
+    pack,
+)
+from refgi.sssil.crown.pattern import (
+    level_key,
+    pixel_key,
+    row_key,
+    sample_points,
+    sample_weight,
+    shared_offsets,
+    shift_of,
+    shifted,
+)
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from refgi.stages import stage, tally
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 BAND = 4  # rows that a thread takes at once
 GROUP = 256  # samples that are summed before they are added to the total

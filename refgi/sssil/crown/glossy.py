@@ -17,18 +17,16 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.lobes import receiver_lobe
-from refgi.rsm.buffers.glossy import GlossyPoints
+from refgi.radiometry import receiver_lobe
+from refgi.rsm.buffers.leaving import GlossyPoints
 from refgi.rsm.raster.projection import Projection
 from refgi.sampling import FIRST_STEP, SECOND_STEP, hash_bits
-from refgi.sssil.crown.add import disc_texels, form_factor
-from refgi.sssil.crown.points import TO_UNIT, distance, pixel_key, relative_weight, row_key
+from refgi.sssil.crown.form_factor import disc_texels, form_factor
+from refgi.sssil.crown.pattern import TO_UNIT, distance, pixel_key, relative_weight, row_key
 from refgi.sssil.pyramid.view import Level
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 LEAST_SPREAD = 1.0 / 64  # of s: finer than texels of a crown, and what bounds weights
 

@@ -7,25 +7,22 @@ samples of the settings and by `ENOUGH`.
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.diagnostics import asked
 from refgi.jit import kernel, prange
+from refgi.pairs.estimates import lost_share, sample_pixels, warn_of_loss
 from refgi.pairs.irradiance import Receivers
-from refgi.pairs.loss import lost_share, sample_pixels, warn_of_loss
 from refgi.settings import replaced
-from refgi.sssil.crown.add import disc_texels, form_of, term
+from refgi.sssil.crown.form_factor import disc_texels, form_of, term
 from refgi.sssil.crown.gather import level_factor
 from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings, SamplingSettings
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 ENOUGH = 256  # samples that lose next to nothing
 FEW = 32  # more lose 3 % at most (docs/methods/hssil.md), which is not worth an estimate

@@ -6,16 +6,13 @@ needs the diagonal of the picture. Together the crowns sample each offset from a
 
 import math
 import warnings
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import RefgiWarning
 from refgi.sssil.crown.pattern import samples_at, shared_offsets
 from refgi.sssil.settings import SamplingSettings
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 RECEIVERS = 256  # rows of receivers, or receivers, whose samples are counted
 

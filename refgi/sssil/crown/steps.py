@@ -5,21 +5,28 @@ Each texel of a tile adds its own shift modulo 1.
 """
 
 import math
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.sssil.crown.gather import level_factor, sum_of_samples
-from refgi.sssil.crown.pattern import PHASES, every_texel, mirrored_offsets, tile_offsets
-from refgi.sssil.crown.points import key_shift, level_key, pixel_key, row_key, tile_shifts
-from refgi.sssil.crown.points import sample_points as points_of
+from refgi.sssil.crown.pattern import (
+    PHASES,
+    every_texel,
+    key_shift,
+    level_key,
+    mirrored_offsets,
+    pixel_key,
+    row_key,
+    tile_offsets,
+    tile_shifts,
+)
+from refgi.sssil.crown.pattern import sample_points as points_of
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import Density, HssilSettings
 from refgi.stages import stage
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 BELOW_1 = 1.0 - 2.0**-24  # largest number below 1 that float32 holds
 
 

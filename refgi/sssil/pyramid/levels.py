@@ -11,19 +11,16 @@ from refgi.errors import expect
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection
 from refgi.skips import left_out
-from refgi.sssil.pyramid.closest import NO_PIXEL
-from refgi.sssil.pyramid.fill import fill_coarser_level, fill_first_level
+from refgi.sssil.pyramid.fill import NO_PIXEL, fill_coarser_level, fill_first_level
 from refgi.sssil.pyramid.mean import average_pixels, average_texels
 from refgi.sssil.pyramid.resample import draw_pixels, draw_texels
 from refgi.sssil.pyramid.view import Level, Picture, View, view_of
 from refgi.sssil.settings import HssilSettings, SamplingSettings
 from refgi.stages import skip, stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-
-Array = npt.NDArray[Any]
-
 
 def pyramid(frame: "Frame", settings: HssilSettings) -> list[Level]:
     """Return what a camera sees at the resolutions at which light is gathered.

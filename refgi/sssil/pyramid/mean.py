@@ -9,15 +9,12 @@ mirrored sums.
 """
 
 import math
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.sssil.pyramid.view import Level, Picture, View, centre, pixel_surface
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 # lines: weight; weight times radiance, depth, position, normal
 RADIANCE, DEPTH, POSITION, NORMAL, LINES = 1, 4, 5, 8, 11

@@ -12,14 +12,12 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.sampling import hash_bits
-from refgi.sssil.crown.points import TO_UNIT, level_key, pixel_key, row_key
+from refgi.sssil.crown.pattern import TO_UNIT, level_key, pixel_key, row_key
 from refgi.sssil.pyramid.view import Level, Picture, View, centre, pixel_surface, three
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 STREAM = np.uint32(0x165667B1)  # keeps draws apart from the shifts of samples, which have the same keys
 TASKS = 16  # blocks of rows that threads take, whatever their number

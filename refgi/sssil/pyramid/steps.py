@@ -10,10 +10,8 @@ Of each texel's pixels the closest is kept, or all are averaged, or radiance alo
 - size: Rows and columns of the picture.
 """
 
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection
@@ -22,8 +20,8 @@ from refgi.sssil.pyramid.levels import empty_level
 from refgi.sssil.pyramid.mean import average_pixels, average_texels
 from refgi.sssil.pyramid.view import Level, Picture, View, view_of
 from refgi.stages import stage
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 Size = tuple[int, int]  # rows and columns of the picture
 Closest = tuple[Array, Array, Array, Array, Array, Array]
 Means = tuple[Array, Array, Array, Array, Array]

@@ -12,13 +12,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel
 from refgi.rsm.raster.projection import Projection
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 ROUNDING = 1e-12  # of a tangent: 90 degrees in radians are not quite 90 degrees
 GRAZING = 1e-6  # least ratio of the cosines: below, it is rounding of a float32 normal

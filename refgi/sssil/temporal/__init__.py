@@ -6,7 +6,6 @@ of the last; `refgi.scene.path` moves camera, lights and objects through one sce
 """
 
 from refgi.sssil.settings import TemporalSettings
-from refgi.sssil.temporal.sequence import Sequence, SequenceFrame
-from refgi.sssil.temporal.still import still_frame
+from refgi.sssil.temporal.sequence import Sequence, SequenceFrame, still_frame
 
 __all__ = ["Sequence", "SequenceFrame", "TemporalSettings", "still_frame"]

@@ -1,9 +1,9 @@
-"""Sequence of frames with temporal coherence (Sec. 3.3), each blended with the one before."""
+"""Sequence of frames with temporal coherence (Sec. 3.3), each blended with the one before; stills of it."""
 
+import collections
+import itertools
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
-
-import numpy.typing as npt
 
 from refgi.diagnostics import FrameSession
 from refgi.errors import expect
@@ -13,8 +13,8 @@ from refgi.settings import flat, replaced
 from refgi.sssil.settings import LAST_SEED, HssilSettings, TemporalSettings
 from refgi.sssil.temporal.filter import Filtered, History, first_light, history_of, temporal_filter, with_frames
 from refgi.stages import Memory, reusing, sharing
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 Method = Callable[[Frame, Any], Array]
 Lobes = Callable[[Frame, Any], Array | None]
 
@@ -123,7 +123,7 @@ def _hssil() -> Method:
 
 
 def _hssil_lobes(frame: Frame, settings: Any) -> Array | None:
-    from refgi.sssil.lobes import hssil_lobes
+    from refgi.sssil.hssil import hssil_lobes
 
     return hssil_lobes(frame, settings)
 
@@ -134,3 +134,36 @@ def seeded(settings: Any, number: int) -> Any:
     if number == 0 or not seeds:
         return settings
     return replaced(settings, {key: (seed + number) % (LAST_SEED + 1) for key, seed in seeds.items()})
+
+
+def still_frame(
+    scene: Scene, settings: Any, temporal: TemporalSettings, frames: int, *, method: Callable[[Frame, Any], Any],
+    lobes: Callable[[Frame, Any], Any] | None = None, **frame_options: Any,
+) -> SequenceFrame:
+    """Render a scene again and again, each frame with other random numbers, and return the last.
+
+    Parameters
+    ----------
+    scene : Scene
+        Camera, lights and objects rest.
+    settings : object
+        Those of the method in the first frame; its seed advances by 1 a frame.
+    temporal : TemporalSettings
+        The temporal filter.
+    frames : int
+        How many, at least 1.
+    method : callable
+        Function of a frame and settings that gives its indirect irradiance.
+    lobes : callable, optional
+        As for `Sequence`.
+    **frame_options : object
+        Passed to `Frame`: width, height, dtype, rsm_resolution, shadows.
+
+    Returns
+    -------
+    SequenceFrame
+        The last frame, filtered.
+    """
+    sequence = Sequence(itertools.repeat(scene, frames), settings, temporal, method=method, lobes=lobes,
+                        **frame_options)
+    return collections.deque(sequence, maxlen=1).pop()

@@ -1,26 +1,21 @@
 """The temporal filter one step after the other: reprojection, entering points, clamp of earlier light, blend (3.3)."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.rsm.raster.projection import Projection
 from refgi.scene.model import Geometry
 from refgi.sssil.reprojection import SourceView, fetched
 from refgi.sssil.settings import Fetch, TemporalSettings
-from refgi.sssil.temporal.entering import fetch_entering
-from refgi.sssil.temporal.filter import History, relative_to
+from refgi.sssil.temporal.filter import History, clamp_to_neighbourhood, relative_to
 from refgi.sssil.temporal.filter import blend as blended
-from refgi.sssil.temporal.motion import previous_points
-from refgi.sssil.temporal.neighbourhood import clamp_to_neighbourhood
+from refgi.sssil.temporal.motion import fetch_entering, previous_points
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-
-Array = npt.NDArray[Any]
-
 
 @stage("sssil.reprojection", kept=False)
 def reprojection(

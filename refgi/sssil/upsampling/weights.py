@@ -15,14 +15,12 @@ it is the one that leaves linear functions linear, as the bilinear weights of tw
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.elementary import pow
 from refgi.jit import kernel
-from refgi.sssil.upsampling import lines, receivers
+from refgi.sssil.upsampling import lines
 from refgi.sssil.upsampling.lines import SPAN, WIDE
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 TOTAL, MEANS = 3 * SPAN, 4 * SPAN  # after three lines of light
 LEAST = 1e-20  # sum of weights, of tents that add up to 1, that is too small to divide by
@@ -69,8 +67,8 @@ def average(
     u_rising, u_level, u_falling = _tents(tents, BEFORE, np.uint64(place))
     d_rising, d_level, d_falling = _tents(tents, AFTER, np.uint64(place))
     for i in range(np.uint64(wide)):
-        across, plane = pixels[np.uint64(receivers.ACROSS) + i], pixels[np.uint64(receivers.PLANE) + i]
-        down = pixels[np.uint64(receivers.DOWN) + i]
+        across, plane = pixels[np.uint64(lines.ACROSS) + i], pixels[np.uint64(lines.PLANE) + i]
+        down = pixels[np.uint64(lines.DOWN) + i]
         b_rising, b_level, b_falling = _tents(tents, BEFORE, i)
         a_rising, a_level, a_falling = _tents(tents, AFTER, i)
         before = _by_slope_sign(across, b_rising, b_level, b_falling)
@@ -125,10 +123,10 @@ def _row_weights(texels: Array, pixels: Array, i: Any, side: Any, plane: Any, ac
 
 @kernel
 def _texel_weight(texels: Array, at: Any, pixels: Array, i: Any, plane: Any, power: Any) -> Any:
-    n, m, span = np.uint64(receivers.NORMAL) + i, np.uint64(lines.NORMAL) + at, np.uint64(SPAN)
+    n, m, span = np.uint64(lines.RECEIVER_NORMAL) + i, np.uint64(lines.NORMAL) + at, np.uint64(SPAN)
     cosine = (pixels[n] * texels[m] + pixels[n + span] * texels[m + span]
               + pixels[n + span + span] * texels[m + span + span])
-    off = (texels[np.uint64(lines.NEARNESS) + at] - plane) * pixels[np.uint64(receivers.SCALE) + i]
+    off = (texels[np.uint64(lines.NEARNESS) + at] - plane) * pixels[np.uint64(lines.SCALE) + i]
     return bilateral_weight(cosine, off, power)
 
 

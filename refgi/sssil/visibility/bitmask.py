@@ -11,33 +11,34 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.sssil.crown.add import disc_texels, form_factor, form_of
-from refgi.sssil.crown.emitters import length_scale
+from refgi.sssil.crown.form_factor import disc_texels, form_factor, form_of, length_scale
 from refgi.sssil.crown.gather import level_factor
-from refgi.sssil.crown.points import level_key, pixel_key, row_key
+from refgi.sssil.crown.pattern import level_key, pixel_key, row_key
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import Bitmask, HssilSettings
-from refgi.sssil.visibility.elevation import (
+from refgi.sssil.visibility.slices import (
     AREA,
     INVERSE,
     PLANES,
     L,
     N,
+    SliceCounts,
     direction,
+    fill_slices,
     heights,
     pack,
     sector_mask,
+    slice_counts,
+    slice_offsets,
+    turn_of,
     visibility,
 )
-from refgi.sssil.visibility.slices import SliceCounts, fill_slices, slice_counts, slice_offsets, turn_of
 from refgi.stages import stage, tally
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 PART, TOTAL, HIGHEST, SCRATCH = 0, 6, 9, 10  # lines of scratch: two slices' sums, all sums, largest q so far
 

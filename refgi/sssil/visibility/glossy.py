@@ -7,21 +7,29 @@ marched past in all of them, so that none are drawn by importance.
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.rays import far_offset
-from refgi.sssil.crown.add import disc_texels
+from refgi.sssil.crown.form_factor import disc_texels
 from refgi.sssil.crown.glossy import GlossyReceivers, glossy_transfer
-from refgi.sssil.crown.points import level_key, pixel_key, row_key
+from refgi.sssil.crown.pattern import level_key, pixel_key, row_key
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import Bitmask, HssilSettings
-from refgi.sssil.visibility.elevation import PLANES, direction, heights, pack, sector_mask, visibility
 from refgi.sssil.visibility.rays import Surfels
-from refgi.sssil.visibility.slices import SliceCounts, fill_slices, slice_counts, turn_of
-
-Array = npt.NDArray[Any]
+from refgi.sssil.visibility.slices import (
+    PLANES,
+    SliceCounts,
+    direction,
+    fill_slices,
+    heights,
+    pack,
+    sector_mask,
+    slice_counts,
+    turn_of,
+    visibility,
+)
+from refgi.types import Array
 
 
 class SliceSamples(NamedTuple):

@@ -10,24 +10,29 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import receivers
 from refgi.rays import far_offset
-from refgi.sssil.crown.add import disc_texels, form_factor, form_of
+from refgi.sssil.crown.form_factor import disc_texels, form_factor, form_of
 from refgi.sssil.crown.gather import level_factor
-from refgi.sssil.crown.pattern import shared_offsets
-from refgi.sssil.crown.points import level_key, pixel_key, pixel_offset, row_key, sample_points, sample_weight
+from refgi.sssil.crown.pattern import (
+    level_key,
+    pixel_key,
+    pixel_offset,
+    row_key,
+    sample_points,
+    sample_weight,
+    shared_offsets,
+)
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings, SamplingSettings
 from refgi.stages import report_progress, stage, tally
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-
-Array = npt.NDArray[Any]
 
 BATCH = 1 << 18  # pairs held at a time
 

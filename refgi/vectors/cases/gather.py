@@ -12,11 +12,11 @@ from refgi.scene import SpotLight
 from refgi.settings import of
 from refgi.splat.gather.gather import GatherSettings
 from refgi.splat.gather.steps import gather_steps
-from refgi.vectors.cases.plan import Plan, Plans, cases_of, recorded_plan
-from refgi.vectors.cases.scenes import AWAY, BULB, DOWN, SPOT, SUN, room
+from refgi.types import Array
+from refgi.vectors.cases.scenes import AWAY, BULB, DOWN, SPOT, SUN, Plan, Plans, cases_of, recorded_plan, room
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.recorded import record
-from refgi.vectors.spec import Array, Case
+from refgi.vectors.spec import Case
 
 SQUARE = SpotLight((0.25, 1.5, 0.125), (0.0, -1.0, 0.0), 0.4, math.pi / 4, (3.0, 1.0, 2.0))  # a map of half extent 1
 

@@ -15,8 +15,19 @@ from refgi.settings import of, replaced
 from refgi.sssil.settings import PRESETS, HssilSettings, TemporalSettings
 from refgi.sssil.temporal.filter import History, history_of, with_frames
 from refgi.sssil.temporal.sequence import Sequence, SequenceFrame
-from refgi.vectors.cases.plan import Plan, recorded_plan
-from refgi.vectors.cases.scenes import BULB, DOWN, POLE, RAMP, SPOT, VIEW, coloured, room, stored_scene
+from refgi.vectors.cases.scenes import (
+    BULB,
+    DOWN,
+    POLE,
+    RAMP,
+    SPOT,
+    VIEW,
+    Plan,
+    coloured,
+    recorded_plan,
+    room,
+    stored_scene,
+)
 from refgi.vectors.recipe import Recipe, reading
 from refgi.vectors.recorded import record
 from refgi.vectors.spec import Arrays, Bug, Case, Run, expected_of, kind_of

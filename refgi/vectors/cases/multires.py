@@ -6,8 +6,21 @@ from typing import Any
 from refgi.scene import Camera, Scene, merge
 from refgi.settings import of
 from refgi.splat.multires.settings import ByIrradiance, Criteria, MultiresSettings
-from refgi.vectors.cases.plan import Plan, Plans, cases_of, recorded_plan
-from refgi.vectors.cases.scenes import AWAY, DOWN, FLOOR, SPOT, SUN, WALL, quad, room, stored_scene
+from refgi.vectors.cases.scenes import (
+    AWAY,
+    DOWN,
+    FLOOR,
+    SPOT,
+    SUN,
+    WALL,
+    Plan,
+    Plans,
+    cases_of,
+    quad,
+    recorded_plan,
+    room,
+    stored_scene,
+)
 from refgi.vectors.spec import Case
 
 CLOSE = Camera((1.0, 1.05, 0.95), (-0.4, 0.35, -0.5), (0.1, 1.0, 0.0), math.radians(65))  # fills the picture

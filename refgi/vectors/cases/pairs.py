@@ -3,9 +3,10 @@
 import numpy as np
 
 from refgi.pairs.steps import pairs
+from refgi.types import Array
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.recorded import record
-from refgi.vectors.spec import Array, Case
+from refgi.vectors.spec import Case
 
 COUNT = 160
 

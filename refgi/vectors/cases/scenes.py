@@ -1,13 +1,50 @@
-"""The scenes of the kits: small, without symmetry, with lamps of unequal strength, so that no bug hides in them."""
+"""The scenes of the kits, small and without symmetry, and cases as plans of what they differ in."""
 
 import dataclasses
 import math
-from typing import Any
+from collections.abc import Callable, Mapping
+from functools import partial
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from refgi.frame import Shadows
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, Mesh, PointLight, Scene, SpotLight, merge
-from refgi.vectors.spec import Array
+from refgi.types import Array
+from refgi.vectors.recorded import recorded_case
+from refgi.vectors.spec import Case
+
+
+class Plan(NamedTuple):
+    """A case in the making."""
+
+    what: str
+    scene: Scene
+    size: tuple[int, int]  # columns and rows of the picture
+    maps: int  # texels along the side of a map
+    lights: int = 0  # pixel lights of each map
+    choices: Mapping[str, Any] = MappingProxyType({})  # settings by their keys
+    shadows: Shadows | None = None  # of direct light; None: as a frame has them by default
+
+
+Plans = Mapping[str, Callable[[], Plan]]
+
+
+def cases_of(plans: Plans, make: Callable[[str, Plan], Case]) -> dict[str, Callable[[], Case]]:
+    """Return what makes the planned cases, by id; a scene is built when its case is."""
+    def made(id: str) -> Case:
+        return make(id, plans[id]())
+
+    return {id: partial(made, id) for id in plans}
+
+
+def recorded_plan(id: str, plan: Plan, method: str, settings: Any) -> Case:
+    """Return what a method does as planned, from the scene to the indirect irradiance."""
+    return recorded_case(id, plan.scene, method, settings, what=plan.what, indirect=True, width=plan.size[0],
+                         height=plan.size[1], rsm_resolution=plan.maps,
+                         shadows=plan.shadows)
+
 
 # strongest and weakest differ by a factor of 8 and in hue, so that neither order nor channel can be mistaken
 SPOT = SpotLight((0.5, 1.5, 0.625), (-0.6, -0.8, -0.7), 0.4, 0.8, (4.0, 2.6, 1.3))

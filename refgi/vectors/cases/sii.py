@@ -2,8 +2,23 @@
 
 from refgi.settings import of
 from refgi.splat.sii.settings import SiiSettings
-from refgi.vectors.cases.plan import Plan, Plans, cases_of, recorded_plan
-from refgi.vectors.cases.scenes import BEHIND, BULB, DOWN, POLE, RAMP, SPOT, SUN, coloured, far_away, room, sheet
+from refgi.vectors.cases.scenes import (
+    BEHIND,
+    BULB,
+    DOWN,
+    POLE,
+    RAMP,
+    SPOT,
+    SUN,
+    Plan,
+    Plans,
+    cases_of,
+    coloured,
+    far_away,
+    recorded_plan,
+    room,
+    sheet,
+)
 from refgi.vectors.spec import Case
 
 

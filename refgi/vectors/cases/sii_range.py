@@ -7,8 +7,7 @@ import numpy as np
 from refgi.splat.sii.reach.steps import ellipsoids
 from refgi.splat.sii.settings import SiiSettings
 from refgi.vectors.cases import sii
-from refgi.vectors.cases.plan import Plan, Plans, cases_of, recorded_plan
-from refgi.vectors.cases.scenes import AWAY, DOWN, SPOT, SUN, room
+from refgi.vectors.cases.scenes import AWAY, DOWN, SPOT, SUN, Plan, Plans, cases_of, recorded_plan, room
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.recorded import record
 from refgi.vectors.spec import Case

@@ -5,8 +5,7 @@ from typing import Any
 from refgi.scene import Scene
 from refgi.settings import of
 from refgi.truth.settings import TruthSettings
-from refgi.vectors.cases.plan import Plan, recorded_plan
-from refgi.vectors.cases.scenes import BULB, SPOT, SUN, room
+from refgi.vectors.cases.scenes import BULB, SPOT, SUN, Plan, recorded_plan, room
 from refgi.vectors.spec import Case
 
 SIZE = (20, 14)  # columns, rows

@@ -7,8 +7,7 @@ from typing import Any
 from refgi.cluster.settings import ValSettings
 from refgi.scene import Camera, Scene, SpotLight
 from refgi.settings import of
-from refgi.vectors.cases.plan import Plan, Plans, cases_of, recorded_plan
-from refgi.vectors.cases.scenes import BULB, SPOT, far_away, kerbs, room, stacked
+from refgi.vectors.cases.scenes import BULB, SPOT, Plan, Plans, cases_of, far_away, kerbs, recorded_plan, room, stacked
 from refgi.vectors.spec import Case
 
 SEED = 1  # of the lights' shifts: without one, points lie on the borders of texels

@@ -2,8 +2,7 @@
 
 from refgi.settings import of
 from refgi.truth.vpl import VplSettings
-from refgi.vectors.cases.plan import Plan, Plans, cases_of, recorded_plan
-from refgi.vectors.cases.scenes import AWAY, DOWN, SPOT, SUN, room
+from refgi.vectors.cases.scenes import AWAY, DOWN, SPOT, SUN, Plan, Plans, cases_of, recorded_plan, room
 from refgi.vectors.spec import Case
 
 

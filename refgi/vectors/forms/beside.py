@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from refgi.vectors.edits import Edits, edited
-from refgi.vectors.rows import Form
-from refgi.vectors.spec import Array, Arrays, Bug, Run
+from refgi.types import Array
+from refgi.vectors.rows import Edits, Form, edited
+from refgi.vectors.spec import Arrays, Bug, Run
 
 Arguments = Mapping[str, Any]
 Names = Mapping[str, str]  # leaf of a stage's parameters or output: the case's name of that array

@@ -7,8 +7,8 @@ import numpy as np
 from refgi.literal import gather
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, PERSPECTIVE, Projection, project
 from refgi.splat.gather.interpolation import LEAST_SIMILAR, coarse_pixels
+from refgi.types import Array
 from refgi.vectors.forms.beside import Arguments, Described, form_of, own
-from refgi.vectors.spec import Array
 
 KINDS = {PERSPECTIVE: "perspective", ORTHOGRAPHIC: "orthographic", PARABOLOID: "paraboloid"}
 SHOWN = {"triangle_id": "covered"}

@@ -4,9 +4,10 @@ import numpy as np
 
 from refgi.literal import lights
 from refgi.literal.warp import warp as literal_warp
+from refgi.types import Array
 from refgi.vectors.forms.beside import Arguments, Described, Names, form_of, own
 from refgi.vectors.recipe import reading
-from refgi.vectors.spec import Array, Run
+from refgi.vectors.spec import Run
 
 
 def importance(arguments: Arguments) -> Described:

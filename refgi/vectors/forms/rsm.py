@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from refgi.literal import buffers, direct, light_flux, val_areas
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
-from refgi.scene.lamps import Lamp
+from refgi.scene.light import Lamp
 from refgi.scene.model import Light
 from refgi.vectors.bounds import ROUNDING
 from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, ids, own, written

@@ -5,10 +5,11 @@ import numpy as np
 from refgi.literal import hssil_crown, hssil_levels, upsampling
 from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.sssil.settings import Bilateral
+from refgi.types import Array
 from refgi.vectors.forms.beside import Arguments, Described, Names, form_of, own
 from refgi.vectors.recipe import reading, writing
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Array, Arrays, Bug, Run
+from refgi.vectors.spec import Arrays, Bug, Run
 
 EYE = "positions are relative to the eye, z times the ray of depth 1 through the pixel's centre (E-HSS-10)"
 AREA = "E-HSS-06"

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from refgi.settings import flat, replaced
+from refgi.types import Array
 from refgi.vectors.forms.beside import Arguments, Described, Names
 from refgi.vectors.recipe import Change, reading, writing
-from refgi.vectors.spec import Array, Arrays, Bug, Run
+from refgi.vectors.spec import Arrays, Bug, Run
 
 RADIOMETRY = "docs/radiometry: E = integral of L cos over the hemisphere, L = albedo/pi of the direct irradiance there"
 ESTIMATE = {"tier": "T3", "paper": RADIOMETRY}

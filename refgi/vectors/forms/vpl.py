@@ -1,8 +1,9 @@
 """Literal forms of stages of pixel lights with visibility, by rays and by imperfect shadow maps."""
 
 from refgi.literal import imperfect, vpl
+from refgi.types import Array
 from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, own
-from refgi.vectors.spec import Array, Arrays, Run
+from refgi.vectors.spec import Arrays, Run
 
 LIFT = 1e-3  # m: ports lift the ends of their rays off the surfaces by up to that; what it decides is masked
 MAPS = "Ritschel et al. 2008, Sec. 3"

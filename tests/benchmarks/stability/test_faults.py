@@ -154,15 +154,15 @@ def test_a_full_disk_leaves_nothing_in_the_cache(tmp_path, monkeypatch):
     (64, True, "compare", False), (None, False, "render", False), (1, False, "scenes", False),
     (-5, True, "warm", True)])
 def test_a_limit_of_memory_is_told_before_libraries_are_loaded(monkeypatch, left, loaded, verb, refused):
-    from refgi.cli import room
+    from refgi.cli import group
 
-    monkeypatch.setattr(room, "_left", lambda: left if left is None else left << 20)
-    monkeypatch.setattr(room.sys, "modules", {"scipy.spatial": None} if loaded else {})
+    monkeypatch.setattr(group, "_left", lambda: left if left is None else left << 20)
+    monkeypatch.setattr(group.sys, "modules", {"scipy.spatial": None} if loaded else {})
     if refused:
         with pytest.raises(InputError, match=f"leaves {max(0, left)} MiB, {verb} needs"):
-            room.require_room(verb)
+            group.require_room(verb)
     else:
-        room.require_room(verb)
+        group.require_room(verb)
 
 
 def test_every_command_has_its_faults():

@@ -7,7 +7,7 @@ import pytest
 from benchmarks.stability import pictures, runner, sameness
 from benchmarks.stability.hostile import Hostile, hostile, shrunk
 from benchmarks.stability.promise import Task
-from refgi.stress.rows import Row, over_scenes
+from refgi.stress.promises import Row, over_scenes
 
 pytestmark = pytest.mark.slow  # tests/benchmarks/test_smoke.py runs a task of each part
 

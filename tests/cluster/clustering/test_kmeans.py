@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.clustering.kmeans import Clustering, cluster, in_use, mean_angle
-from refgi.cluster.clustering.metric import angle
+from refgi.cluster.clustering.rounds import angle
 from refgi.errors import InputError
 from refgi.literal.val_areas import kmeans_assign, kmeans_rounds, kmeans_start
 from refgi.stages import observe

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from refgi.cluster.filters.brute import brute_means, brutes, build_brute
-from refgi.cluster.filters.depth_scale import DepthScale
+from refgi.cluster.filters.basis import DepthScale
 from refgi.cluster.filters.mip import build_mip, mip_means, mip_of, mips
+from refgi.cluster.filters.prefilter import brute_means, brutes, build_brute
 from refgi.literal.val_maps import basis, series_depth
 from tests.cluster.filters.sat import build_sat, sat_means, sats
 

@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.cluster.filters.basis import beyond_disc, fill_basis, fill_beyond, normalise
-from refgi.cluster.filters.depth_scale import DepthScale
+from refgi.cluster.filters.basis import DepthScale, beyond_disc, fill_basis, fill_beyond, normalise
 from refgi.jit import kernel
 
 Array = npt.NDArray[Any]

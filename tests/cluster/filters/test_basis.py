@@ -7,8 +7,7 @@ import struct
 import numpy as np
 import pytest
 
-from refgi.cluster.filters.basis import eight_bits, fill_basis, half_precision, normalise, sine_cosine
-from refgi.cluster.filters.depth_scale import DepthScale
+from refgi.cluster.filters.basis import DepthScale, eight_bits, fill_basis, half_precision, normalise, sine_cosine
 from refgi.jit import kernel
 from refgi.literal.val_maps import basis, rounded_level, series_depth
 from refgi.literal.val_series import above_half, frequencies, shade, weights

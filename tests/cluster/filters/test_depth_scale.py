@@ -5,12 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from refgi.cluster.filters.depth_scale import depth_scale, series_depths, series_distance
+from refgi.cluster.filters.basis import depth_scale, series_depths, series_distance
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.settings import ConstantBias, Csm, Pcss
 from refgi.cluster.visibility.pcss import blocker_test
-from refgi.cluster.visibility.search_region import scale_of
-from refgi.cluster.visibility.series import above_half, series
+from refgi.cluster.visibility.search_region import above_half, scale_of, series
 
 EXACT = 1e-14
 OVERSHOOT = 0.1  # of the series, 9 % of its height

@@ -5,7 +5,7 @@ import pytest
 
 from refgi.literal.val_maps import map_depths
 from refgi.literal.val_series import shade, weights
-from refgi.rsm.raster.depth_maps import paraboloid_depth_maps
+from refgi.rsm.raster.paraboloid import paraboloid_depth_maps
 from refgi.scene import load_scene
 from tests.cluster.filters import reads
 

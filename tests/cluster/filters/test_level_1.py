@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from refgi.cluster.filters.basis import eight_bits, fill_basis, half_precision, normalise
-from refgi.cluster.filters.depth_scale import DepthScale, series_depths
+from refgi.cluster.filters.basis import DepthScale, eight_bits, fill_basis, half_precision, normalise, series_depths
 from refgi.jit import kernel
 from tests.cluster.filters import reads
 

@@ -9,7 +9,7 @@ from refgi.cluster.lighting import clustered_irradiance
 from refgi.cluster.lighting.interleave import RUNS, assigned_subsets
 from refgi.cluster.maps.shadow_maps import shadow_maps
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.evaluate import visibility
+from refgi.cluster.visibility.shadow import visibility
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads

@@ -4,7 +4,7 @@ import numpy as np
 
 from refgi.cluster.clustering.rectangle import AreaLights
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.evaluate import visibility
+from refgi.cluster.visibility.shadow import visibility
 from refgi.rsm.raster.projection import paraboloid_projection
 from refgi.settings import of
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.maps.shadow_maps import shadow_maps
-from refgi.cluster.visibility.evaluate import visibility
+from refgi.cluster.visibility.shadow import visibility
 from refgi.literal import val_filters, val_maps, val_series, val_visibility
 from refgi.settings import replaced
 from tests.cluster.reference.edge import EDGE, RECEIVER, SETTINGS, receivers, scene, square_light, width_of

@@ -16,8 +16,8 @@ from refgi.cluster.visibility.search_region import (
     find_search_regions,
     light_constants,
     scale_of,
+    series,
 )
-from refgi.cluster.visibility.series import series
 from refgi.settings import of
 from tests.cluster.filters.sat import build_sat, sat_means, sats
 

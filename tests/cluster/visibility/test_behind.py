@@ -5,7 +5,7 @@ import pytest
 
 from refgi.cluster.maps.shadow_maps import shadow_maps
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.evaluate import visibility
+from refgi.cluster.visibility.shadow import visibility
 from refgi.errors import InputError
 from refgi.rays import Tracer
 from refgi.settings import of

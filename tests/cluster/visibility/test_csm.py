@@ -5,10 +5,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from refgi.cluster.filters.depth_scale import DepthScale
+from refgi.cluster.filters.basis import DepthScale
 from refgi.cluster.settings import ConstantBias, Csm, ValSettings
 from refgi.cluster.visibility.csm import compare_filtered, find_penumbra
-from refgi.cluster.visibility.evaluate import visibility
 from refgi.cluster.visibility.search_region import (
     BIAS,
     DELTA,
@@ -22,9 +21,14 @@ from refgi.cluster.visibility.search_region import (
     D,
     FilterSizing,
     Z,
+    above_half,
     find_search_regions,
+    first_lit,
+    frequencies,
+    series,
+    weights,
 )
-from refgi.cluster.visibility.series import above_half, first_lit, frequencies, series, weights
+from refgi.cluster.visibility.shadow import visibility
 from refgi.settings import of
 from tests.cluster.visibility.plates import (
     are_shares,

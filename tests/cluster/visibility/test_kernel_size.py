@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.evaluate import visibility
-from refgi.cluster.visibility.kernel_size import (
+from refgi.cluster.visibility.pcf import (
     STEEPEST,
     cone_tangent,
     disc,
@@ -16,6 +15,7 @@ from refgi.cluster.visibility.kernel_size import (
     published_tangent,
     solid_angle_tangent,
 )
+from refgi.cluster.visibility.shadow import visibility
 from refgi.literal import val_series, val_visibility
 from refgi.settings import of
 from tests.cluster.visibility.plates import directions, lit_by

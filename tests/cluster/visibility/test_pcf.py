@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.evaluate import visibility
+from refgi.cluster.visibility.shadow import visibility
 from refgi.literal.val_visibility import depth_tests
 from refgi.settings import of
 from tests.cluster.visibility.plates import are_shares, lit_by, map_of_plates, on_plane

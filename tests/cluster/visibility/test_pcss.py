@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from refgi.cluster.filters.depth_scale import DepthScale
+from refgi.cluster.filters.basis import DepthScale
 from refgi.cluster.settings import ConstantBias, ValSettings
-from refgi.cluster.visibility.evaluate import visibility
 from refgi.cluster.visibility.pcss import PcssShadow, blocker_test, compare_texels
 from refgi.cluster.visibility.search_region import (
     DEPTH,
@@ -17,6 +16,7 @@ from refgi.cluster.visibility.search_region import (
     find_search_regions,
     light_constants,
 )
+from refgi.cluster.visibility.shadow import visibility
 from refgi.settings import of
 from tests.cluster.visibility.plates import (
     are_shares,

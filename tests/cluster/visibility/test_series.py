@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.settings import Csm
-from refgi.cluster.visibility.series import above_half, first_lit, plateau, series, weights
+from refgi.cluster.visibility.search_region import above_half, first_lit, plateau, series, weights
 from refgi.literal import val_series as literal
 
 EXACT = 1e-13  # sums of up to 64 sines in another order

@@ -6,9 +6,9 @@ import json
 import numpy as np
 import pytest
 
-from refgi.compare.maps import luminance
 from refgi.compare.page.album import Judge, Picture, View, album
-from refgi.compare.page.budget import COARSEST, FIRST, SECOND, THIRD, Store
+from refgi.compare.page.floats import COARSEST, FIRST, SECOND, THIRD, Store
+from refgi.compare.pictures import luminance
 from tests.compare.page.test_floats import unpacked
 
 HEIGHT, WIDTH = 40, 50

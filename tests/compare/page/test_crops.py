@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from refgi.compare.page.crops import LEAST_SIDE, worst_crops
+from refgi.compare.page.album import LEAST_SIDE, worst_crops
 
 COVERED = np.ones((64, 96), bool)
 

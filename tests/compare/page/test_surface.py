@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from refgi.compare.page.surface import SurfaceFit, follows
+from refgi.compare.page.album import SurfaceFit, follows
 from refgi.errors import InputError
 
 RNG = np.random.default_rng(5)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from refgi.compare.maps import luminance
+from refgi.compare.pictures import luminance
 from refgi.compare.report import TIMES, page
 from refgi.image import tone_map
 from tests.compare.conftest import make_comparison, make_scene

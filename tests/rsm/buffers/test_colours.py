@@ -146,13 +146,13 @@ def test_texture_and_colours_multiply():
 
 def test_faces_take_their_colours_along():
     """Mirrored, merged with plain meshes, without flat faces, chosen."""
+    from refgi.scene.motion import transformed_all
     from refgi.scene.repair import repaired
-    from refgi.scene.transform import transformed_all
 
     mesh = coloured(rectangle((-1, -1, 1), (2, 0, 0), (0, 0, -2), WHITE, "floor"))
     mirrored, = transformed_all([mesh], np.diag([-1.0, 1, 1, 1])[None])
-    for face, colours in zip(mirrored.faces, mirrored.colours, strict=True):
-        np.testing.assert_allclose(colours, ramp(mirrored.vertices[face] * (-1, 1, 1)))
+    for face, attributes in zip(mirrored.faces, mirrored.colours, strict=True):
+        np.testing.assert_allclose(attributes, ramp(mirrored.vertices[face] * (-1, 1, 1)))
     flat = dataclasses.replace(mesh, faces=np.vstack([[[0, 0, 1]], mesh.faces]),
                                colours=np.concatenate([np.zeros((1, 3, 3)), mesh.colours]))
     np.testing.assert_array_equal(repaired(flat, "mesh")[0].colours, mesh.colours)
@@ -172,10 +172,10 @@ def test_factors_beyond_1_are_refused():
 
 
 def test_scenes_without_colours_run_no_kernel_of_them(monkeypatch):
-    from refgi.rsm.buffers import colours
+    from refgi.rsm.buffers import attributes
 
     for name in ("_tint_rows", "_tint_texels"):
-        monkeypatch.setattr(colours, name, None)
+        monkeypatch.setattr(attributes, name, None)
     scene = box(SPOT, paint=lambda mesh: mesh)
     assert scene.geometry.colours is None
     assert (Frame(scene).gbuffer.albedo[:, Frame(scene).gbuffer.covered] == np.float32(0.8)).all()

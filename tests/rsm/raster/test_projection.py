@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from refgi.rsm.buffers.texel_rays import texel_ray
+from refgi.rsm.buffers.surfaces import texel_ray
 from refgi.rsm.raster.projection import (
     camera_projection,
     cube_projection,

@@ -13,14 +13,13 @@ import pytest
 
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene import Geometry, Material, Mesh, Texture, load_scene, merge
+from refgi.scene.files import reading_as
 from refgi.scene.gltf import read_gltf
 from refgi.scene.model import Scene
-from refgi.scene.motion import moved, with_own_vertices
+from refgi.scene.motion import moved, transformed_all, with_own_vertices
 from refgi.scene.obj import read_obj
-from refgi.scene.reading import reading_as
 from refgi.scene.repair import repaired
 from refgi.scene.texture.image import Image
-from refgi.scene.transform import transformed_all
 from tests.scene.samples import BUFFER, glb_bytes, gltf_tree, write_scene
 
 CODES = np.random.default_rng(1).integers(0, 256, (4, 6, 3), np.uint8)

@@ -12,7 +12,7 @@ from PIL import Image as Pictures
 
 from refgi.errors import InputError
 from refgi.scene.texture.image import Image, decoded, image_file, srgb_table
-from refgi.scene.texture.pyramid import level_sizes, next_level
+from refgi.scene.texture.table import level_sizes, next_level
 from tests.naive import textures as naive
 
 ROUNDING = 1e-15  # of one power in float64

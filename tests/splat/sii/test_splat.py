@@ -15,9 +15,8 @@ from refgi.pairs.ranged_sum import LANES, range_factor
 from refgi.scene import Material, load_scene
 from refgi.settings import of, replaced
 from refgi.splat import PairSettings, Receivers, irradiance
-from refgi.splat.sii.reach.bounds import light_solids
+from refgi.splat.sii.reach.bounds import covered_pixels, light_solids, screen_quads
 from refgi.splat.sii.reach.fragments import fragments, gather_bits
-from refgi.splat.sii.reach.screen_bounds import covered_pixels, screen_quads
 from refgi.splat.sii.reach.threshold import low_irradiance
 from refgi.splat.sii.settings import SiiSettings
 from refgi.splat.sii.sii import cut_irradiance, splat

@@ -13,16 +13,18 @@ from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import load_scene
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.scene.model import BLACK, Camera, Material, Scene, SpotLight, merge
-from refgi.sssil.camera_transport import (
+from refgi.sssil.cameras import (
     Points,
     Views,
+    _candidate_views,
+    _wide_views,
     equal_flux_points,
+    place_cameras,
     sampling_quality,
     transport,
     unoccluded,
     visible_points,
 )
-from refgi.sssil.cameras import _candidate_views, _wide_views, place_cameras
 from refgi.stages import observe
 from tests.sssil.cameras.hidden_side import BACK, HALF_ANGLE, LIGHT, hidden_side
 

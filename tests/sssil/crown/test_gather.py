@@ -11,7 +11,7 @@ from refgi.jit import threads
 from refgi.literal import hssil_crown as literal
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
-from refgi.sssil.crown.add import DISC
+from refgi.sssil.crown.form_factor import DISC
 from refgi.sssil.crown.gather import _list_emitting, gather
 from refgi.sssil.crown.pattern import samples_at
 from refgi.sssil.pyramid.view import Level

@@ -7,7 +7,7 @@ import pytest
 from refgi.errors import InputError
 from refgi.jit import threads
 from refgi.settings import of, replaced
-from refgi.sssil.crown.points import level_key, pixel_key, row_key
+from refgi.sssil.crown.pattern import level_key, pixel_key, row_key
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.visibility.bitmask import bitmask_gather

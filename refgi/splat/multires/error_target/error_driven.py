@@ -13,29 +13,27 @@ the mean, would be found by no sample. So are lobes. Subsplats carry the rest.
 """
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.draws import ERROR_SAMPLES, draws
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.pairs.settings import AutoLightcuts, Lightcuts
+from refgi.sampling import ERROR_SAMPLES, draws
 from refgi.splat.multires.error_target.interpolate import surface_levels
-from refgi.splat.multires.error_target.pixel_sum import PixelSum, unshadowed
+from refgi.splat.multires.error_target.near import PixelSum, unshadowed
 from refgi.splat.multires.error_target.trial import ExactIrradiance, Trials
 from refgi.splat.multires.refinement.grid import Subsplats, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.stages import skip, stage, tally
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.lights import PixelLights
     from refgi.pairs.settings import PairSettings
     from refgi.rsm import GBuffer
     from refgi.splat.multires.settings import ByError
-
-Array = npt.NDArray[Any]
 
 DEVIATIONS = 3.0  # standard errors between the estimate and either bound
 RULE_OF_THREE = 3.0  # samples: what no one of n draws met has, at 95 %, a share below 3 / n

@@ -23,14 +23,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange, threads
 from refgi.rsm.pool import plane
 from refgi.splat.multires.refinement.grid import level_shape, representative
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 FEW_CELLS = 1 << 16  # of a level, that one thread has processed before others are awake
 LEAST_AGREEMENT = 1e-12  # of 1; leaves the plain tent where nothing agrees

@@ -1,27 +1,39 @@
-"""The unbounded part of near pairs, summed at every pixel, and glossy lobes: what no interpolation can carry.
+"""What is summed at a pixel: near pairs without bound, glossy lobes, all lights as they are or under visibility.
 
 E = sum (Phi / pi) min(g, b) + sum (Phi / pi) max(0, g - b), with g the geometry term and b its bound: the first sum is
 bounded and smooth, fit for subsplats; the second, summed here, is not 0 only where r^2 < 1 / b, since g <= 1 / r^2.
 (Bias compensation splits the clamped sum in the same way: Kollig and Keller 2006.) Tiles without near lights cost one
 box test a light. Lobes can be as narrow as a pixel at any distance, so they are summed here as a whole.
+
+Interpolation carries no peak of a near pair, so each sum also says what single pairs give beyond a bound (`near`): the
+part that is added at every pixel. With a shadow ray for each pair that part has rays of its own. Under the soft shadows
+of clusters no pair has a visibility of its own; there the clamp bounds what is near.
 """
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.pairs.irradiance import Receivers
+from refgi.pairs.irradiance import Receivers, add_lights, checked
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.packing import Packed
 from refgi.pairs.pair_sum import NX, SUM, Clamp, X, limits_of, pair_term
+from refgi.pairs.settings import PairSettings
+from refgi.pairs.shadow_rays import BATCH, RayReceivers, Senders, summed
 from refgi.pairs.tiles import block_by_block, put, taken
-from refgi.rsm.pool import plane
+from refgi.rsm.pool import plane, zeros
 from refgi.splat.multires.refinement.grid import level_shape
+from refgi.splat.multires.subsplats.evaluate import ray_receivers, visible_at
 from refgi.stages import stage
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
+if TYPE_CHECKING:
+    from refgi.pairs.pixel_lights import PixelLights
+    from refgi.rays import Tracer
+    from refgi.rsm import GBuffer
+    from refgi.scene import Geometry
 
 SIDE = 16  # pixels along a square that is tested as a whole
 ROWS = 9  # of its tile: position, normal and sums
@@ -190,3 +202,93 @@ def _mark_near(lights: Array, bound: Array, low: Array, high: Array, near: Array
         # g <= c_l / r^3 as well
         near[k] = (square * bound[k] < one) & (cl > zero) & (square * square * square * bound[k] * bound[k] < cl * cl)
     return bool(near.any())
+
+
+class PixelSum(NamedTuple):
+    """A sum of lights at the pixels of a picture, and its peaks."""
+
+    at: Callable[[Array], Array]  # covered pixels, n flat indices -> irradiance (3, n), W/m^2
+    near: Callable[[Receivers, float], NearLight]  # what single lights give all pixels beyond a bound, W/m^2
+
+
+def unshadowed(receivers: Receivers, packed: Packed) -> PixelSum:
+    """Return the sum of packed lights at contiguous receivers, without visibility."""
+
+    def at(pixel: Array) -> Array:
+        points, normals = taken(receivers.position, pixel), taken(receivers.normal, pixel)
+        sums = np.zeros_like(points)
+        add_lights(points, normals, packed, sums)
+        return sums
+
+    return PixelSum(at, lambda points, most: near_light(points, packed, most))
+
+
+def shadowed_by_clusters(at: Callable[[Array], Array]) -> PixelSum:
+    """Return a sum whose lights share the visibility of their clusters; `at` finds it."""
+
+    def near(receivers: Receivers, _: float) -> NearLight:
+        return _nothing_near(receivers)
+
+    return PixelSum(at, near)
+
+
+def shadowed_by_rays(tracer: "Tracer", geometry: "Geometry", buffer: "GBuffer", lights: "PixelLights") -> PixelSum:
+    """Return the sum of `vpl`: a shadow ray for each pair, pairs not clamped.
+
+    `tracer`: the scene's rays. `geometry`: the triangles that the buffer's ids refer to. `lights`: N pixel lights.
+    """
+
+    def near(receivers: Receivers, most: float) -> NearLight:
+        found, width = _nothing_near(receivers), receivers.covered.shape[1]
+        if most <= 0:
+            return found
+        pixel, peaks = _pixels_with_near_pairs(receivers, lights, most), Peaks(most)
+        points = ray_receivers(tracer, geometry, buffer, pixel)
+        values = summed(tracer, points, lights, True, BATCH, None, peaks.keep).astype(receivers.position.dtype)
+        put(found.irradiance, pixel, values)
+        found.has_near[pixel // width // SIDE, pixel % width // SIDE] = True
+        return found._replace(pairs=peaks.pairs)
+
+    return PixelSum(visible_at(tracer, geometry, buffer, lights), near)
+
+
+class Peaks:
+    """What pairs give beyond `most`, a bound of their strongest channel (W/m^2), not all they give; counts them."""
+
+    def __init__(self, most: float) -> None:
+        self._most, self.pairs = most, 0
+
+    def keep(self, _to: RayReceivers, _receivers: tuple[int, int], _senders: Senders, _lights: tuple[int, int],
+             reach: Array, contribution: Array) -> None:
+        """Scale contributions (n, 3), W/m^2, to what exceeds the bound; clear the reach of pairs that keep below it."""
+        _keep_excess(self._most, reach, contribution)
+        self.pairs += int(np.count_nonzero(reach))
+
+
+@kernel(parallel=True)
+def _keep_excess(most: float, reach: Array, contribution: Array) -> None:
+    for i in prange(len(reach)):
+        strongest = max(contribution[i, 0], max(contribution[i, 1], contribution[i, 2]))
+        beyond = reach[i] > 0 and strongest > most
+        reach[i] = 1 if beyond else 0
+        share = 1.0 - most / strongest if beyond else 0.0
+        for c in range(3):
+            contribution[i, c] *= share
+
+
+def _nothing_near(receivers: Receivers) -> NearLight:
+    shape = receivers.covered.shape
+    return NearLight(zeros(receivers.position.shape, receivers.position.dtype),
+                     np.zeros(level_shape(shape[0], shape[1], SIDE.bit_length() - 1), np.bool_), 0)
+
+
+def _pixels_with_near_pairs(receivers: Receivers, lights: "PixelLights", most: float) -> Array:
+    """Return the covered pixels that some light, were nothing in between, gives more than a bound; all with lobes."""
+    packed = checked(receivers, lights, PairSettings(clamp=None), None)
+    if packed.lobes is not None:
+        return np.flatnonzero(receivers.covered)
+    near = near_light(receivers, packed, most)
+    bright = np.repeat(np.repeat(near.has_near, SIDE, axis=0), SIDE, axis=1)
+    bright = bright[: receivers.covered.shape[0], : receivers.covered.shape[1]] & receivers.covered
+    pixel = np.flatnonzero(bright)
+    return pixel[taken(near.irradiance, pixel).any(axis=0)]

@@ -7,19 +7,17 @@ are summed light by light; the result is that of `irradiance` for this light alo
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel
-from refgi.lobes import receiver_lobe
 from refgi.pairs.glossy_sum import ReceiverLobes
 from refgi.pairs.lobe_culling import LIMIT, bound_lobes
-from refgi.pairs.lobe_shape import Widening
 from refgi.pairs.lobe_sum import add_lobe
 from refgi.pairs.packing import Packed
 from refgi.pairs.pair_sum import NX, ROWS, SUM, Clamp, X, limits_of, pair_term
+from refgi.pairs.pixel_lights import Widening
 from refgi.pairs.sphere_sum import TERM, cut_cones, whole_cones
-
-Array = npt.NDArray[Any]
+from refgi.radiometry import receiver_lobe
+from refgi.types import Array
 
 TILE_ROWS = ROWS + 5  # what lobes need
 DIFFUSE, LOBE = 0, 1  # rows of the places

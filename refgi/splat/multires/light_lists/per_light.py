@@ -15,28 +15,30 @@ from refgi.jit import kernel, prange, thread_count, threads
 from refgi.pairs.glossy import glossy_radiance
 from refgi.pairs.glossy_sum import receiver_lobes_of
 from refgi.pairs.irradiance import Receivers, checked
-from refgi.rsm.buffers.glossy import GlossyPoints
+from refgi.rsm.buffers.leaving import GlossyPoints
 from refgi.splat.multires.light_lists.lists import (
+    CellTree,
     ReceiverTree,
     SubsplatLists,
+    cell_tree,
     empty_lists,
+    interior_cells,
     read_leaves,
     refine_for_lights,
+    subsplats_of_leaves,
 )
 from refgi.splat.multires.light_lists.one_light import single_lights
-from refgi.splat.multires.light_lists.tree import CellTree, cell_tree, interior_cells, subsplats_of_leaves
 from refgi.splat.multires.refinement.grid import Subsplats, top_level
 from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
 from refgi.stages import report_progress, stage, tally
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.lights import PixelLights
     from refgi.pairs.settings import PairSettings
     from refgi.rsm import GBuffer
     from refgi.splat.multires.settings import ByIrradiance
-
-Array = npt.NDArray[Any]
 
 BATCH_BYTES = 1 << 28  # bytes for the lists of a batch of lights, unless one light for each thread needs more
 SMALL_PICTURE = 1 << 18  # pixels up to which threads would wait for each other longer than they upsample one light

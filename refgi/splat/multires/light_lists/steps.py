@@ -7,13 +7,18 @@ import itertools
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import PairSettings
-from refgi.splat.multires.light_lists.lists import ReceiverTree, append_children, keep_split
+from refgi.splat.multires.light_lists.lists import (
+    CellTree,
+    ReceiverTree,
+    append_children,
+    cell_tree,
+    interior_cells,
+    keep_split,
+)
 from refgi.splat.multires.light_lists.per_light import threshold_of
-from refgi.splat.multires.light_lists.tree import CellTree, cell_tree, interior_cells
 from refgi.splat.multires.refinement.grid import Subsplats, representatives, top_level
 from refgi.splat.multires.refinement.steps import subsplats_of
 from refgi.splat.multires.settings import Representative, Upsampling
@@ -21,12 +26,11 @@ from refgi.splat.multires.subsplats.evaluate import points_of, sum_at
 from refgi.splat.multires.subsplats.steps import area_read, arrays_of
 from refgi.splat.multires.subsplats.upsample import picture_of
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rsm import GBuffer
     from refgi.splat.multires.settings import ByIrradiance
-
-Array = npt.NDArray[Any]
 Levels = tuple[Array, ...]
 
 

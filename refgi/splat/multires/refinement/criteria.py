@@ -11,11 +11,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.splat.multires.refinement.derivatives import curvatures, depth_slopes
-from refgi.splat.multires.refinement.mipmap import (
+from refgi.splat.multires.refinement.grid import (
     COLUMNS,
     ROWS,
     START,
@@ -27,12 +26,11 @@ from refgi.splat.multires.refinement.mipmap import (
     rows_of,
 )
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rsm import GBuffer
     from refgi.splat.multires.settings import Chord, Criteria, DepthCriterion, DepthRange, DepthSlope, NormalRange, Rate
-
-Array = npt.NDArray[Any]
 CHANNELS = {"depth": ("depth",), "derivative": ("depth",), "normal": ("normal",), "curvature": ("normal", "position")}
 CHUNK = 4096  # cells that a thread takes at once
 

@@ -10,10 +10,9 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-from refgi.splat.multires.refinement.mipmap import (
+from refgi.splat.multires.refinement.grid import (
     COLUMNS,
     ROWS,
     Mipmap,
@@ -24,8 +23,7 @@ from refgi.splat.multires.refinement.mipmap import (
     rows_of,
 )
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 # rows of pairs that a thread keeps: within a row, their distances; from BELOW on two rows of pairs with the row below,
 # taking turns

@@ -3,9 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.splat.multires.refinement.cells import CellStates, classify_cells
 from refgi.splat.multires.refinement.criteria import (
     depth_ranges,
     mark_curvatures,
@@ -15,17 +13,15 @@ from refgi.splat.multires.refinement.criteria import (
     normal_ranges,
 )
 from refgi.splat.multires.refinement.derivatives import curvatures, depth_slopes
-from refgi.splat.multires.refinement.grid import Subsplats, level_shape
-from refgi.splat.multires.refinement.mipmap import START, element_count, layout, level_views
-from refgi.splat.multires.refinement.refine import depth_first, pass_by_pass
+from refgi.splat.multires.refinement.grid import START, Subsplats, element_count, layout, level_shape, level_views
+from refgi.splat.multires.refinement.refine import CellStates, classify_cells, depth_first, pass_by_pass
 from refgi.splat.multires.settings import Chord, DepthRange, DepthSlope, Diagonal, Measure, NormalRange, Traversal
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rsm import GBuffer
     from refgi.splat.multires.settings import Criteria
-
-Array = npt.NDArray[Any]
 Levels = tuple[Array, ...]
 
 

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.reference import reference_visibility
@@ -25,6 +24,7 @@ from refgi.scene import Geometry
 from refgi.splat.multires.refinement.grid import Subsplats
 from refgi.splat.multires.settings import Representative
 from refgi.stages import report_progress, stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.cluster.settings import ValSettings
@@ -32,9 +32,6 @@ if TYPE_CHECKING:
     from refgi.lights import PixelLights
     from refgi.rays import Tracer
     from refgi.rsm import GBuffer
-
-Array = npt.NDArray[Any]
-
 
 def _point_steps(*arguments: Any, **named: Any) -> tuple[Array, Array]:
     from refgi.splat.multires.subsplats.steps import point_steps
@@ -146,7 +143,7 @@ def _average_cell(
 
 
 def _visible_steps(*arguments: Any, **named: Any) -> Array:
-    from refgi.splat.multires.subsplats.ray_steps import visible_steps
+    from refgi.splat.multires.subsplats.shadow_steps import visible_steps
 
     return visible_steps(*arguments, **named)
 

@@ -5,8 +5,6 @@
 
 from typing import TYPE_CHECKING, Any
 
-import numpy.typing as npt
-
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import PairSettings
 from refgi.splat.multires.refinement.grid import Subsplats
@@ -23,12 +21,10 @@ from refgi.splat.multires.subsplats.upsample import (
     tent_level,
 )
 from refgi.stages import stage
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rsm import GBuffer
-
-Array = npt.NDArray[Any]
-
 
 @stage("multires.points", kept=False)
 def points(

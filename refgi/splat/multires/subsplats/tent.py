@@ -18,11 +18,9 @@ neighbour at the texel's own level the tap. Diagonal taps count as in `tent_pass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 BAND = 32  # rows of a task: two more are read than written
 MASK, SHARE = 3, 4  # planes of a row after the three channels: m, and m where the texel is to be filtered

@@ -8,7 +8,6 @@ texels that hold irradiance and doubled again, down to the pixels.
 from typing import Any, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange, threads
@@ -17,8 +16,7 @@ from refgi.splat.multires.refinement.grid import Subsplats, level_shape
 from refgi.splat.multires.settings import Upsampling
 from refgi.splat.multires.subsplats.tent import demo_pass, tent_pass
 from refgi.stages import stage
-
-Array = npt.NDArray[Any]
+from refgi.types import Array
 
 FEW_TEXELS = 1 << 16  # of a level, that one thread fills before others are awake
 

@@ -8,22 +8,19 @@ of light (16 + 48 + 24 + 24), Sec. 6.
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers, checked, over_receivers
-from refgi.pairs.lobe_shape import Widening
-from refgi.pairs.pixel_lights import Range
+from refgi.pairs.pixel_lights import Range, Widening
 from refgi.pairs.ranged_sum import LANES, reached
 from refgi.splat.sii.reach.lists import LightLists, listed_pairs
-from refgi.splat.sii.reach.reference_length import lobe_strength, with_reference_length
+from refgi.splat.sii.reach.threshold import lobe_strength, with_reference_length
 from refgi.splat.sii.settings import SiiSettings
+from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.lights import PixelLights
     from refgi.rsm import Projection
-
-Array = npt.NDArray[Any]
 
 FRAGMENT_BITS = 72
 SAMPLE_BITS = 112

@@ -8,24 +8,21 @@ where B >= I_low, one irradiance for all lights; the parts of a light, diffuse a
 """
 
 import dataclasses
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from refgi.pairs.irradiance import Receivers, summed
 from refgi.pairs.packing import Packed, pack
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import PairSettings
 from refgi.splat.sii.reach.bounds import appendix_ellipsoid, tangent_ellipsoid
-from refgi.splat.sii.reach.reference_length import picture_length
-from refgi.splat.sii.reach.reference_length import strengths as packed_strengths
-from refgi.splat.sii.reach.threshold import DIFFUSE, GLOSSY, all_peaks, light_range, threshold
+from refgi.splat.sii.reach.threshold import DIFFUSE, GLOSSY, all_peaks, light_range, picture_length, threshold
+from refgi.splat.sii.reach.threshold import strengths as packed_strengths
 from refgi.splat.sii.settings import AbsoluteCut, FullBound, ReachSettings, RelativeCut, SiiSettings
 from refgi.splat.sii.sii import sum_in_range
 from refgi.stages import stage
+from refgi.types import Array
 
-Array = npt.NDArray[Any]
 Parts = tuple[Array, Array | None]  # diffuse, glossy: None where no light is glossy
 
 

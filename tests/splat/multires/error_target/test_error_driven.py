@@ -14,12 +14,12 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import checked
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
-from refgi.splat.multires.error_target import pixel_sum as sum_module
+from refgi.splat.multires.error_target import near as sum_module
 from refgi.splat.multires.error_target import trial
-from refgi.splat.multires.error_target.descent import fill_coarsest, fill_level, fill_picture
 from refgi.splat.multires.error_target.error_driven import draw_samples, error_driven, estimate_error, estimate_mean
 from refgi.splat.multires.error_target.interpolate import blend_weights, surface_levels
 from refgi.splat.multires.error_target.near import near_light
+from refgi.splat.multires.error_target.trial import fill_coarsest, fill_level, fill_picture
 from refgi.stages import observe
 from tests.splat.multires.choices import by_error, unclamped
 

@@ -15,8 +15,7 @@ from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.splat.multires import MultiresSettings, multires
-from refgi.splat.multires.error_target.near import SIDE
-from refgi.splat.multires.error_target.pixel_sum import shadowed_by_clusters, shadowed_by_rays
+from refgi.splat.multires.error_target.near import SIDE, shadowed_by_clusters, shadowed_by_rays
 from refgi.stages import observe
 from refgi.truth import VplSettings, vpl
 

@@ -13,15 +13,19 @@ from refgi.pairs.ranged_sum import LANES, reached
 from refgi.pairs.tiles import block_by_block
 from refgi.rsm.raster.projection import camera_projection, cube_projection
 from refgi.scene import Camera
-from refgi.splat.sii.reach.bins import list_lights, pack_solids
 from refgi.splat.sii.reach.bounds import (
     Ellipsoid,
     appendix_ellipsoid,
+    covered_pixels,
     half_ball_radius,
+    inflation,
     light_solids,
+    screen_quads,
+    sphere_mesh,
     tangent_ellipsoid,
+    tiles_of_quads,
 )
-from refgi.splat.sii.reach.screen_bounds import covered_pixels, inflation, screen_quads, sphere_mesh, tiles_of_quads
+from refgi.splat.sii.reach.lists import list_lights, pack_solids
 from tests.naive import bounds as naive
 from tests.pairs import sets
 from tests.splat.sii.reach.regions import in_ellipsoid, significant_radius, waste

@@ -16,10 +16,9 @@ from refgi.radiometry import lobe_fraction
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, cut_irradiance, irradiance, sii, splat
-from refgi.splat.sii.ledger import sii_ledger
+from refgi.splat.sii.approximations import sii_ledger
 from refgi.splat.sii.reach.fragments import fragments
-from refgi.splat.sii.reach.reference_length import reference_length, with_reference_length
-from refgi.splat.sii.reach.threshold import low_irradiance
+from refgi.splat.sii.reach.threshold import low_irradiance, reference_length, with_reference_length
 from refgi.stages import observe
 
 PAPER = of(SiiSettings, cut_share=0.05)  # 768 lights

@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 # a file's tests run in one process, so that few kernels are compiled twice; files in the order of tests/conftest.py
-PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder --durations 25 --durations-min 5
+PYTEST := $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --durations 25 --durations-min 5
 
 .PHONY: demo test quick test-for test-all check evidence bench stress mutate kit-score docs clean
 

@@ -37,6 +37,11 @@ def pytest_configure() -> None:
         import trimesh  # noqa: F401
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """Return how many processes run tests: two a core, since some wait for files or for others, and at most four."""
+    return min(4, 2 * (os.cpu_count() or 1))
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     items.sort(key=_turn)

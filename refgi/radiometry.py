@@ -6,7 +6,7 @@ Units: radiant intensity W/sr, irradiance W/m^2, solid angle sr. The equations a
 is cos^P around an axis, and K(th, P) is the part of its flux that leaves above a surface tilted by th.
 
 Symbols: r unit vector along the lobe's axis, w a direction, n the surface's normal, th the angle between r and n,
-P the exponent, K(th, P) the part of cos^P above the surface, h = |r - w|^2 / 2 = 1 - r . w.
+P the exponent, K(th, P) the part of cos^P above the surface, ``h = |r - w|^2 / 2`` = 1 - r . w.
 
 The lobe is I(w) = c <r . w>^P where n . w > 0, with c = (P + 1) / (2 pi K) for unit flux. The power is taken as
 2^(P log2(1 - h)): near the axis, where a lobe of exponent 10^6 lives, h keeps its digits and r . w does not. So both
@@ -264,7 +264,7 @@ def lobe_norm(cos_theta: Any, exponent: Any) -> Any:
 
 @kernel
 def lobe_gap(rx: Any, ry: Any, rz: Any, wx: Any, wy: Any, wz: Any) -> Any:
-    """Return h = |r - w|^2 / 2 for an axis r of length 1 and a vector w of any length but 0.
+    """Return ``h = |r - w|^2 / 2`` for an axis r of length 1 and a vector w of any length but 0.
 
     That is 1 - cos of the angle between them, 0 to 2, in the type of the arguments.
     """

@@ -57,7 +57,7 @@ CASES = {
 # of every skip: functions that see more work with it off, and what of their arguments shows that
 WORK = {
     "frame.buffers": {"frame._tracer": None},
-    "frame.lobes": {"rsm.buffers.glossy.direct_lobes": None},
+    "frame.lobes": {"rsm.buffers.leaving.direct_lobes": None},
     "rsm.channels": {"rsm.buffers.gbuffer._planes": lambda names, *_: len(names)},
     "rsm.texels": {"rsm.buffers.gbuffer._planes": lambda _, shape, *__: math.prod(shape)},
     "rsm.clusters": {"rsm.raster.visibility_buffer._draw_bands": lambda *arguments: not arguments[5]},

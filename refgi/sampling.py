@@ -4,7 +4,7 @@ Host functions return whole sets (Halton, grid, an order along a Hilbert curve).
 for use inside loops: a Sobol pair with hash-based Owen scrambling, where dimension and seed pick an independent
 randomisation. Nothing here keeps state: the same index, dimension and seed give the same point everywhere.
 
-In GLSL, with ``uint`` of 32 bits::
+Seeded random numbers in GLSL, with ``uint`` of 32 bits::
 
     uint mix32(uint x) {
         x = (x ^ (x >> 16)) * 0x21F0AAADu;
@@ -17,7 +17,7 @@ In GLSL, with ``uint`` of 32 bits::
     }
 
 A stream is one use of random numbers; a use that needs several of them, such as one for each map, numbers its parts:
-the stream is then `use + 256 part`. Nothing keeps state, so a value depends on nothing that was drawn before it.
+the stream is then `use + 256 part`.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Buffers of one frame that its jobs share, and digests of what stages give.
 
-Each is computed once in a process, with all its channels; the time that took counts for each job that uses it, so that
-a job's time is that of a whole frame.
+Each buffer is computed once in a process, with all its channels; the time that took counts for each job that uses it,
+so that a job's time is that of a whole frame.
 """
 
 import dataclasses

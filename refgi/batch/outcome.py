@@ -1,6 +1,6 @@
 """Results of jobs: one as a file, all as a bench's, flicker and lag of a sequence, and those of an earlier batch.
 
-x_k is a method's picture of frame k, r_k the truth, v_k the variance of its mean; the truths of two frames have
+Symbols: x_k a method's picture of frame k, r_k the truth, v_k the variance of its mean; the truths of two frames have
 different seeds, so that their noise is independent. Means are over the pixels with light in both frames, of the picture
 or of the truth, and over all frames.
 

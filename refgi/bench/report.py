@@ -1,7 +1,7 @@
 """The page of a bench: error over time, bars of split errors, several scenes at once.
 
-Two panels: the change of the mean that each approximation makes, and its share of the whole's mean square error. In
-both the parts add up exactly; what lies below 0 takes back what others did. A mark shows the sum.
+Split errors have two panels: the change of the mean that each approximation makes, and its share of the whole's mean
+square error. In both the parts add up exactly; what lies below 0 takes back what others did. A mark shows the sum.
 """
 
 import math

@@ -6,8 +6,8 @@ order of the method's pipeline. Beside the chain stands the method with each swi
 
 Every picture is made with each of several seeds. One that draws no random numbers is made once.
 
-x_0 is the truth, x_n the picture of the method as it is used, x_k has one approximation more than x_k-1
-(`refgi.bench.split`). Its step is d_k = x_k - x_k-1, the whole error e = x_n - x_0 = d_1 + ... + d_n. How parts add up:
+x_0 is the truth, x_n the picture of the method as it is used, x_k has one approximation more than x_k-1. Its step is
+d_k = x_k - x_k-1, the whole error e = x_n - x_0 = d_1 + ... + d_n. How parts add up:
 
 - changes of the mean add up exactly: mean e = sum of mean d_k;
 - mean squares do so with their cross terms: mean e^2 = sum of mean d_k^2 + 2 sum over j < k of mean d_j d_k;

@@ -1,9 +1,8 @@
 """The command's frame: verbs loaded when used, errors and warnings as one line each, exit codes.
 
-That is a limit of address space (`ulimit -v`) too small for them: without room OpenBLAS asks for memory without end,
-and LLVM and Embree end the process with no word of refgi's. And a number of threads that Numba cannot start.
-
-An exception that ended a run, as exit code, message, file and key.
+What the libraries would fail at is refused before they are loaded: a number of threads that Numba cannot start, and a
+limit of address space (`ulimit -v`) too small for them. Without room OpenBLAS asks for memory without end, and LLVM and
+Embree end the process with no word of refgi's.
 """
 
 import contextlib

@@ -5,8 +5,8 @@ behind. Here the key covers the kernel's own bytecode and constants, the kernels
 reads, and versions and sources of what compiles it; comments, docstrings, line numbers and the rest of its module are
 no part of it. Intrinsics, and overloads registered by `refgi.jit.by_type`, count with their code as well.
 
-One file holds one specialisation of one kernel. Its name says the kernel, the key of its code (`refgi.jit.cache`) and a
-hash of the argument types, and nothing about where the sources lie or when they were written. What is in it stands in
+One file holds one specialisation of one kernel. Its name says the kernel, the key of its code (`code_key`) and a hash
+of the argument types, and nothing about where the sources lie or when they were written. What is in it stands in
 `refgi.jit.kernelfile`; one that is damaged, even inside machine code, counts as absent and is written anew.
 
 Machine code of a file is run, so only what nobody else can have written is read: neither the folder nor a file may

@@ -1,12 +1,12 @@
 """`Kernel`: a compiled function that is native code for Python and plain LLVM code for other kernels.
 
-A call with arrays counts references, atomically, so that threads wait for each other. Of a borrowed array nothing is
-counted; whoever lends it keeps it alive.
-
 Numba makes native code of every compiled function, also of one that is only ever called from others, where it is
 optimised and made native once more as a part of each. A `Kernel` therefore holds two dispatchers: itself, for calls
 from Python, with the cache on disk, and a `Callee`, which types and lowers the function for its callers and leaves
 the rest to them.
+
+A call with arrays counts references, atomically, so that threads wait for each other. Of a borrowed array nothing is
+counted; whoever lends it keeps it alive.
 """
 
 import gc

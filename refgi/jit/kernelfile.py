@@ -1,12 +1,12 @@
 """The file of a compiled kernel: types as text, object code, LLVM's bitcode and a SHA-256 of all of it.
 
-Text is what Numba prints, as far as kernels need it: `float32`, `none`, `float32[:, ::1]`, `(int64, none,)`;
+Types as text are what Numba prints, as far as kernels need it: `float32`, `none`, `float32[:, ::1]`, `(int64, none,)`;
 `named('package.module.Class', float32, ...)` is a named tuple, `omitted(1.0)` a default value, `readonly(...)` an array
 that is not written to.
 
-The first line is the format's name, the second a JSON object: names of symbols, the type of the result as
-`text_of` writes it, how many bytes of each code follow. Nothing of it is unpickled; modules and classes are looked
-up among those that are loaded.
+The file's first line is the format's name, the second a JSON object: names of symbols, the type of the result as
+`text_of` writes it, how many bytes of each code follow. Nothing of it is unpickled; modules and classes are looked up
+among those that are loaded.
 """
 
 import ast

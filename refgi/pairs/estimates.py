@@ -4,9 +4,10 @@ A clamp or a cut is a bias that no picture shows. The share it removes is that o
 the setting and without, at pixels that are the same in every run. Without a clamp a few near pairs hold much of the
 sum, so the share is as good as the sample: within 3 of 100 in the tests.
 
-Each half, doubled, is an estimate of the picture of its own, so half of their difference is one of the error of both
-together: of independent draws its mean square is the variance. A light so near that it decides the error of a picture
-without a clamp is seen only where a sampled pixel is near it: the estimate is then too low.
+The error of sampling is seen by halves of the lights. Each half, doubled, is an estimate of the picture of its own, so
+half of their difference is one of the error of both together: of independent draws its mean square is the variance. A
+light so near that it decides the error of a picture without a clamp is seen only where a sampled pixel is near it: the
+estimate is then too low.
 
 Where all lights are far from what is seen halves agree on too little. What lit pixels send to each other is part of
 the light, so that a sum of lights below it is off by the difference at least.

@@ -1,12 +1,11 @@
 """The sum over all pairs of pixel light and glossy receiver: radiance towards the eye (AMS Eq. 2 with its rho_s).
 
-A light's terms are found in a few passes over the tile; one that lies in no lobe is passed over after the first, one
-that lights none of the receivers before the power is taken. Symbols as in `glossy_sum`.
-
 L_s = specular (P + 2) / (2 pi) sum over lights of <m . w>^P I(w) c_x / r^2, where I c_x / r^2 is the term of the
 diffuse sum, clamped alike. Receivers are the SIMD lanes; norm and reflectance are theirs and are multiplied in last.
 The power is taken as 2^(P log2(1 - h)), h = |m - w|^2 / 2, as for senders' lobes (`lobe_sum`). Tiles are of 64
-receivers, each with lights of its own: those that planes, ranges and the receivers' lobes leave (`receiver_culling`).
+receivers, each with lights of its own: those that planes, ranges and the receivers' lobes leave (`lobe_culling`). A
+light's terms are found in a few passes over the tile; one that lies in no lobe is passed over after the first, one that
+lights none of the receivers before the power is taken.
 
 Symbols as in `pair_sum`; m the direction to the eye mirrored at the receiver, w unit vector from it to the light.
 """

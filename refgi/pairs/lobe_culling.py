@@ -5,14 +5,13 @@ light's surface, or so far off the lobe's axis that (1 - h)^P is below the small
 or where B < xi I_low everywhere in the sphere (procedure P3). Each by more than rounding, so that the kernel itself
 would add 0 and the sum is the same to the bit.
 
-Symbols: d vector from the sphere's centre to the light, r its length, rho the sphere's radius, h = 1 - cos of the angle
-to the lobe's axis.
+A tile's mirrored directions and positions are bounded by boxes. For receivers' lobes a light is passed over when no
+direction and no position out of them come as near to each other as the farthest of the tile's lobes reaches, by more
+than rounding: the sum is the same to the bit.
 
-A tile's mirrored directions and positions are bounded by boxes. A light is passed over when no direction and no
-position out of them come as near to each other as the farthest of the tile's lobes reaches, by more than rounding:
-the sum is the same to the bit.
-
-Symbols: d vector from receiver to light, m the direction to the eye mirrored, h = 1 - m . d / |d| as in `glossy_sum`.
+Symbols, lights' lobes: d vector from the sphere's centre to the light, r its length, rho the sphere's radius, h = 1 -
+cos of the angle to the lobe's axis. Receivers' lobes: d vector from receiver to light, m the direction to the eye
+mirrored, h = 1 - m . d / |d| as in `glossy_sum`.
 """
 
 import math

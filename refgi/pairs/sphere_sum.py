@@ -11,12 +11,12 @@ integral along a slice is a polynomial, and one smooth integral over the turn is
 quadrant, right to 1e-4 of the pixel light on its axis at worst (|d| just over r) and to 1e-10 in most places. Products
 of cosines, roots and quotients are all it takes: no angle is computed.
 
+Tiles, groups and order of the lights are those of `pair_sum`. A first pass runs over the receivers as lanes and takes
+the closed form; it leaves a mark where a horizon cuts the cone, and a second pass sees to those receivers one by one.
+
 Symbols: w0 = d / |d| cone axis, b angle between l and n_x, e and f their bisectors, c = e x f the line of both
 horizons; chi turn of a slice from e, chi0 that of w0, v(chi) the slice's direction; rho, s lengths of w0 across and
 along c; m = rho sin(chi - chi0), t = rho cos(chi - chi0); sigma = <c . w>; g angle in a quadrant, y = tan(g / 2).
-
-Tiles, groups and order of the lights are those of `pair_sum`. A first pass runs over the receivers as lanes and takes
-the closed form; it leaves a mark where a horizon cuts the cone, and a second pass sees to those receivers one by one.
 """
 
 import math

@@ -13,13 +13,12 @@ triangles around what the shifted ray hit are tested against the ray itself, in 
 a ray passes (Woop, Benthin & Wald 2013) and no ray passes between them. A volume within its rounding counts as 0: the
 ray meets that edge, and at a vertex all of them.
 
-Huge triangles are subdivided for Embree alone: float32 tests are off by a share of a triangle's size.
-
-A hit on a quad of 10^8 m is found to some metres, so that it may hide a floor 1 mm above it. Edges longer than the
-scene's grain and than 0.4 of their middle's distance from the coordinates' origin are halved, until none is left: then
-no piece is longer than the larger of the grain and the distance of its own points, where float32 coordinates are as
-coarse. What is cut depends on the edge alone, so neighbours are cut at the same points and no gap opens. A face of
-size S becomes some tens of pieces times log2(S / grain).
+Huge triangles are subdivided for Embree alone: float32 tests are off by a share of a triangle's size. A hit on a quad
+of 10^8 m is found to some metres, so that it may hide a floor 1 mm above it. Edges longer than the scene's grain and
+than 0.4 of their middle's distance from the coordinates' origin are halved, until none is left: then no piece is longer
+than the larger of the grain and the distance of its own points, where float32 coordinates are as coarse. What is cut
+depends on the edge alone, so neighbours are cut at the same points and no gap opens. A face of size S becomes some tens
+of pieces times log2(S / grain).
 """
 
 import math

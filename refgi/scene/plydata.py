@@ -1,7 +1,7 @@
 """PLY files, ASCII or binary: their header, and their entries as one array a property.
 
-Read here and not by trimesh, which takes a header's counts on trust, refuses lists of differing lengths in binary files
-and skips what it does not know.
+Files are read here and not by trimesh, which takes a header's counts on trust, refuses lists of differing lengths in
+binary files and skips what it does not know.
 """
 
 import struct

@@ -1,9 +1,9 @@
 """Light from further cameras, placed by coarse transport, joined where they show the same surface (Sec. 5, discussion).
 
-T_ij (W/m^2) is the irradiance of receiver i from sender j, Phi_j / pi cos_i cos_j / r^2 where nothing lies between;
-Phi_j (W) is the flux that the surface around the sender reflects.
-
 Further cameras are placed where they see directly lit surfaces that light the picture and that it does not show.
+
+Symbols: T_ij (W/m^2) is the irradiance of receiver i from sender j, Phi_j / pi cos_i cos_j / r^2 where nothing lies
+between; Phi_j (W) is the flux that the surface around the sender reflects.
 """
 
 import dataclasses

@@ -3,15 +3,13 @@
 Spots and points get equal-area maps of the square to the cap or the sphere; a directional light gets a rectangle across
 the scene's bounds. Symbols: (a, b) a point of the square, d the direction of a ray from the light.
 
-Without a density each ray stands for the same solid angle or area, exactly; with one, for that over
-the density at its place. The cells are ordered along a Hilbert curve: neighbours in the list are neighbours on the
-surfaces they reach, which is what makes systematic picks even.
+Without a density each ray stands for the same solid angle or area, exactly; with one, for that over the density at its
+place. The cells are ordered along a Hilbert curve: neighbours in the list are neighbours on the surfaces they reach,
+which is what makes systematic picks even.
 
-Piecewise constant densities over the unit square, for importance sampling: uniform points are warped to them.
-
-q_ij is the probability of cell (i, j) of an m x m grid. The first coordinate follows the marginal sum_j q_ij, the
-second q_ij / sum_j q_ij within row i; both are linear inside a cell, so a point stands for 1 / (m^2 q_ij) of a uniform
-one.
+Densities for importance sampling are piecewise constant over the unit square: uniform points are warped to them. q_ij
+is the probability of cell (i, j) of an m x m grid. The first coordinate follows the marginal sum_j q_ij, the second
+q_ij / sum_j q_ij within row i; both are linear inside a cell, so a point stands for 1 / (m^2 q_ij) of a uniform one.
 """
 
 import math

@@ -1,5 +1,7 @@
 """One pass of the ground truth of glossy receivers: directions of their lobes, photons on them, and the rest.
 
+Paths start along the receiver's lobe, and scatter at surfaces by every lobe; light vertices share the first bounce.
+
 A direction of density (P + 1) / (2 pi) <m.w>^P that finds radiance L contributes s (P + 2) / (P + 1) <n.w> L: bounded,
 however sharp the lobe. Symbols: as in `refgi.truth.lobe_receivers` and `refgi.truth.surfaces`; x the receiver, y where
 a direction lands, A = r^2 n_a / n_b with n_a = D <m.w>^P <g.w> / r^2, D of `density_on_axis`, and n_b = <g.l> / (Omega
@@ -10,8 +12,6 @@ the irradiance E = dPhi <g.v> / (D^2 W) across the face; the pixel's lobe makes 
 normal and lobe at the pixel's centre. Photons of a single lobe that the receivers' own directions meet do not count.
 
 Symbols: v towards the camera, g face normal where the photon lands, n the pixel's normal, w against the photon's way.
-
-Paths start along the receiver's lobe, and scatter at surfaces by every lobe; light vertices share the first bounce.
 """
 
 import math

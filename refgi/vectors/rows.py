@@ -1,7 +1,7 @@
 """Likely bugs as rows of text, each an edit of the literal form of a stage: `cause :: list :: old => new :: paper`.
 
-One language for likely bugs (`rows`), the search for causes (`search`) and the faults that benchmarks put into ports
-and into refgi itself.
+Edits are one language for likely bugs (`rows`), the search for causes (`search`) and the faults that benchmarks put
+into ports and into refgi itself.
 
 Rows lie beside the file that they edit, `refgi/literal/*.bugs`. `old` stands exactly once, in one line, in the function
 of a form or in those of refgi.literal that it calls, docstrings apart; several edits are joined by ` ;; `. `list` names

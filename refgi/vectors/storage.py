@@ -3,8 +3,8 @@
 A packed float or a depth in few bits moves an element by up to one step of its format, whichever way it is rounded.
 NumPy alone.
 
-Elements are matched by their whole numbers (texel and map, cell of a subsplat), those alike in them, or all of a list
-without any, by the nearest position and then the nearest values.
+Elements of lists are matched by their whole numbers (texel and map, cell of a subsplat), those alike in them, or all of
+a list without any, by the nearest position and then the nearest values.
 """
 
 import math

@@ -1,8 +1,8 @@
 """The rounds of k-means (Sec. 5.1, 6): each light to the area light that is nearest in position and normal.
 
-d = w_x |x - c| + w_a angle(n, n_c), the printed form, or d = w_x |x - c|^2 + w_a |n - n_c|^2. Weights arrive with their
-units taken in, and whether to square. Angles are exact to rounding everywhere: near 0 and pi the arc cosine of a dot
-product is not, and lights of one wall differ by just that.
+The distance is d = w_x |x - c| + w_a angle(n, n_c), the printed form, or w_x |x - c|^2 + w_a |n - n_c|^2. Weights
+arrive with their units taken in, and whether to square. Angles are exact to rounding everywhere: near 0 and pi the arc
+cosine of a dot product is not, and lights of one wall differ by just that.
 
 Distances (their roots, where squared) obey the triangle inequality: an area light more than twice as far from a
 light's own one as the light itself is cannot be nearer to it (Elkan 2003). Lights that share an area light are looked

@@ -15,16 +15,15 @@ t is the depth over the range of the series, 0 to less than 1 (the rest keeps th
 near one); where the map is empty it is the far end. The paper's channels are the 2 M of the basis and the 2 M of the
 "basis-z"; the mean of (1 - f) t needs the plain t as well.
 
-The published textures have 8 bits for sines and cosines, 16 for those times z (Sec. 6).
+The published textures have 8 bits for sines and cosines, 16 for those times z (Sec. 6). 8 bits store [-1, 1] as 0 ..
+255; the paper does not say how, this is the mapping of normalised textures. Each number is off by 1/255 at most, so V
+is off by sum_k 2 sqrt(2) / (255 c_k) at most: 0.0059 with 4 terms. 16 bits are the IEEE format of 11 significant ones,
+rounded to nearest, ties to even.
 
-8 bits store [-1, 1] as 0 .. 255; the paper does not say how, this is the mapping of normalised textures. Each number
-is off by 1/255 at most, so V is off by sum_k 2 sqrt(2) / (255 c_k) at most: 0.0059 with 4 terms. 16 bits are the
-IEEE format of 11 significant ones, rounded to nearest, ties to even.
-
-The square beyond the unit disc, for filters that cannot leave it out: the disc is the hemisphere before the light, and
-a square map has a fifth of its texels beyond it. Holding nothing its texels would let light leak in over the rim.
-`mirrored` texels hold what lies in the direction mirrored at the light's plane, (s, t) / (s^2 + t^2): the filter then
-sees nothing but the hemisphere, as the sum over the texels of the disc does.
+Some filters cannot leave out the square beyond the unit disc, which is the hemisphere before the light: a fifth of a
+map's texels lie there. Holding nothing they would let light leak in over the rim. `mirrored` texels hold what lies in
+the direction mirrored at the light's plane, (s, t) / (s^2 + t^2): the filter then sees nothing but the hemisphere, as
+the sum over the texels of the disc does.
 """
 
 import functools

@@ -1,8 +1,8 @@
 """Prefilters of convolution shadow maps (Sec. 6): mip maps, or means texel by texel at a cost that grows with the disc.
 
-The disc takes the texels whose centres it holds, within the unit disc, or the one it lies in. The box is the square
-around the disc, at least a texel wide; texels count by the area of them that it holds, those beyond the unit disc
-too, and what of it lies beyond the map is cut off. A box with its middle beyond the map is moved to its edge. Sums
+By brute force the disc takes the texels whose centres it holds, within the unit disc, or the one it lies in. The box is
+the square around the disc, at least a texel wide; texels count by the area of them that it holds, those beyond the unit
+disc too, and what of it lies beyond the map is cut off. A box with its middle beyond the map is moved to its edge. Sums
 are float64 for any map.
 """
 

@@ -9,10 +9,9 @@ Level l halves level l - 1 by the mean of 2 x 2 texels; where the side is odd, t
 Texel i of level l covers the texels i 2^l .. (i + 1) 2^l - 1 of the map, so no size drifts. The square beyond the
 unit disc holds the far end, or mirrors the disc (`fill_beyond`).
 
-Level 0 is not stored. It would be three quarters of a pyramid and more than a core's cache, small discs alone read
-it, and four depths give what four of its texels hold, to the same bits.
-
-Level 0 of a mip map, computed from the depths where it is read, by receivers whose discs are a few texels wide.
+Level 0 is not stored but computed from the depths where it is read, by receivers whose discs are a few texels wide. It
+would be three quarters of a pyramid and more than a core's cache, and four depths give what four of its texels hold, to
+the same bits.
 """
 
 from collections.abc import Callable

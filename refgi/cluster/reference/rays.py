@@ -2,8 +2,9 @@
 
 Rays from receivers to points on lights, many for each receiver, and what share of them arrives.
 
-V_C(x) = sum over the cluster of w_i V(p_i, x) / sum of w_i. With w_i = L_i(x), what each light gives to x, the sum of
-the paper's third equation is that of its second, exactly: no error of clustering is left, and none of soft shadows.
+By pixel lights V_C(x) = sum over the cluster of w_i V(p_i, x) / sum of w_i. With w_i = L_i(x), what each light gives to
+x, the sum of the paper's third equation is that of its second, exactly: no error of clustering is left, and none of
+soft shadows.
 """
 
 from collections.abc import Callable

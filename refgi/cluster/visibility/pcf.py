@@ -4,15 +4,15 @@ A cone of half-angle a around a direction at polar angle theta is a disc on a st
 sin(theta) / (cos(theta) + cos(a)) and radius sin(a) / (cos(theta) + cos(a)), exactly. No angle is ever computed: only
 tan(a) and the vector to the receiver.
 
-Symbols: d distance from the area light's centre to the receiver (m), z that of blockers, p cos(beta) the penumbra
-perpendicular to the view, Delta the size of the area light (m), alpha the penumbra's angle.
-
 A receiver falls into one texel of an area light's map. The hard test compares that texel alone; PCF compares all of a
 square of fixed width around it and returns the share that does not hide the receiver (Reeves, Salesin and Cook 1987).
 
 A texel holds the distance along its own centre's direction, not along the receiver's. So the receiver is moved there as
 well, on its tangent plane: of a surface that the map itself holds, no texel is nearer than its own plane, and sloping
 surfaces need no bias.
+
+Symbols: d distance from the area light's centre to the receiver (m), z that of blockers, p cos(beta) the penumbra
+perpendicular to the view, Delta the size of the area light (m), alpha the penumbra's angle.
 """
 
 import math

@@ -5,7 +5,7 @@ times the width of the scene; the first half has as many lights as fill a subtre
 one level of the light tree, so its clusters are squarish patches that face one way. Halving is by selection and
 depends on nothing but the lights: the same bits for every number of threads.
 
-Level 0 are the lights in the order of `order`; a node of level l joins FAN neighbours of level l - 1. A node's
+Level 0 are the lights in the order of `compact_order`; a node of level l joins FAN neighbours of level l - 1. A node's
 representative is a light at the mean position, with the mean normal, which is shorter than 1 where normals differ, and
 the flux of all: means are weighted by the sum over the channels. Nodes lie level by level in one array.
 

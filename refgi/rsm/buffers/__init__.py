@@ -1,6 +1,6 @@
 """G-buffer, reflective shadow maps, direct light, and the radiance that a camera receives.
 
-`gbuffer` resolves the attributes of each texel's triangle (`runs`, `attributes`), only those that are used;
+`gbuffer` resolves the attributes of each texel's triangle (`lines`, `attributes`), only those that are used;
 `reflective` adds the flux that reaches each texel from a light (`light_projection`, `solid_angle`).
 """
 

@@ -12,7 +12,7 @@ so the interpolated normal of corner normals n0, n1, n2 is, times d . N, an affi
 
 Corners enter by differences of 1, not of 2 factors of their distance, so small triangles far away keep their digits.
 
-Seen edge-on, d . N is rounding and t anything, so t is kept within what the corners have.
+Of a triangle seen edge-on d . N is rounding and t anything, so t is kept within what the corners have.
 """
 
 import math

@@ -1,7 +1,7 @@
 """The stage, a floor with three walls, what stands on it, and leaves that are cut out of quads by alpha.
 
-The quads hang on a grid, each turned and tilted at random; most of a quad is hole. A spot shines through them from
-above, so that light and shadow on the floor and the walls are those of leaves.
+The leaves' quads hang on a grid, each turned and tilted at random; most of a quad is hole. A spot shines through them
+from above, so that light and shadow on the floor and the walls are those of leaves.
 """
 
 import dataclasses

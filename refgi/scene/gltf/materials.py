@@ -3,7 +3,7 @@
 The model of metal and roughness has no counterpart here: its base colour is taken as diffuse. Specular and glossiness
 are a diffuse part and a Phong lobe as wide as the microfacets: alpha = (1 - glossiness)^2, P = 2 / alpha^2 - 2.
 
-Image, sampler, set of texture coordinates, KHR_texture_transform.
+A texture is image, sampler, set of texture coordinates and KHR_texture_transform.
 """
 
 import contextlib

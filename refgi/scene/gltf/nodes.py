@@ -1,11 +1,9 @@
 """The node tree of a glTF document: what the default scene holds, in order, and where each lies, instances too.
 
-KHR_lights_punctual lights and cameras of a glTF document, placed by their node.
-
-glTF measures spot and point lights in candela (lm/sr) and directional lights in lux (lm/m^2). They become W/sr and
-W/m^2 by the luminous efficacy that defines the candela, 683 lm/W, the factor that exporters use as well, unless another
-unit is asked for. `range` is
-ignored (light falls with the square of the distance). Between its cone angles a spot has the extension's falloff.
+KHR_lights_punctual lights and cameras are placed by their node. glTF measures spot and point lights in candela (lm/sr)
+and directional lights in lux (lm/m^2). They become W/sr and W/m^2 by the luminous efficacy that defines the candela,
+683 lm/W, the factor that exporters use as well, unless another unit is asked for. `range` is ignored (light falls with
+the square of the distance). Between its cone angles a spot has the extension's falloff.
 """
 
 import math

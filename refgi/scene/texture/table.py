@@ -1,7 +1,7 @@
 """`Texture`, mip levels that keep the energy, and all textures of a scene as arrays for kernels.
 
-So the mean of every level is the image's. A level has half the texels of the one below along each axis, rounded down,
-at least 1. Where that does not divide, a texel covers parts of texels, which count with their area.
+The mean of every level is the image's. A level has half the texels of the one below along each axis, rounded down, at
+least 1. Where that does not divide, a texel covers parts of texels, which count with their area.
 """
 
 import dataclasses

@@ -1,10 +1,9 @@
 """Splatting Indirect Illumination (Dachsbacher and Stamminger 2006): pixel lights where they are significant.
 
 `sii` turns texels of the reflective shadow map into pixel lights and adds the irradiance of each to the pixels where it
-is significant. `reach` says how far lights count, `splat` sums them there, `ledger` accounts for where the power goes.
-It differs from the paper where that is silent or wrong: fluxes carry exact solid angles and T / N, intensities 1 / pi,
-Phong lobes conserve their flux above the surface, and the picture is that of the threshold alone, whatever bound found
-the pixels.
+is significant. `reach` says how far lights count, `approximations` accounts for where the power goes. It differs from
+the paper where that is silent or wrong: fluxes carry exact solid angles and T / N, intensities 1 / pi, Phong lobes
+conserve their flux above the surface, and the picture is that of the threshold alone, whatever bound found the pixels.
 """
 
 from refgi.method import Method

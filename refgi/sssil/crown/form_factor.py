@@ -4,10 +4,8 @@ The columns of a level are split into phases, column x into phase x modulo P, an
 receivers that share samples are the SIMD lanes, and what they read is contiguous. Padding of zero radiance surrounds
 the columns, and one row of it follows the last, so that samples outside the picture need no test.
 
-Lengths are scaled by a power of two, so that fourth powers of distances stay within float32.
-
-The receivers of a row are the SIMD lanes. A tile of receivers is one array with strides known to the compiler, so that
-few overlap checks remain in each call.
+Lengths are scaled by a power of two, so that fourth powers of distances stay within float32. A tile of receivers is one
+array with strides known to the compiler, so that few overlap checks remain in each call.
 
 Symbols: d vector from receiver to sample; m = -n_j ds_j / pi of the sample; c = max(0, n . d) = r cos(theta);
 s = max(0, m . d) = r R^2, with the radius R of the disc that has the sample's projected area; |d| = r.

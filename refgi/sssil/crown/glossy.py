@@ -1,8 +1,9 @@
 """Crown samples of glossy receivers, drawn by importance: more where lobes point on the screen (Soler 2009, Sec. 5).
 
 Every glossy pixel is a receiver at full resolution on every level, as an upsampled highlight would be a blurred one.
-Its samples lie at the distances of `points`, but around the azimuth phi at which the mirrored ray leaves the pixel on
-the picture: a ray that starts at the pixel stays on one half-line of it. From a uniform v of the unit interval ::
+Its samples lie at the distances of `sample_points`, but around the azimuth phi at which the mirrored ray leaves the
+pixel on the picture: a ray that starts at the pixel stays on one half-line of it. From a uniform v of the unit interval
+::
 
     angle = phi + 2 arctan(s tan(pi (v - 1/2))), weight s / (c^2 + s^2 (1 - c^2)) with c = cos(pi (v - 1/2)),
 

@@ -2,8 +2,8 @@
 
 A point (u, v) of the unit square lies at the angle 2 pi v. With uniform density it lies r sqrt(1 + 3 u) from the
 receiver in the crown, r sqrt(u) in the disc within: equal areas get equally many points. With a density of the inverse
-distance it lies r (1 + u) and r u away: rings of equal width get equally many. It takes the texel it falls into, and
-stands for as many texels as there are to a point where it lies.
+distance it lies r (1 + u) and r u away: rings of equal width get equally many. A point takes the texel it falls into,
+and stands for as many texels as there are to a point where it lies.
 
 Offsets are whole texels (ox, oy), columns to the right and rows down from the receiver.
 

@@ -1,7 +1,7 @@
 """Levels filled with the surfaces nearest to the eye (Sec. 4): from pixels, then from four texels each.
 
-Of equally near ones it is that nearest to the picture's vertical centre line, then the upper, then the left one. So a
-mirror-symmetric picture of an even number of texels has mirror-symmetric levels, and the choice is the same whether
+Of equally near surfaces it is that nearest to the picture's vertical centre line, then the upper, then the left one. So
+a mirror-symmetric picture of an even number of texels has mirror-symmetric levels, and the choice is the same whether
 it is made at once or level by level. The best of each column is found first, with the columns as SIMD lanes, then the
 best of neighbouring columns.
 

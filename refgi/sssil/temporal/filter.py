@@ -1,7 +1,7 @@
 """Temporal filter F_i = a W(F_{i-1}) + (1 - a) I_i (Sec. 3.3), with a clamp to new light around a pixel.
 
-Variance clipping of temporal anti-aliasing (Salvi 2016; Karis 2014 clamps to the extremes): the bounds are the mean of
-the new light in a square of pixels, plus and minus some standard deviations, in each channel.
+The clamp is variance clipping of temporal anti-aliasing (Salvi 2016; Karis 2014 clamps to the extremes): the bounds are
+the mean of the new light in a square of pixels, plus and minus some standard deviations, in each channel.
 
 Symbols: I_i light of frame i as computed, F_i as filtered, W reprojection, a share of the frame before, n frames in
 which a surface was found before.

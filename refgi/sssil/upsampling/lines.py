@@ -4,9 +4,9 @@ Whatever a pixel's place in its texel, its texel's neighbours are as many places
 row of pixels reads contiguous values. Depth is stored as its inverse, the nearness: it is linear in the picture along
 every plane, and 0 at infinity.
 
-On a plane the nearness 1/z is linear in the picture, so differences between neighbouring pixels give its value at the
-texels around, without rays or normals: of the two differences along each axis the smaller one counts, and none where
-they disagree in sign, which avoids silhouettes.
+So differences of nearness between neighbouring pixels give its value on a plane at the texels around, without rays or
+normals: of the two differences along each axis the smaller one counts, and none where they disagree in sign, which
+avoids silhouettes.
 
 Symbols: g_x, g_y slope of the nearness (1/m a texel).
 """

@@ -1,8 +1,7 @@
 """Visibility of samples by a bitmask of angles on the depth map (after Therrien et al. 2023).
 
-From a receiver the picture is marched in slices, nearest samples first. The surface at a sample is taken to extend
-from its point away from the eye by a thickness, and occludes the sectors of elevation whose middle it covers
-(`elevation`).
+From a receiver the picture is marched in slices, nearest samples first. The surface at a sample is taken to extend from
+its point away from the eye by a thickness, and occludes the sectors of elevation whose middle it covers (`slices`).
 
 Symbols: d vector from receiver to sample (m), c = max(0, n . d), s = max(0, -m . d) with m = n_j ds_j / pi.
 """

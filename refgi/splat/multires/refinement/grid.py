@@ -3,8 +3,9 @@
 Level l has cells of 2^l x 2^l pixels, level 0 is the picture itself. Pictures of any size have such levels: cells at
 the right and lower border are cut. A cell without any surface is never refined and never evaluated.
 
-Levels lie one after another, each row by row, so that what holds for every cell of every level is one loop. A row of
-cells of the coarsest level belongs to one thread, which fills all finer levels inside it while they are in its cache.
+A mipmap's levels lie one after another, each row by row, so that what holds for every cell of every level is one loop.
+A row of cells of the coarsest level belongs to one thread, which fills all finer levels inside it while they are in its
+cache.
 """
 
 from typing import NamedTuple

@@ -192,7 +192,7 @@ def refine(
 
     discontinuous tuple of (h_l, w_l) bool: Which cells hold a discontinuity, for levels 0 to top; level 0 is never
         refined.
-    diagonal: Neighbours across a corner that count: "off", "corner", "literal" or "full8"; see `cells`.
+    diagonal: Neighbours across a corner that count: "off", "corner", "literal" or "full8".
     traversal: "single_pass", depth first, or "list", as published; both give the same.
     -> Subsplats: Cells of the coarsest level row by row, depth first within them.
     """

@@ -7,11 +7,10 @@ it; F(x) is the radius of the region at x, an ellipse has its centre at (c, 0) a
 The paper's first bound is a quadrilateral in screen space. Here it is the exact rectangle of the ball of radius R_0
 around the light: the tangents from the eye, horizontally and vertically.
 
-Ellipsoids as low-polygon meshes, drawn to find the pixels a light may reach (SII Sec. 3.4 and 4; E-SII-14 i).
-
-Graphics hardware draws a coarse sphere, scaled and turned into each light's ellipsoid. The sphere's vertices lie on
-the unit ball and its faces within it, so as published it misses pixels; scaled by one over the distance of its
-nearest face it encloses the ball. A pixel comes into question where the drawing covers its centre.
+To find the pixels a light may reach, graphics hardware draws a coarse sphere, scaled and turned into each light's
+ellipsoid (SII Sec. 3.4 and 4; E-SII-14 i). The sphere's vertices lie on the unit ball and its faces within it, so as
+published it misses pixels; scaled by one over the distance of its nearest face it encloses the ball. A pixel comes into
+question where the drawing covers its centre.
 """
 
 import math

@@ -4,6 +4,7 @@ A tile of 8 x 8 pixels is bounded by boxes around its positions and normals. A l
 lies behind its surface, it behind the surfaces of all receivers, its solid misses the box, or the largest B that the
 box admits is below I_low. Strips of 16 x 256 are tested first, then their quarters, then tiles of 16 x 16 and their
 parts, each against the lights that may reach the whole alone.
+
 All is done from differences of positions, with a margin for rounding: lists may be longer than need be, never shorter.
 
 Symbols: d vector from the solid's centre to the box's, q the half sides of the box; with the solid scaled to the unit

@@ -4,13 +4,13 @@ The paper sets I_low to "x % of I_0", an irradiance to an intensity. Here it is 
 I_low = x max I_0 / L_ref^2: dim lights reach less far, as Sec. 3.6 says they do. The intensity of an RGB light is its
 largest channel.
 
+Without L_ref the paper's unit of length is missing, and with it how far splats reach. Figure 8 shows how far they do:
+of 768 lights cut at 5 % a mean of 125 counts at a pixel. Here B of pairs of lights and sampled pixels is sorted: the
+length is the one under which 5 % leave that share of them, in any unit.
+
 `cut_loss` is the share of light that the threshold removes: the picture's sum at sampled pixels against the full one.
 
-I_low is "x % of I_0", an irradiance of an intensity: the paper's unit of length is missing, and with it how far splats
-reach. Figure 8 shows how far they do: of 768 lights cut at 5 % a mean of 125 counts at a pixel. Here B of pairs of
-lights and sampled pixels is sorted: the length is the one under which 5 % leave that share of them, in any unit.
-
-B = I(w) / r^2 of a pair of light and receiver is what the threshold compares, in float64.
+B = I(w) / r^2 of a pair of light and receiver is what the threshold compares; here it is float64.
 """
 
 import dataclasses

@@ -1,6 +1,6 @@
 """The page of a comparison: one file that works from disk, with pictures as numbers, table, plot and stages inside.
 
-It says what results were made with: versions, processor, threads.
+It says what its results were made with: versions, processor, threads.
 """
 
 import functools

@@ -4,8 +4,8 @@ Local frames: x along the wall, y up, z towards the courtyard; a shape stands wh
 (rows, columns) of a grid at density 1, and grow with the density but never below `least`, where the shape would no
 longer be recognised.
 
-In a bay x starts in its middle. It has a wall above the arch, its underside and the moulding around it. Soft or small
-are curtains, swags, shrubs and floor tiles.
+In a bay x starts in the middle. A bay has a wall above the arch, its underside and the moulding around it. Soft or
+small are curtains, swags, shrubs and floor tiles.
 """
 
 import dataclasses

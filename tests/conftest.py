@@ -14,6 +14,7 @@ hypothesis.settings.register_profile("refgi", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("refgi")
 
 ROOT = Path(__file__).parents[1]
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # several processes share the cores: waiting threads leave theirs
 COLLECTED: pytest.StashKey[tuple[list[pytest.Item], set[int]]] = pytest.StashKey()  # tests, and those left out
 # its first test makes the kit, for which the others of its folder would wait: it runs first, and they run last
 MAKES_THE_KIT = "tests/vectors/test_forms.py"

@@ -4,9 +4,9 @@ A kernel runs its bands by itself where the record has no threads: in a process 
 started, where they do not exist any more and OpenMP would end the process. Numba's `workqueue` takes one caller at a
 time and aborts at a second; there the first kernel has the threads, and others run by themselves meanwhile.
 
-Threads sleep between loops. By OpenMP's default they spin, which gains nothing measurable where each has a core of its
-own, and takes the core of the one that is waited for where it has not: beside another busy process, or several
-processes at once.
+Threads spin for some microseconds between loops and then sleep. OpenMP's default is to spin for milliseconds, which
+takes the core of the thread that is waited for where each has none of its own: beside a busy process, or several
+processes at once (docs/frames).
 """
 
 import contextlib
@@ -26,6 +26,7 @@ cgutils: Any = untyped_cgutils
 threading: Any = untyped_parallel
 
 SYMBOL = "refgi_launcher"
+SPINS = "3000"  # looks at what is waited for before a thread sleeps
 BYTES = ir.IntType(8).as_pointer()
 INT = ir.IntType(64)
 PARALLEL_FOR, EXCLUSIVE, BUSY = range(3)  # fields of the record
@@ -49,7 +50,8 @@ def start_threads() -> None:
     Raises InputError if the threading layer that NUMBA_THREADING_LAYER asks for is not there.
     """
     if not _launcher.parallel_for and not _forked:
-        os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # read when OpenMP is loaded, which is now
+        if "OMP_WAIT_POLICY" not in os.environ:
+            os.environ.setdefault("GOMP_SPINCOUNT", SPINS)  # read when OpenMP is loaded, which is now
         try:
             threading._launch_threads()
         except ValueError as error:

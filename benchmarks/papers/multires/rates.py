@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.multires.subjects import (
     LARGE,
     count_of,
@@ -21,7 +22,7 @@ from benchmarks.papers.multires.subjects import (
     without_indirect,
 )
 from benchmarks.papers.records import Bar, Figure, Picture, Plot, Ratios, Table
-from benchmarks.papers.workbench import Gallery, Workbench, errors_of, interleaved, seen_by
+from benchmarks.papers.workbench import Gallery, Workbench, errors_of, seen_by
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.scene import Scene
 from refgi.settings import replaced

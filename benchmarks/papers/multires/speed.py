@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.multires.subjects import (
     LARGE,
     count_of,
@@ -21,7 +22,7 @@ from benchmarks.papers.multires.subjects import (
     unclamped,
 )
 from benchmarks.papers.records import Cell, Figure, Picture, Plot, Rows, Table
-from benchmarks.papers.workbench import Gallery, Workbench, errors_of, interleaved, seen_by
+from benchmarks.papers.workbench import Gallery, Workbench, errors_of, seen_by
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints

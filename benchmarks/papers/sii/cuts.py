@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.records import Bar, Case, Cell, Figure, Ratios, Table, relative
 from benchmarks.papers.sii.subjects import counted, full_sum, reference_length, splats
-from benchmarks.papers.workbench import Gallery, Redrawing, Workbench, errors_of, interleaved
+from benchmarks.papers.workbench import Gallery, Redrawing, Workbench, errors_of
 from refgi.compare.pictures import Scale
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights

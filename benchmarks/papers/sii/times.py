@@ -6,9 +6,10 @@ import time
 from functools import partial
 from typing import Any
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.records import Cell, Figure, Table, relative
 from benchmarks.papers.sii.subjects import CAUSTIC
-from benchmarks.papers.workbench import Redrawing, Workbench, interleaved, seen_by
+from benchmarks.papers.workbench import Redrawing, Workbench, seen_by
 from refgi.lights import importance, importance_pyramid
 from refgi.lights.warp import Method, warp_samples
 from refgi.sampling import halton

@@ -7,10 +7,11 @@ import imageio.v3
 import numpy as np
 import pytest
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.records import PAPERS, Entry, choose, find_paper
 from benchmarks.papers.report import page
 from benchmarks.papers.runner import reproduce
-from benchmarks.papers.workbench import FULL, QUICK, Workbench, interleaved
+from benchmarks.papers.workbench import FULL, QUICK, Workbench
 from refgi.errors import InputError
 from refgi.image import read_exr
 from tests.benchmarks.papers.conftest import ENTRIES, TINY, gradient

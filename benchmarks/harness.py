@@ -1,14 +1,18 @@
-"""How benchmarks measure: interleaved runs, medians, and ratios within one process."""
+"""How benchmarks measure: interleaved runs, medians, ratios within one process, and how far pictures are off."""
 
+import dataclasses
 import os
 import statistics
 import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
 
 from refgi.scene import Scene, load_scene
 from refgi.stages import Run
+from refgi.types import Array
 
 K = TypeVar("K", bound=Hashable)
 
@@ -102,3 +106,20 @@ def own_seconds(runs: Sequence[Run]) -> dict[str, float]:
             own[open_runs[-1].name] -= run.seconds
         open_runs.append(run)
     return own
+
+
+def relative_rmse(found: Array, full: Array) -> float:
+    """Return the RMSE over the mean of what is in full, both over all pixels and channels."""
+    return float(np.sqrt(np.mean((found.astype(np.float64) - full) ** 2)) / full.mean(dtype=np.float64))
+
+
+def moved(scene: Scene, step: float, *, light: bool = True, camera: bool = True) -> Scene:
+    """Return a scene whose first light and camera lie `step` farther along x, m."""
+    if light:
+        lamp: Any = scene.lights[0]
+        a, b, c = lamp.position
+        scene = scene.with_lights(dataclasses.replace(lamp, position=(a + step, b, c)), *scene.lights[1:])
+    if camera:
+        x, y, z = scene.camera.eye
+        scene = scene.with_camera(eye=(x + step, y, z))
+    return scene

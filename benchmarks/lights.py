@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.harness import Row, in_turn, real_scene
+from benchmarks.harness import Row, in_turn, real_scene, relative_rmse
 from refgi import Frame, load_scene
 from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import add_lights
@@ -66,7 +66,7 @@ def _of_count(name: str, frame: Frame, count: int, repeats: int) -> Iterator[Row
         off = got[:, some].astype(np.float64) - expected
         total = expected.sum(axis=0, dtype=np.float64)
         worst = float((np.abs(off).sum(axis=0)[total > 0] / total[total > 0]).max(initial=0.0))
-        rmse = float(np.sqrt((off**2).mean()) / expected.mean(dtype=np.float64))
+        rmse = relative_rmse(got[:, some], expected)
         whole, taken_by_cuts = share * statistics.median(of_full), statistics.median(of_cuts)
         equal = taken_by_cuts / (whole / number)
         note = (f"N {number}, full {whole:.3f} s ({min(of_full) * share:.3f} to {max(of_full) * share:.3f}), "

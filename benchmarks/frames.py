@@ -6,7 +6,6 @@ of lights and pixels; an error is RMSE over the mean to the same lights without 
 used where REFGI_DATA names their folder, built-in ones of as many faces elsewhere.
 """
 
-import dataclasses
 import statistics
 import time
 import warnings
@@ -17,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import refgi
-from benchmarks.harness import Row, own_seconds, paper_scene
+from benchmarks.harness import Row, moved, own_seconds, paper_scene, relative_rmse
 from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import find_method, usual_shadows
@@ -107,18 +106,6 @@ def _rate(name: str, scene: Scene, subject: Subject, light: bool, camera: bool, 
     return Row(name, 1 / statistics.median(taken), "frames/s", aim, note)
 
 
-def moved(scene: Scene, step: float, *, light: bool = True, camera: bool = True) -> Scene:
-    """Return a scene whose first light and camera lie `step` farther along x, m."""
-    if light:
-        lamp = scene.lights[0]
-        a, b, c = lamp.position
-        scene = scene.with_lights(dataclasses.replace(lamp, position=(a + step, b, c)), *scene.lights[1:])
-    if camera:
-        x, y, z = scene.camera.eye
-        scene = scene.with_camera(eye=(x + step, y, z))
-    return scene
-
-
 def _error(scene: Scene, subject: Subject) -> float:
     """Return the RMSE of irradiance over the mean, both over all pixels, to that without what makes frames fast."""
     pictures = []
@@ -127,5 +114,4 @@ def _error(scene: Scene, subject: Subject) -> float:
         settings = replaced(method.settings(), changed)
         frame = Frame(scene, width=subject.width, height=subject.height, shadows=usual_shadows(settings))
         pictures.append(np.asarray(method.compute(frame, settings)[0], np.float64))
-    found, full = pictures
-    return float(np.sqrt(np.mean((found - full) ** 2)) / full.mean())
+    return relative_rmse(*pictures)

@@ -1,14 +1,20 @@
-"""How benchmarks measure: interleaved runs, medians, and ratios within one process."""
+"""How benchmarks measure: interleaved runs, medians, ratios within one process, and how far pictures are off."""
 
+import dataclasses
 import os
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
 
 from refgi.scene import Scene, load_scene
 from refgi.stages import Run
+from refgi.types import Array
+
+K = TypeVar("K", bound=Hashable)
 
 STAND_INS = {  # built-in scenes of as many faces, where the papers' are absent
     "cornell_horse": "cornell_sphere:faces=17000", "sponza": "atrium:faces=262000",
@@ -56,25 +62,35 @@ class Ratio(NamedTuple):
     seconds_b: float
 
 
-def seconds(function: Callable[[], object], repeats: int = 5) -> float:
-    """Return the median wall time of `function` after one warm-up call, s."""
-    function()
-    return statistics.median(_time(function) for _ in range(repeats))
+def seconds_of(run: Callable[[], object], clock: Callable[[], float] = time.perf_counter) -> float:
+    """Return the time of one call, s."""
+    started = clock()
+    run()
+    return clock() - started
+
+
+def in_turn(work: Mapping[K, Callable[[], object]], repeats: int,
+            clock: Callable[[], float] = time.perf_counter) -> dict[K, list[float]]:
+    """Time pieces of work in turn, A B C A B C ..., after one run of each that compiles."""
+    for run in work.values():
+        run()
+    spent: dict[K, list[float]] = {name: [] for name in work}
+    for _ in range(repeats):
+        for name, run in work.items():
+            spent[name].append(seconds_of(run, clock))
+    return spent
+
+
+def interleaved(work: Mapping[K, Callable[[], object]], repeats: int) -> dict[K, float]:
+    """Return the median seconds of pieces of work in turn."""
+    return {name: statistics.median(times) for name, times in in_turn(work, repeats).items()}
 
 
 def ratio(a: Callable[[], object], b: Callable[[], object], repeats: int = 7) -> Ratio:
-    """Time A and B in turn, A B A B ..., after one warm-up call of each."""
-    a(), b()
-    pairs = [(_time(a), _time(b)) for _ in range(repeats)]
-    quotients = sorted(x / y for x, y in pairs)
-    return Ratio(statistics.median(quotients), quotients[0], quotients[-1],
-                 statistics.median(x for x, _ in pairs), statistics.median(y for _, y in pairs))
-
-
-def _time(function: Callable[[], object]) -> float:
-    started = time.perf_counter()
-    function()
-    return time.perf_counter() - started
+    """Return the time of A over that of B, pair by pair."""
+    times = in_turn({"a": a, "b": b}, repeats)
+    quotients = [x / y for x, y in zip(times["a"], times["b"], strict=True)]
+    return Ratio(statistics.median(quotients), min(quotients), max(quotients), *map(statistics.median, times.values()))
 
 
 def own_seconds(runs: Sequence[Run]) -> dict[str, float]:
@@ -90,3 +106,20 @@ def own_seconds(runs: Sequence[Run]) -> dict[str, float]:
             own[open_runs[-1].name] -= run.seconds
         open_runs.append(run)
     return own
+
+
+def relative_rmse(found: Array, full: Array) -> float:
+    """Return the RMSE over the mean of what is in full, both over all pixels and channels."""
+    return float(np.sqrt(np.mean((found.astype(np.float64) - full) ** 2)) / full.mean(dtype=np.float64))
+
+
+def moved(scene: Scene, step: float, *, light: bool = True, camera: bool = True) -> Scene:
+    """Return a scene whose first light and camera lie `step` farther along x, m."""
+    if light:
+        lamp: Any = scene.lights[0]
+        a, b, c = lamp.position
+        scene = scene.with_lights(dataclasses.replace(lamp, position=(a + step, b, c)), *scene.lights[1:])
+    if camera:
+        x, y, z = scene.camera.eye
+        scene = scene.with_camera(eye=(x + step, y, z))
+    return scene

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.harness import Row, paper_scene, ratio
+from benchmarks.harness import Row, paper_scene, ratio, relative_rmse
 from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import find_method, usual_shadows
@@ -48,7 +48,7 @@ def rows(quick: bool) -> Iterator[Row]:
             settings = of(find_method(mode[0]).settings, **mode[1])
             frame = Frame(scene, width=size, height=size, shadows=usual_shadows(settings))
             found, whole = _light(frame, mode), _light(frame, full)
-            error = float(np.sqrt(np.mean((found - whole) ** 2)) / whole.mean())
+            error = relative_rmse(found, whole)
             faster = ratio(lambda frame=frame, full=full: _light(frame, full),
                            lambda frame=frame, mode=mode: _light(frame, mode), repeats)
             yield Row(f"{name}: {title}", error, "RMSE / mean", "",

@@ -1,7 +1,4 @@
-"""From the shell: help, the first picture with an empty kernel cache, the second start, and what an edit recompiles.
-
-Cold starts are timed in turn with those of an earlier commit, on the same machine; so is the demo, unless --quick.
-"""
+"""From the shell: help, the first picture with an empty kernel cache, the second start, and what an edit recompiles."""
 
 import os
 import shutil
@@ -15,9 +12,7 @@ from pathlib import Path
 from benchmarks.harness import Row
 
 ROOT = Path(__file__).parents[1]
-EARLIER = "d69759e"  # before kernels were compiled as parts of their callers
 PICTURE = ["render", "cornell_box", "--method", "sii", "--size", "512x512", "--out"]
-DEMO = ["compare", "cornell_box", "--methods", "sii,multires,val,hssil", "--out"]  # of the Makefile
 
 
 def rows(quick: bool) -> Iterator[Row]:
@@ -31,9 +26,7 @@ def rows(quick: bool) -> Iterator[Row]:
         yield Row("second start above import of numba", second - numba, "s", "<= 1.5")
         yield Row("kernels compiled after an edit of scene/material.py", _compiled_after_edit(folder), "kernels",
                   "<= 0")
-        yield from _beside(folder, "first picture, empty cache", PICTURE, "picture.exr", 0.3)
-        if not quick:
-            yield from _beside(folder, "demo, empty cache", DEMO, "demo", 0.25)
+        yield Row("first picture, empty cache", _seconds(ROOT, [*PICTURE, f"{folder}/b.exr"], f"{folder}/cold"), "s")
 
 
 def _compiled_after_edit(folder: str) -> int:
@@ -45,29 +38,6 @@ def _compiled_after_edit(folder: str) -> int:
     before = len(list(Path(f"{folder}/cache").iterdir()))
     _seconds(copy, [*PICTURE, f"{folder}/edited.exr"], f"{folder}/cache")
     return len(list(Path(f"{folder}/cache").iterdir())) - before
-
-
-def _beside(folder: str, name: str, arguments: list[str], out: str, aim: float) -> Iterator[Row]:
-    """Time a command with an empty cache, and that of the earlier commit, in turn."""
-    now = _seconds(ROOT, [*arguments, f"{folder}/now_{out}"], f"{folder}/cold_{out}")
-    yield Row(name, now, "s")
-    if (earlier := _checkout(folder)) is None:
-        return
-    then = _seconds(earlier, [*arguments, f"{folder}/then_{out}"], f"{folder}/earlier_{out}")
-    yield Row(f"{name}, over that of {EARLIER}", now / then, "", f"<= {aim}", f"{then:.1f} s there")
-
-
-def _checkout(folder: str) -> Path | None:
-    """Return the sources of the earlier commit, or None where there is no history."""
-    place = Path(folder) / "earlier"
-    if not place.is_dir():
-        place.mkdir()
-        archive = subprocess.run(["git", "-C", str(ROOT), "archive", EARLIER, "refgi"], capture_output=True,
-                                 check=False)
-        if archive.returncode:
-            return None
-        subprocess.run(["tar", "-x", "-C", str(place)], input=archive.stdout, check=True)
-    return place if (place / "refgi").is_dir() else None
 
 
 def _seconds(sources: Path, arguments: list[str], cache: str = "") -> float:

@@ -1,10 +1,8 @@
-"""What the figures of one run share: sizes, frames that stay warm, run times in turn, errors, and pictures of light."""
+"""What the figures of one run share: sizes, frames that stay warm, errors, and pictures of light."""
 
 import colorsys
 import dataclasses
-import statistics
-import time
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -22,7 +20,6 @@ from refgi.truth import TruthResult, TruthSettings, trace_truth
 from refgi.types import Array
 
 T = TypeVar("T")
-K = TypeVar("K", bound=Hashable)
 
 SMALLEST = 8  # pixels along a side, however small a run is
 GOLDEN = 0.6180339887498949  # turns between neighbouring colours
@@ -111,24 +108,6 @@ class Redrawing(Memory):
     def recall(self, name: str, inputs: tuple[Any, ...]) -> tuple[bool, Any]:
         """Return whether a result for these inputs is kept, and the result; of splats none is."""
         return (False, None) if name.startswith(("sii.", "multires.", "pairs.")) else super().recall(name, inputs)
-
-
-def interleaved(work: Mapping[K, Callable[[], object]], repeats: int) -> dict[K, float]:
-    """Return median seconds of pieces of work in turn, A B C A B C ..., after one run of each that compiles."""
-    for run in work.values():
-        run()
-    spent: dict[K, list[float]] = {name: [] for name in work}
-    for _ in range(repeats):
-        for name, run in work.items():
-            spent[name].append(seconds_of(run))
-    return {name: statistics.median(times) for name, times in spent.items()}
-
-
-def seconds_of(run: Callable[[], object]) -> float:
-    """Return the wall time of one call."""
-    started = time.perf_counter()
-    run()
-    return time.perf_counter() - started
 
 
 class Errors(NamedTuple):

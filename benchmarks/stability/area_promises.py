@@ -1,49 +1,20 @@
-"""Promises of virtual area lights: exact angles, rectangles in any unit, maps that nothing hidden moves."""
-
-from typing import Any
+"""Promises of virtual area lights: rectangles in any unit, maps that nothing hidden moves."""
 
 import numpy as np
 
-from benchmarks.stability.inputs import BLOCK, around, directions
-from benchmarks.stability.ladder import Ladder
-from benchmarks.stability.maths import cross, dot
-from benchmarks.stability.pair_ladders import filled
+from benchmarks.stability.numbers import directions
 from benchmarks.stability.promise import Case, Promise
 from refgi.cluster.clustering.kmeans import Clustering
 from refgi.cluster.clustering.rectangle import AreaLights, area_lights
-from refgi.cluster.clustering.rounds import linear
 from refgi.cluster.maps.occluders import Ends
 from refgi.cluster.maps.shadow_maps import shadow_maps
 from refgi.cluster.settings import AreaLightSettings, ShadowMapSettings
-from refgi.jit import kernel
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.rsm.buffers.extent import Extent
 from refgi.scene import Geometry
-from refgi.types import Array
 
 LIGHTS, CLUSTERS = 60, 8
 NUMBERS = ("map_of", "center", "near", "far", "scene_far", "depth")  # of shadow maps
-
-
-@kernel
-def _angles(x: Array, out: Array) -> None:
-    zero, one = x[0, 0] - x[0, 0], x.dtype.type(1.0)
-    for i in range(x.shape[1]):
-        out[0, i] = linear(zero, zero, zero, x[0, i], x[1, i], x[2, i], zero, zero, zero, x[3, i], x[4, i], x[5, i],
-                           zero, one)
-
-
-def draw_normals(rng: np.random.Generator, real: Any) -> Array:
-    n = directions(rng)
-    m = around(rng, n, real)
-    tilt = 10.0 ** rng.uniform(-16, 0, BLOCK)
-    m = np.where(rng.random(BLOCK) < 0.3, n + tilt * directions(rng), m)
-    return np.concatenate([n, rng.choice([-1.0, 1.0], BLOCK) * m / np.sqrt((m * m).sum(axis=0))])
-
-
-def angle(m: Any, x: Any) -> Any:
-    aside = cross(x[:3], x[3:])
-    return [m.atan2(m.sqrt(dot(aside, aside)), dot(x[:3], x[3:]))]
 
 
 def _lights(rng: np.random.Generator, size: float) -> tuple[PixelLights, Clustering]:
@@ -103,11 +74,6 @@ def unmoved(rng: np.random.Generator) -> Case:
     return Case(differing, f"a plane of {ground:.3g} m under a room of 2 m: {differing} numbers differ")
 
 
-LADDERS = (
-    Ladder("val.angle", "unit normals any way, 1e-16 .. 1 rad from along and opposite", draw_normals,
-           filled(_angles), angle, 5.0, source="1e-15, as the kernel promises, and a rounding of both inputs",
-           unit="one", conditioned=False, reals=("float64",)),
-)
 PROMISES = (
     Promise("val.rectangles", "lengths x 2^k, to the bit", "area_lights",
             "k -60 .. 60; lights in rows and in one place", rectangles, "lengths", 0.0, "exact",

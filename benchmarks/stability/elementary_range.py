@@ -10,10 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.stability.inputs import BLOCK, any_size
-from benchmarks.stability.ladder import THREADS, Ladder
-from benchmarks.stability.maths import Maths
-from benchmarks.stability.pair_ladders import each, filled
+from benchmarks.stability.ladder import THREADS, Ladder, each, filled
+from benchmarks.stability.numbers import BLOCK, any_size
 from refgi.elementary import exp2, log2, log2p1, pow
 from refgi.jit import kernel
 from refgi.stress.promises import Row
@@ -143,22 +141,6 @@ def draw_powers(rng: np.random.Generator, real: Any) -> Array:
     return np.stack([x, rng.uniform(-most, most, BLOCK) * np.exp(rng.uniform(-5, 0, BLOCK)) / np.log2(x)])
 
 
-def power_of_two(m: Maths, x: Any) -> Any:
-    return [m.exp(x[0] * m.log(m.number(np.array(2.0))))]
-
-
-def logarithm(m: Maths, x: Any) -> Any:
-    return [m.log(x[0]) / m.log(m.number(np.array(2.0)))]
-
-
-def logarithm_of_more(m: Maths, x: Any) -> Any:
-    return [m.log1p(x[0]) / m.log(m.number(np.array(2.0)))]
-
-
-def power(m: Maths, x: Any) -> Any:
-    return [m.exp(x[1] * m.log(x[0]))]
-
-
 def _ladder(name: str, draw: Any, fill: Any, formula: Any, limit: float, reals: tuple[str, ...]) -> Ladder:
     return Ladder(name, "all sizes, subnormal numbers and numbers next to 1 among them", draw, filled(fill), formula,
                   limit, source="the promise of refgi/elementary, without a condition", conditioned=False, reals=reals,
@@ -167,9 +149,10 @@ def _ladder(name: str, draw: Any, fill: Any, formula: Any, limit: float, reals: 
 
 BOTH = ("float32", "float64")
 LADDERS = (
-    _ladder("exp2", draw_exponents, FILL["exp2"], power_of_two, 1.3, BOTH),
-    _ladder("log2", draw_positive, FILL["log2"], logarithm, 0.6, BOTH),
-    _ladder("log2p1", draw_above_minus_one, FILL["log2p1"], logarithm_of_more, 3.0, BOTH),
-    _ladder("pow32", draw_powers, POW, power, 2.5, ("float32",)),
-    _ladder("pow64", draw_powers, POW, power, 15.0, ("float64",)),
+    _ladder("exp2", draw_exponents, FILL["exp2"], lambda x: [np.exp2(x[0])], 1.3, BOTH),
+    _ladder("log2", draw_positive, FILL["log2"], lambda x: [np.log2(x[0])], 0.6, BOTH),
+    _ladder("log2p1", draw_above_minus_one, FILL["log2p1"], lambda x: [np.log1p(x[0]) / np.log(0 * x[0] + 2)], 3.0,
+            BOTH),
+    _ladder("pow32", draw_powers, POW, lambda x: [x[0] ** x[1]], 2.5, ("float32",)),
+    _ladder("pow64", draw_powers, POW, lambda x: [x[0] ** x[1]], 15.0, ("float64",)),
 )

@@ -9,31 +9,24 @@ from benchmarks.stability import (
     area_promises,
     buffers,
     elementary_range,
-    hssil,
-    lamp_ladders,
-    level_promises,
-    light_ladders,
+    lamps,
     lobes,
-    map_ladders,
     map_promises,
-    pair_ladders,
-    place_promises,
+    maps,
+    pairs,
+    places,
     promise,
-    sampled_promises,
     sent_promises,
-    sum_promises,
-    val_ladders,
+    sums,
+    val,
 )
-from benchmarks.stability.inputs import BLOCK
 from benchmarks.stability.ladder import Ladder, conditions, errors, inputs_of, rows
-from benchmarks.stability.maths import DIGITS, EXTENDED, trusted
+from benchmarks.stability.numbers import BLOCK, DIGITS, EXTENDED, digits, trusted
 from benchmarks.stability.promise import Task, Tell
 from refgi.stress.promises import Row
 
-MODULES = (pair_ladders, hssil, lamp_ladders, val_ladders, map_ladders, elementary_range, lobes, light_ladders,
-           area_promises, level_promises, sent_promises)
-PROMISED = (sum_promises, lobes, buffers, map_promises, area_promises, level_promises,
-            place_promises, sampled_promises, sent_promises)  # of stages
+MODULES = (pairs, lamps, val, maps, elementary_range, lobes, places, sent_promises)
+PROMISED = (sums, lobes, buffers, map_promises, area_promises, places, sent_promises)  # of stages
 ALL = ".all"
 
 
@@ -57,7 +50,7 @@ def tasks(short: bool) -> list[Task]:
         return lambda _: elementary_range.rows(name, short)
 
     return [*(Task(name, measured(ladder)) for name, ladder in ladders().items()),
-            Task("crown.unit", lambda _: hssil.unit_rows(short)),
+            Task("crown.unit", lambda _: pairs.unit_rows(short)),
             *(Task(f"{name}{ALL}", whole(name)) for name in elementary_range.FILL),
             *promise.promise_tasks(promises().values(), "kernels", short)]
 
@@ -77,12 +70,12 @@ def again(name: str, seed: int, case: int) -> str:
         got = ladder.run(x)
         lines.append(f"{name} {real}, seed {seed}, case {case}\n  inputs     {_shown(x[:, 0])}")
         lines.append(f"  got        {_shown(got[:, 0])}")
-        for maths in (EXTENDED, DIGITS) if ladder.extended else (DIGITS,):
+        for precision in (EXTENDED, DIGITS) if ladder.extended else (DIGITS,):
             with np.errstate(all="ignore"):
-                exact = ladder.formula(maths, [maths.number(row) for row in x])
-            error, unit = errors(ladder, maths, real, x, got)
-            condition = conditions(ladder, maths, real, x, unit) if ladder.conditioned else np.ones_like(error)
-            lines += [f"  {maths.name}\n    formula  {_shown([one[0] for one in exact])}",
+                exact = ladder.formula(precision.of(x))
+            error, unit = errors(ladder, precision, real, x, got)
+            condition = conditions(ladder, precision, real, x, unit) if ladder.conditioned else np.ones_like(error)
+            lines += [f"  {precision.name}\n    formula  {_shown([one[0] for one in exact])}",
                       f"    error    {_shown((error / unit)[:, 0].astype(float))} units, condition "
                       f"{_shown(condition[:, 0].astype(float))}, figure "
                       f"{float((error / unit / condition).max()):.4g}, limit {ladder.limit:g}"]
@@ -105,4 +98,4 @@ def _shown(values: Any) -> str:
                     for v in values)
 
 
-DIGITS_TYPES = (np.longdouble, type(DIGITS.pi))
+DIGITS_TYPES = (np.longdouble, digits.mpf)

@@ -1,7 +1,8 @@
-"""Ladders of sharp lobes: norms to exponents of 1e20, a term of the sum over lobes, drawn directions; norms on average.
+"""Ladders of Phong lobes: gap, power, norms to exponents of 1e20, a term of the sum, drawn directions; mean norms.
 
 Formulas are those of docs/radiometry.md: the lobe c <r . w>^P with c = (P + 1) / (2 pi K). For P of a million and more
-K = 1 - erfc(sqrt(-(a - 1/4) ln(1 - c^2))) / 2, a = (P + 1) / 2; below it is an incomplete beta function.
+K = 1 - erfc(sqrt(-(a - 1/4) ln(1 - c^2))) / 2, a = (P + 1) / 2; below it is an incomplete beta function. Those of
+refgi.literal take K from a quadrature in float64, which is not exact enough, and the power from the cosine.
 
 About the horizon the continued fraction of a norm loses digits: some P/3 ULP, as its terms are 1 less almost 1. That is
 rounding, to either side alike; a fraction which is cut too early, or a wrong term, is off to one side.
@@ -11,22 +12,36 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.stability.inputs import BLOCK, across, directions, sizes
-from benchmarks.stability.ladder import Ladder
-from benchmarks.stability.maths import DIGITS, digits, dot
-from benchmarks.stability.pair_ladders import LEAST, each_of, norm, norms
+from benchmarks.stability.ladder import Ladder, each_of
+from benchmarks.stability.numbers import (
+    BLOCK,
+    DIGITS,
+    across,
+    around,
+    complementary_error,
+    directions,
+    dot,
+    incomplete_beta,
+    pi_of,
+    sizes,
+    some,
+)
 from benchmarks.stability.promise import Case, Promise
 from refgi.jit import kernel
+from refgi.literal.pairs import LEAST_SHARE
 from refgi.pairs.lobe_culling import LIMIT, bound_lobes
 from refgi.pairs.lobe_sum import EXPONENT, RATIO, add_lobe
 from refgi.pairs.pair_sum import NX, SUM, Clamp, X
-from refgi.radiometry import lobe_direction
+from refgi.radiometry import lobe_direction, lobe_gap, lobe_norm, lobe_power
 from refgi.types import Array
 
 ROWS = max(EXPONENT, RATIO) + 1
 SHARP, SHARPEST = 1e6, 1e20
 SMALLEST, STEP = 2.0**-126, 2.0**-149  # a lobe below this share of its peak is 0; of subnormal float32 numbers
 EDGE = 8 * 2.0**-24  # of the light's plane, within which rounding may decide
+
+
+norms = each_of(lobe_norm, 2)
 
 
 @kernel
@@ -39,6 +54,55 @@ def _terms(lights: Array, to: Array, limits: Array, clamp: Any, tile: Array, out
         out[0, i] = tile[SUM, 0]
 
 
+def draw_gaps(rng: np.random.Generator, real: Any) -> Array:
+    w = directions(rng)
+    return np.concatenate([around(rng, w, real), w * sizes(rng, 1e-15, 1e9)])
+
+
+def gap(x: Any) -> Any:
+    off = x[:3] - x[3:6] / np.sqrt(dot(x[3:6], x[3:6]))
+    return [dot(off, off) / 2]
+
+
+def draw_powers(rng: np.random.Generator, real: Any) -> Array:
+    """Return gaps and exponents, most of whose product is 1e-3 to 200: where the power is neither 0 nor 1."""
+    exponent = sizes(rng, 1e-3, 1e8 if real is np.float32 else 1e20)
+    gaps = np.minimum(np.exp(rng.uniform(np.log(1e-3), np.log(200), BLOCK)) / exponent, rng.uniform(0, 1, BLOCK))
+    gaps = np.where(rng.random(BLOCK) < 0.1, rng.uniform(0, 2, BLOCK), gaps)
+    return np.stack([some(rng, gaps, 0.0), some(rng, exponent, 0.0)])
+
+
+def power(x: Any) -> Any:
+    inside = np.where(x[0] < 1, x[0], 0 * x[0])
+    return [np.where(x[0] < 1, np.exp(x[1] * np.log1p(-inside)), 0 * x[0])]
+
+
+def flushed(x: Any, real: Any) -> Any:
+    """Return what a power below the smallest normal number may lose: all of it."""
+    tiny = float(np.finfo(real).tiny)
+    return np.where(power(x)[0] < 2 * tiny, tiny, 0.0)
+
+
+def draw_norms(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    """Return cosines from 1 down to where 1e-11 of the lobe is left above the surface, and exponents."""
+    exponent = some(rng, sizes(rng, 1e-3, 1e4), 0.0)
+    near = np.exp(rng.uniform(np.log(1e-9), 0, BLOCK)) * rng.choice([-1.0, 1.0], BLOCK)
+    edge = near * 5 / np.sqrt(exponent + 25)
+    cosine = np.select([kind := rng.integers(0, 4, BLOCK) == 0, kind == 1], [np.ones(BLOCK), rng.random(BLOCK)], edge)
+    below = -np.minimum(5 / np.sqrt(exponent + 25), 0.999)
+    return np.stack([np.maximum(cosine, below), exponent])
+
+
+def norm(x: Any) -> Any:
+    """(P + 1) / (2 pi K), K = 1 - I / 2; I the regularised incomplete beta function of sin^2, (P + 1) / 2 and 1/2."""
+    return _normed(x, incomplete_beta(np.maximum(1 - x[0] * x[0], 0), (x[1] + 1) / 2) / 2)
+
+
+def _normed(x: Any, half: Any) -> Any:
+    fraction = np.where(x[0] >= 0, 1 - half, half)
+    return [np.where(fraction > LEAST_SHARE, (x[1] + 1) / (2 * pi_of(x) * fraction), 0 * x[0])]
+
+
 def draw_sharp(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     """Return cosines within the width of the lobe off the horizon, to where 1e-11 of it is left, and exponents."""
     exponent = sizes(rng, SHARP, SHARPEST)
@@ -46,11 +110,8 @@ def draw_sharp(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     return np.stack([near / np.sqrt(exponent), exponent])
 
 
-def sharp_norm(m: Any, x: Any) -> Any:
-    s = m.sqrt(((x[1] + 1) / 2 - m.number(np.float64(0.25))) * -m.log1p(-x[0] * x[0]))
-    half = np.frompyfunc(digits.erfc, 1, 1)(s) / 2
-    fraction = np.where(x[0] >= 0, 1 - half, half)
-    return [np.where(fraction > LEAST, (x[1] + 1) / (2 * m.pi * fraction), 0 * x[0])]
+def sharp_norm(x: Any) -> Any:
+    return _normed(x, complementary_error(np.sqrt(((x[1] + 1) / 2 - 0.25) * -np.log1p(-x[0] * x[0]))) / 2)
 
 
 def draw_middle(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
@@ -83,36 +144,36 @@ def terms(x: Array) -> Array:
     return out
 
 
-def _shape(m: Any, x: Any) -> Any:
+def _shape(x: Any) -> Any:
     d = x[:3]
     square = dot(d, d)
-    length = m.sqrt(square)
-    off = [r - w / length for r, w in zip(x[6:9], d, strict=True)]
+    length = np.sqrt(square)
+    off = x[6:9] - d / length
     h = dot(off, off) / 2
-    inside = np.where(h < 1, h, 0)
+    inside = np.where(h < 1, h, 0 * h)
     above = dot(d, x[3:6]) / length
-    power = np.where((h < 1) & (above > 0), m.exp(x[12] * m.log1p(-inside)), 0 * h)
+    power = np.where((h < 1) & (above > 0), np.exp(x[12] * np.log1p(-inside)), 0 * h)
     return square, h, above, power, np.maximum(dot(d, x[9:12]) / length, 0)
 
 
-def term(m: Any, x: Any) -> Any:
-    square, _, _, power, cosine = _shape(m, x)
+def term(x: Any) -> Any:
+    square, _, _, power, cosine = _shape(x)
     return [power * cosine / square]
 
 
-def term_bound(m: Any, x: Any, real: Any) -> Any:  # noqa: ARG001
+def term_bound(x: Any, real: Any) -> Any:  # noqa: ARG001
     """What `add_lobes` promises of a float32 term; beyond it what is lost among subnormal numbers."""
-    square, h, _, power, cosine = _shape(m, x)
+    square, h, _, power, cosine = _shape(x)
     h = np.minimum(h, 0.999)
     value = power * cosine / square
-    rounding = value * (17 + 5 * -x[12] * m.log1p(-h) / m.log(m.number(np.float64(2))) + 6.5 * x[12] * (
-        m.sqrt(2 * h) + h) / (1 - h)) + 4 * power / square
+    rounding = value * (17 + 5 * -x[12] * np.log1p(-h) / np.log(2 + 0 * h) + 6.5 * x[12] * (
+        np.sqrt(2 * h) + h) / (1 - h)) + 4 * power / square
     return rounding * 2.0**-24 + 2 * SMALLEST / square + 4 * STEP
 
 
-def undecided(m: Any, x: Any, real: Any) -> Any:  # noqa: ARG001
+def undecided(x: Any, real: Any) -> Any:  # noqa: ARG001
     """Whether rounding may decide on which side of the light's plane or of h = 1 a pair lies: then nothing counts."""
-    _, h, above, _, _ = _shape(m, x)
+    _, h, above, _, _ = _shape(x)
     return np.where((abs(above) < EDGE) | (abs(h - 1) < 1e-3), np.inf, 0.0)
 
 
@@ -126,16 +187,16 @@ def draw_samples(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     return np.stack([u, rng.random(BLOCK), exponent])
 
 
-def sample(m: Any, x: Any) -> Any:
-    gap = 1 - m.exp(m.log(x[0]) / (x[2] + 1))
-    across_axis, phi = m.sqrt(gap * (2 - gap)), 2 * m.pi * x[1]
-    return [across_axis * m.cos(phi), across_axis * m.sin(phi), 1 - gap]
+def sample(x: Any) -> Any:
+    gap = 1 - np.exp(np.log(x[0]) / (x[2] + 1))
+    across_axis, phi = np.sqrt(gap * (2 - gap)), 2 * pi_of(x) * x[1]
+    return [across_axis * np.cos(phi), across_axis * np.sin(phi), 1 - gap]
 
 
-def sample_unit(m: Any, x: Any, real: Any) -> Any:  # noqa: ARG001
+def sample_unit(x: Any, real: Any) -> Any:  # noqa: ARG001
     """One ULP of the length across the axis for what lies across it, of 1 for what lies along it."""
-    gap = 1 - m.exp(m.log(x[0]) / (x[2] + 1))
-    side = m.sqrt(gap * (2 - gap)) * 2.0**-52
+    gap = 1 - np.exp(np.log(x[0]) / (x[2] + 1))
+    side = np.sqrt(gap * (2 - gap)) * 2.0**-52
     return np.stack([side, side, 0 * gap + 2.0**-52])
 
 
@@ -150,8 +211,8 @@ def bias(rng: np.random.Generator) -> Case:
     widths = 1.7 + 0.2 * rng.random(SAMPLES)  # of the lobe off the horizon: there the fraction has the most terms
     x = np.stack([-widths / np.sqrt(exponent), exponent])
     got = norms(x)[0]
-    exact = norm(DIGITS, [DIGITS.number(row) for row in x])[0]
-    error = np.array([float(DIGITS.number(np.array([g]))[0] / e - 1) for g, e in zip(got, exact, strict=True)])
+    exact = norm(DIGITS.of(x))[0]
+    error = np.array([float(DIGITS.of(np.array([g]))[0] / e - 1) for g, e in zip(got, exact, strict=True)])
     error /= 2.0**-52 * (1 + exponent / 3)
     deviation = float(error.std(ddof=1)) / np.sqrt(SAMPLES)
     return Case(abs(float(error.mean())) / deviation, f"exponents {middle:.0f} and more: mean {error.mean():.3g} "
@@ -159,6 +220,16 @@ def bias(rng: np.random.Generator) -> Case:
 
 
 LADDERS = (
+    Ladder("lobe.gap", "r 1e-15 .. 1e9 m, any direction, 1 ULP off, opposite", draw_gaps, each_of(lobe_gap, 6), gap,
+           12.0,
+           source="6.5 roundings of the unit vector and 5 of its square, each at most one ULP", extended=2_000_000),
+    Ladder("lobe.power", "P 0 .. 1e8 (float64: 1e20), gap 0 .. 2", draw_powers, each_of(lobe_power, 2), power,
+           floor=flushed, extended=4_000_000),
+    Ladder("lobe.norm", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, norms, norm,
+           reals=("float32",), extended=0, exact=2000),
+    Ladder("lobe.norm64", "P 0 .. 1e4, cosine 1 .. where K is 1e-11", draw_norms, norms, norm, 5300.0,
+           "observed x 2", "2615 ULP: a continued fraction of sqrt(P) steps", conditioned=False, reals=("float64",),
+           extended=0, exact=2000),
     Ladder("lobe.norm_sharp", "P 1e6 .. 1e20, to 6.6 widths of the lobe off the horizon", draw_sharp, norms,
            sharp_norm, 12.0, source="12 roundings of the exponent, erfc and the norm", extended=0, exact=4000),
     Ladder("lobe.norm_middle", "P 1e3 .. 1e6, to 5 widths of the lobe off the horizon", draw_middle, norms,

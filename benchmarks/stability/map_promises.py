@@ -10,7 +10,7 @@ import math
 import mpmath
 import numpy as np
 
-from benchmarks.stability.inputs import directions
+from benchmarks.stability.numbers import directions
 from benchmarks.stability.promise import Case, Promise
 from refgi.rsm.buffers.solid_angle import spot_power
 from refgi.rsm.raster.paraboloid import draw_paraboloids

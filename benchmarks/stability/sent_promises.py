@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.stability.inputs import BLOCK, directions
-from benchmarks.stability.ladder import Ladder
-from benchmarks.stability.pair_ladders import each_of
+from benchmarks.stability.ladder import Ladder, each_of
+from benchmarks.stability.numbers import BLOCK, directions, pi_of
 from benchmarks.stability.promise import Case, Promise
 from refgi.lights.walk import walk_lights
 from refgi.rays import Tracer
@@ -35,9 +34,9 @@ def draw_square(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     return np.stack([u, v])
 
 
-def cosine_weighted(m: Any, x: Any) -> Any:
-    radius, turn = m.sqrt(x[0]), 2 * m.pi * x[1]
-    return [radius * m.cos(turn), radius * m.sin(turn), m.sqrt(1 - x[0])]
+def cosine_weighted(x: Any) -> Any:
+    radius, turn = np.sqrt(x[0]), 2 * pi_of(x) * x[1]
+    return [radius * np.cos(turn), radius * np.sin(turn), np.sqrt(1 - x[0])]
 
 
 def _spot(rng: np.random.Generator, place: tuple[float, ...], axis: tuple[float, ...]) -> SpotLight:
@@ -122,14 +121,10 @@ def lifted(rng: np.random.Generator) -> Case:
     return Case(off, f"a face of {size:.3g} m found at {distance:.3g} m: starts off by {off:.3g} of the offset")
 
 
-def promised(m: Any, x: Any, real: Any) -> Any:  # noqa: ARG001
-    return 0 * x[0] + GOOD_TO
-
-
 LADDERS = (
     Ladder("hemisphere.cosine", "the unit square, near borders of the eighths of a turn", draw_square,
            each_of(cosine_direction, 2, 3), cosine_weighted, 1.0, source="1e-8, as the kernel promises",
-           scale=promised, conditioned=False, reals=("float64",), lowest=-1.0),
+           scale=lambda x, _: 0 * x[0] + GOOD_TO, conditioned=False, reals=("float64",), lowest=-1.0),
 )
 NARROW = f"half-angles {NARROWEST:g} .. {WIDEST:g} rad"
 PROMISES = (

@@ -81,17 +81,20 @@ def hints(kind: type[Settings]) -> dict[str, Any]:
 _hints: Any = cache(get_type_hints)
 
 
+@cache
 def members(hint: Any) -> tuple[Any, ...]:
     """Return the types that a hint, a type or a union, allows, without None."""
     parts = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     return tuple(part for part in parts if part is not NoneType)
 
 
+@cache
 def may_be_none(hint: Any) -> bool:
     """Return whether a hint allows None."""
     return get_origin(hint) in (Union, UnionType) and NoneType in get_args(hint)
 
 
+@cache
 def choices_of(hint: Any) -> dict[str, type[Settings]]:
     """Return the classes that a field may hold, by name.
 

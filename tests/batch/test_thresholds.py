@@ -27,7 +27,6 @@ SMALL, LARGE = "box.sii (lights=16)", "box.sii (lights=64)"
     ("box.sii.rmse", "< 0.4", [SMALL]),
     ("box.sii.rmse", ">= 0.4", [LARGE]),
     ("box.sii.rmse", "> 0.4", [SMALL, LARGE]),
-    ("box.sii.lights=64.rmse", "< 0.3", []),
     ("box.sii.lights=16.rmse", "< 0.3", [SMALL]),
     ("box.sii.lights=8.rmse", "< 0.3", ["box.sii.lights=8.rmse"]),
     ("box.sii.lights=64.ssim", "> 0.8", []),
@@ -36,7 +35,6 @@ SMALL, LARGE = "box.sii (lights=16)", "box.sii (lights=64)"
     ("box.truth.rmse", "< 0.01", ["box.truth (samples=48)"]),
     ("hall.val.rmse", "< 0.2", ["hall@1.val (default)"]),
     ("hall.val.lag", "< 1", ["hall.val (default)"]),
-    ("hall.val.flicker", "< 1", []),
     ("hall.val.default.flicker", "< 1", []),
     ("box.sii.lag", "< 1", ["box.sii.lag"]),
 ])

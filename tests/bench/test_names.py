@@ -9,8 +9,8 @@ from refgi.bench.results import write_results
 from refgi.errors import InputError
 from tests.bench.folders import make_folder
 
-NAMES = ["", "a\nb", "<script>alert(1)</script>", "|", "../../etc", "\0", "{{ 7*7 }}", "%s", "'\"&<", "$\\frac{", "$a$",
-         "_hidden", "a" * 5000, "\u202e", "#scene1"]
+NAMES = ["", "a\nb", "<script>alert(1)</script>", "|", "../../etc", "\0", "{{ 7*7 }}", "%s", "'\"&<", "$\\frac{",
+         "a" * 5000]
 
 
 @pytest.fixture(scope="module")

@@ -25,6 +25,7 @@ def run(method, seconds, rmse, noise=0.0):
                errors={"truth": figures})
 
 
+@pytest.mark.slow
 def test_the_truth_s_noise_is_taken_out():
     assert error_of(run("sii", 1, 0.5, 0.3)) == pytest.approx(0.4)
     assert error_of(run("sii", 1, 0.2, 0.3)) == 0
@@ -41,6 +42,7 @@ def test_the_cheapest_meets_the_error_in_the_least_time(held):
     assert nearest_table([scene]).splitlines()[2] == "| made | 9 % in 200 ms | 0.1 % in 9000 ms |"
 
 
+@pytest.mark.slow
 def test_what_the_path_tracer_has_not_come_to_is_told_by_the_root_of_time(held):
     scene = held.scenes[0].model_copy(update={"scene": "made", "runs": (run("sii", 0.1, 0.4),), "line": (
         run("truth", 0.1, 0.2), run("truth", 2.0, math.hypot(0.06, 0.01), 0.01))})
@@ -56,6 +58,7 @@ def test_the_tables_are_those_of_the_results(held):
     assert len(cheapest_table(held.scenes).splitlines()) == 2 + len((*BUILT_IN, *REAL)) * len(LEVELS)
 
 
+@pytest.mark.slow
 def test_each_curve_has_ten_settings_and_its_knee_is_split(held):
     assert [scene.scene for scene in held.scenes] == [*BUILT_IN, *REAL]
     for scene in held.scenes:

@@ -1,5 +1,7 @@
 """What `python -m benchmarks before-after` says of two results."""
 
+import pytest
+
 from benchmarks.before_after import fronts_plot, main, ratio_table
 from refgi.bench.results import Figures, Result, Run, SceneResult, write_results
 from tests.batch.made import MACHINE
@@ -29,11 +31,13 @@ def test_ratios_compare_the_same_settings_alone():
                     "| box | path tracer | 1 | 1.50 | 1.50 to 1.50 | 0 % |"]
 
 
+@pytest.mark.slow
 def test_the_plot_has_both_fronts_and_the_path_tracer():
     svg = fronts_plot(BEFORE, AFTER)
     assert all(f">{name}<" in svg for name in ("before", "after", "path tracer"))
 
 
+@pytest.mark.slow
 def test_folders_of_scenes_are_read_and_drawn(tmp_path):
     for name, found in (("before", BEFORE), ("after", AFTER)):
         folder = tmp_path / name / "box"

@@ -137,17 +137,20 @@ def test_an_operator_changes_one_line_of_a_program(toy, operator):
         assert changed == [(fault.before.rstrip("\n"), fault.after.rstrip("\n"))]
 
 
+@pytest.mark.slow
 def test_checks_texts_and_types_are_left_out(toy):
     lines = LAMP.splitlines()
     assert not {fault.line for fault in all_faults(toy)} & {
         number for number, line in enumerate(lines, 1) if "expect(" in line or '"""' in line or line.startswith("def ")}
 
 
+@pytest.mark.slow
 def test_kernels_are_told_from_wiring(toy):
     kinds = {fault.function: fault.kind for fault in all_faults(toy)}
     assert kinds == {"": "wiring", "falloff": "kernels", "light": "wiring"}
 
 
+@pytest.mark.slow
 def test_a_seed_is_an_order(toy):
     faults = all_faults(toy)
     assert drawn(faults, 3) == drawn(faults[::1], 3)
@@ -192,6 +195,7 @@ def test_what_becomes_of_faults(toy, tmp_path, monkeypatch):
     assert content_of(toy) == before
 
 
+@pytest.mark.slow
 def test_what_is_no_program_is_drawn_again(toy, tmp_path):
     refused = faults_to(toy, "return settings.power")[0]._replace(after="    return nothing\n")
     taken = Campaign(toy, tmp_path, [refused, *faults_to(toy, "return falloff(distance)")], 1, lambda *_: None)

@@ -241,15 +241,11 @@ def test_another_version_is_warned_of_and_a_setting_it_does_not_know_refused(tmp
     assert refused(run("--again", file), "SiiSettings")
     rewritten(file, settings=record["settings"], options={})
     assert refused(run("--again", file), "options.dtype: Field required", "options.rsm_resolution: Field required")
-    rewritten(file, scene={})
-    assert refused(run("--again", file), "scene.camera: Field required")
 
 
 @pytest.mark.parametrize(("changes", "words"), [
     ({"sparkle": 1}, "sparkle: Extra inputs are not permitted"),
-    ({"provenance": "2"}, "expected version 2 of the record, got '2'"),
     ({"provenance": 1}, "expected version 2 of the record, got 1"),
-    ({"exposure": "bright"}, "exposure: Input should be a valid number"),
     ({"exposure": -1}, "exposure: Input should be greater than 0"),
     ({"method": ["sii"]}, "method: Input should be a valid string"),
     ({"method": "magic"}, "magic"),
@@ -259,7 +255,6 @@ def test_another_version_is_warned_of_and_a_setting_it_does_not_know_refused(tmp
     ({"frames": 2, "temporal": None}, "a whole record"),
     ({"estimate": {"passes": 1e30}}, "estimate.passes"),
     ({"options": {"dtype": "int8", "rsm_resolution": 16}}, "options.dtype"),
-    ({"options": {"dtype": "float32", "rsm_resolution": 16, "speed": 1}}, "options.speed"),
 ])
 def test_a_record_of_other_keys_or_kinds_is_an_input_error(tmp_path, changes, words):
     file = tmp_path / "a.exr"

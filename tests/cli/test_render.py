@@ -122,8 +122,8 @@ def test_strict_refuses_what_a_mesh_lacks(tmp_path):
     (["cornel_box"], ["did you mean 'cornell_box'"]),
     (["no/such/file.json"], ["no/such/file.json"]), (["a" * 5000], ["expected one of cornell_box"]),
     (["cornell_box", "--method", "sij"], ["method", "sii"]),
-    (["cornell_box", "--size", "12x"], ["12x"]), (["cornell_box", "--size", "0"], ["'0'"]),
-    (["cornell_box", "--size", "99999x9"], ["65536"]),
+    (["cornell_box", "--size", "12x"], ["12x"]), (["cornell_box", "--size", "0x9"], ["'0x9'"]),
+    (["cornell_box", "--size", "9x0"], ["'9x0'"]), (["cornell_box", "--size", "99999x9"], ["65536"]),
     (["cornell_box", "--threads", "0"], ["--threads"]),
     (["cornell_box", "--dtype", "float16"], ["float32"]),
     (["cornell_box", "--exposure", "nan"], ["--exposure"]), (["cornell_box", "--exposure", "-1"], ["--exposure"]),
@@ -163,8 +163,7 @@ def test_all_wrong_settings_are_told_at_once(tmp_path):
 
 
 @pytest.mark.usefixtures("never_computes")
-@pytest.mark.parametrize("name", ["a.jpg", "a.tiff", "file/a.exr", "file/folder/", "a" * 300 + ".png", "a" * 300,
-                                  "a\udcff.exr"])
+@pytest.mark.parametrize("name", ["a.jpg", "file/a.exr", "file/folder/", "a" * 300 + ".png", "a\udcff.exr"])
 def test_an_out_that_cannot_be_written_is_refused_before_anything_is_computed(name, tmp_path):
     (tmp_path / "file").write_text("in the way")
     assert refused(run("cornell_box", "--out", f"{tmp_path}/{name}"), "--out")
@@ -191,9 +190,8 @@ def test_maps_of_area_lights_that_do_not_fit_are_refused(how, tmp_path, monkeypa
                    "for the settings of val", "2,000,000,000 are available")
 
 
-@pytest.mark.parametrize("how", [{}, {"maps.resolution": 4096, "visibility": "rays_vpls"},
-                                 {"clusters": "adaptive", "target_error": 0.1}],
-                         ids=str)
+@pytest.mark.parametrize("how", [{"maps.resolution": 4096, "visibility": "rays_vpls"},
+                                 {"clusters": "adaptive", "target_error": 0.1}], ids=str)
 def test_what_fits_is_not_refused_for_its_maps(how, monkeypatch):
     monkeypatch.setattr(memory, "available_bytes", lambda: 10**9)
     scene = load_scene("cornell_box").with_camera(width=24, height=24)

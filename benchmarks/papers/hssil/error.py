@@ -5,6 +5,7 @@ from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.hssil.subjects import (
     HORSE,
     JUDGED,
@@ -16,7 +17,7 @@ from benchmarks.papers.hssil.subjects import (
     standard_error,
 )
 from benchmarks.papers.records import Cell, Figure, Picture, Plot, Table
-from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, interleaved, mean_of
+from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, mean_of
 from refgi.bench.grid import Choice
 from refgi.bench.split import Renderer, chain_of
 from refgi.compare.pictures import error_scale, luminance

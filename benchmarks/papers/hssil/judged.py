@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.harness import seconds_of
 from benchmarks.papers.hssil.levels import scan_line
 from benchmarks.papers.hssil.subjects import (
     LARGE,
@@ -20,7 +21,7 @@ from benchmarks.papers.hssil.subjects import (
     wide_frame,
 )
 from benchmarks.papers.records import Cell, Figure, Picture, Plot, Table
-from benchmarks.papers.workbench import Gallery, Workbench, errors_of, mean_of, seconds_of
+from benchmarks.papers.workbench import Gallery, Workbench, errors_of, mean_of
 from refgi.compare.pictures import luminance
 from refgi.compare.plot import Axes, curves_plot
 from refgi.frame import Frame

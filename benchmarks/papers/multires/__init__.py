@@ -2,7 +2,7 @@
 
 Of the paper's scenes the teapot is a name and the others are models that are not published with it; bodies of their
 face counts and about their visual complexity stand in for them (`scenes`). The least distance of the clamp that the
-paper always has it does not state: see `subjects`. The last entry goes beyond the paper.
+paper always has it does not state: see `subjects`.
 """
 
 from functools import partial
@@ -10,7 +10,7 @@ from functools import partial
 from benchmarks.papers.multires.error import beside_path_tracing, edges, surface_detail
 from benchmarks.papers.multires.rates import by_lights, by_scene, by_threshold
 from benchmarks.papers.multires.receivers import glossy_receivers
-from benchmarks.papers.multires.speed import error_over_speed, flight
+from benchmarks.papers.multires.speed import flight
 from benchmarks.papers.multires.subjects import BUDDHA, BUNNIES, DRAGON, TEAPOT
 from benchmarks.papers.multires.subsplats import of_each_light, passes, upsampling
 from benchmarks.papers.records import Case, Entry
@@ -78,8 +78,4 @@ FIGURES = (
           make=partial(by_scene, parts=(8, 4, 2, 1), titles={
               TEAPOT: "Simple Teapot", BUDDHA: "Spinning Buddha", DRAGON: "Dragon & Bunny", BUNNIES: "Flying Bunnies"},
               fps={128: (68, 60, 59, 52), 256: (50, 42, 42, 41), 512: (33, 30, 28, 31), 1024: (22, 24, 21, 25)})),
-    Entry("error", "Error over speed-up", "Beyond the paper",
-          "The paper compares frame rates of pictures that look alike. How far a picture is off, and what each part of "
-          "the error buys, it does not say.", columns=2,
-          make=partial(error_over_speed, scenes=("cornell_sphere", "atrium"))),
 )

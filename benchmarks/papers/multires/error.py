@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_dilation
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.multires.subjects import (
     LARGE,
     count_of,
@@ -20,7 +21,7 @@ from benchmarks.papers.multires.subjects import (
     unclamped,
 )
 from benchmarks.papers.records import Case, Figure, Picture, Table, relative
-from benchmarks.papers.workbench import Gallery, Workbench, errors_of, interleaved, seen_by
+from benchmarks.papers.workbench import Gallery, Workbench, errors_of, seen_by
 from refgi.compare.pictures import DIVERGING, Scale, luminance
 from refgi.frame import Frame
 from refgi.lights.footprints import with_equal_solid_angles

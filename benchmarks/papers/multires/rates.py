@@ -1,12 +1,12 @@
 """Frame rates: by normal threshold (Figure 10), by number of lights (Figure 14), by scene (Table 2)."""
 
-import dataclasses
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from benchmarks.harness import interleaved, moved
 from benchmarks.papers.multires.subjects import (
     LARGE,
     count_of,
@@ -21,7 +21,7 @@ from benchmarks.papers.multires.subjects import (
     without_indirect,
 )
 from benchmarks.papers.records import Bar, Figure, Picture, Plot, Ratios, Table
-from benchmarks.papers.workbench import Gallery, Workbench, errors_of, interleaved, seen_by
+from benchmarks.papers.workbench import Gallery, Workbench, errors_of, seen_by
 from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.scene import Scene
 from refgi.settings import replaced
@@ -126,10 +126,8 @@ def _flicker(bench: Workbench, scene: Scene, settings: list[MultiresSettings]) -
 
     The change of the picture less that of the sum over every texel, mean magnitude in % of the mean irradiance.
     """
-    light: Any = scene.lights[0]
-    x, y, z = light.position
-    moved = [scene.with_lights(dataclasses.replace(light, position=(x + STEP * k, y, z))) for k in range(MOVES + 1)]
-    frames = [seen_by(bench, one, width=bench.scale.size // 2, height=bench.scale.size // 2) for one in moved]
+    side = bench.scale.size // 2
+    frames = [seen_by(bench, moved(scene, STEP * k, camera=False), width=side, height=side) for k in range(MOVES + 1)]
     smooth = [every_texel(frame, settings[0]) for frame in frames]
     mean = float(np.mean([s[:, f.gbuffer.covered].mean() for s, f in zip(smooth, frames, strict=True)]))
     found = []

@@ -6,9 +6,10 @@ from functools import partial
 
 import numpy as np
 
+from benchmarks.harness import seconds_of
 from benchmarks.papers.multires.subjects import scene_of, settings_of
 from benchmarks.papers.records import Cell, Figure, Picture, Table
-from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, seconds_of, seen_by
+from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, seen_by
 from refgi.scene import Scene
 from refgi.splat.multires import ByError, ByGeometry, ByIrradiance, Criteria
 from refgi.splat.multires.lobes import multires_lobes

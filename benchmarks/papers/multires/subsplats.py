@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.multires.subjects import (
     LARGE,
     count_of,
@@ -20,7 +21,7 @@ from benchmarks.papers.multires.subjects import (
     unclamped,
 )
 from benchmarks.papers.records import Cell, Figure, Picture, Table
-from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, interleaved
+from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of
 from refgi.compare.pictures import Scale
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights

@@ -8,7 +8,7 @@ as in the paper's Figure 8 (125 of 768). The colour plates are cited by the text
 from functools import partial
 
 from benchmarks.papers.records import Case, Entry
-from benchmarks.papers.sii.cuts import cut_off, every_light, gathering, overdraw, scaled_fluxes
+from benchmarks.papers.sii.cuts import cut_off, gathering, overdraw, scaled_fluxes
 from benchmarks.papers.sii.lights import caustics, instant_radiosity, warped
 from benchmarks.papers.sii.subjects import BOX, CAUSTIC
 from benchmarks.papers.sii.times import moving_and_resting, warp_alone
@@ -61,7 +61,4 @@ FIGURES = (
           "per second, and 63 becomes 85 at half resolution.", columns=3,
           make=partial(scaled_fluxes, scene="atrium:faces=50000", lights=256,
                        fps={"full": (27.0, 37.0), "half": (63.0, 85.0)})),
-    Entry("full", "Full sum", "Every light at every pixel",
-          "The paper has no such row: on its hardware every splat had to be cut.",
-          make=partial(every_light, scene=BOX, lights=1024, shares=(0, 1, 5, 7, 10), fps={1: 14, 5: 48})),
 )

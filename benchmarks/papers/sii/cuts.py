@@ -1,4 +1,4 @@
-"""How far splats reach: overdraw, the cut-off I_low, fluxes scaled by openness; gathering and the full sum beside."""
+"""How far splats reach: overdraw, the cut-off I_low, fluxes scaled by openness; gathering beside."""
 
 from collections.abc import Callable
 from functools import partial
@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.records import Bar, Case, Cell, Figure, Ratios, Table, relative
 from benchmarks.papers.sii.subjects import counted, full_sum, reference_length, splats
-from benchmarks.papers.workbench import Gallery, Redrawing, Workbench, errors_of, interleaved
+from benchmarks.papers.workbench import Gallery, Redrawing, Workbench, errors_of
 from refgi.compare.pictures import Scale
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
@@ -152,33 +153,6 @@ def gathering(bench: Workbench, scene: str, samples: dict[int, float],
             "does not state its radius.",
             f"From {most} to {min(samples)} samples gathering gains {seconds[first] / seconds[least]:.1f} times (paper "
             "5.9): pixels that cannot be interpolated and the interpolation itself take their share."))
-
-
-def every_light(bench: Workbench, scene: str, lights: int, shares: tuple[int, ...], fps: dict[int, float]) -> Figure:
-    """The full sum of 1024 lights at every pixel, beside what splats cut off (I_low in % of I_0).
-
-    Frames per second in the paper are of 768 lights: 1 % from Figure 11, 5 % from Figure 12.
-    """
-    frame, full = bench.frame(scene), full_sum(bench, scene)
-    covered = frame.gbuffer.covered
-    run = {share: partial(sii, frame, splats(bench, scene, share / 100, lights=lights)) for share in shares}
-    seconds = interleaved(run, bench.scale.repeats)
-    rows = [(f"{share} %" if share else "0: every light at every pixel", 1e3 * seconds[share], 1 / seconds[share],
-             fps.get(share), *errors_of(work(), full, covered)) for share, work in run.items()]
-    pairs = lights * int(covered.sum()) / seconds[0]
-    cut = f"{PAPER_PIXELS * PAPER_OVERDRAW * fps[5] / 1e9:.2f}"
-    return Figure(
-        facts=(scene, f"{lights} lights", f"{pairs / 1e9:.2f} thousand million pairs a second"),
-        tables=[Table("Time, and error against every texel in % of the mean irradiance",
-                      ("I_low", "ms", "fps", "fps, paper, 768 lights", "RMSE", "MAE", "energy lost"), rows)],
-        notes=(f"The full sum of {lights} lights runs at {1 / seconds[0]:.1f} frames per second, "
-               f"{1 / seconds[0] / fps[5]:.2f} times the rate of 768 splats cut at 5 % in 2006 and "
-               f"{1 / seconds[0] / fps[1]:.2f} times that at 1 %. It looks at {pairs / 1e9:.2f} thousand "
-               f"million pairs a second; the paper's splats came to {cut} (125 at each of 512² pixels, 48 times a "
-               "second).",
-               f"What the cut costs: the MAE against every texel is {rows[0][5]:.1f} % without and {rows[2][5]:.1f} % "
-               f"with the cut of 5 %, which loses {rows[2][6]:.0f} % of the energy; it saves "
-               f"{1 - seconds[5] / seconds[0]:.0%} of the time."))
 
 
 def scaled_fluxes(bench: Workbench, scene: str, lights: int, fps: dict[str, tuple[float, float]]) -> Figure:

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.records import Case, Figure, Picture, Table, relative
 from benchmarks.papers.sii.subjects import full_sum
-from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, interleaved, whole_frame
+from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, whole_frame
 from refgi.frame import Frame
 from refgi.lights import importance_pyramid
 from refgi.lights.selection import choose_lights, importance_maps

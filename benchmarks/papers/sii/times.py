@@ -1,18 +1,17 @@
 """What takes the time of a frame: what moves and what rests, and the importance warp."""
 
-import dataclasses
 import statistics
 import time
 from functools import partial
 from typing import Any
 
+from benchmarks.harness import interleaved, moved
 from benchmarks.papers.records import Cell, Figure, Table, relative
 from benchmarks.papers.sii.subjects import CAUSTIC
-from benchmarks.papers.workbench import Redrawing, Workbench, interleaved, seen_by
+from benchmarks.papers.workbench import Redrawing, Workbench, seen_by
 from refgi.lights import importance, importance_pyramid
 from refgi.lights.warp import Method, warp_samples
 from refgi.sampling import halton
-from refgi.scene import Scene
 from refgi.splat import sii
 from refgi.stages import Memory, observe
 
@@ -63,24 +62,13 @@ class _Animation:
         return statistics.median(self.spent[1:])
 
     def next_frame(self) -> None:
-        scene = self._moved(STEP * len(self.spent))
+        scene = moved(self.scene, STEP * len(self.spent), light=self.light_moves, camera=self.camera_moves)
         with observe(memory=self.memory) as log:
             started = time.perf_counter()
             frame = seen_by(self.bench, scene)
             frame.radiance(sii(frame, CAUSTIC))
             self.spent.append(time.perf_counter() - started)
         self.reused = sorted({run.name for run in log.runs if run.status == "reused"})
-
-    def _moved(self, offset: float) -> Scene:
-        scene = self.scene
-        if self.light_moves:
-            light: Any = scene.lights[0]
-            x, y, z = light.position
-            scene = scene.with_lights(dataclasses.replace(light, position=(x + offset, y, z)))
-        if self.camera_moves:
-            x, y, z = scene.camera.eye
-            scene = scene.with_camera(eye=(x + offset, y, z))
-        return scene
 
 
 def warp_alone(bench: Workbench, scene: str, printed: dict[tuple[Method, int], tuple[float, ...]]) -> Figure:

@@ -1,15 +1,14 @@
 """The figures and tables of clustered visibility (Dong et al. 2009).
 
 The paper's horse, dragons and blob are not published with it; bodies of the same face counts stand in for them
-(`scenes`), and the built-in atrium for Sponza. Figures 2, 3 and 7 are drawings of the method. The last entry goes
-beyond the paper: which of its approximations costs how much.
+(`subjects`), and the built-in atrium for Sponza. Figures 2, 3 and 7 are drawings of the method.
 """
 
 from functools import partial
 
 from benchmarks.papers.records import Entry
 from benchmarks.papers.val.clusters import criteria, one_by_one, to_the_ceiling
-from benchmarks.papers.val.error import by_area_lights, split
+from benchmarks.papers.val.error import by_area_lights
 from benchmarks.papers.val.frames import four_scenes, one_frame, steps
 from benchmarks.papers.val.moving import changing_topology, walking
 from benchmarks.papers.val.shadows import View, failures, small_and_large, soft_and_crisp
@@ -85,13 +84,4 @@ FIGURES = (
     Entry("table2", "Table 2", "Where the time goes",
           "Of a frame of 51 ms 69 % are indirect illumination, 21 % the blur, 8 % the shadow maps; clustering, lights "
           "and buffers take 2 %.", make=steps),
-    Entry("error", "Error, split", "Beyond the paper",
-          "The paper has no such table: it shows the difference to a hard shadow for every light, in one picture.",
-          make=partial(split, shown=("clustering", "kernel", "filter"), steps={
-              "light sampling": "pixel lights for all light", "clamp": "near ones clamped",
-              "clustering": "clusters: the share of visible lights", "rectangle": "their bounding rectangle",
-              "single view": "one map from its centre, projected back",
-              "kernel": "one mean blocker, one disc", "shadow map resolution": "texels of twice the size",
-              "CSM series": "series of 4 terms", "filter": "mip levels for discs",
-              "interleaving": "interleaving and blur"})),
 )

@@ -1,37 +1,22 @@
-"""The error of the picture: by the number of area lights (Figure 10), and split into what each step costs."""
+"""The error of the picture by the number of area lights (Figure 10); step by step: `refgi bench --split`."""
 
-import math
 import time
-from collections.abc import Callable
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from benchmarks.papers.records import Cell, Figure, Plot, Table
 from benchmarks.papers.val.subjects import (
     AREA_LIGHTS,
-    HORSE,
     JUDGED,
-    MOVING,
-    TITLES,
     clamped,
     frame_of,
     published,
-    scene_of,
     settings_of,
     shadowed,
 )
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of
-from refgi.bench.grid import Choice
-from refgi.bench.results import Part, Split
-from refgi.bench.split import Renderer, chain_of, split_of
 from refgi.cluster.val import val
 from refgi.compare.plot import Axes, Curve, curves_plot
-from refgi.frame import Frame
-from refgi.truth import TruthSettings
-from refgi.types import Array
-
-SIZE = MOVING / 2  # pixels a side in units of the run's: references are slow
 
 
 def by_area_lights(bench: Workbench, scene: str, shown: tuple[int, ...], further: tuple[int, ...],
@@ -98,78 +83,3 @@ def by_area_lights(bench: Workbench, scene: str, shown: tuple[int, ...], further
             "walls meet are lights next to a receiver; no distance is clamped here but for the interleaved picture.",
             f"Interleaved over 8 x 8 pixels and blurred, as the paper's pictures, {title} are another "
             f"{off:.1f} % (MAE) off what they come to without."))
-
-
-class Steps(NamedTuple):
-    """One scene from step to step."""
-
-    split: Split
-    pictures: dict[str, Array]  # (3, h, w) W/m^2, by step
-    frame: Frame
-
-    def of(self, name: str) -> Part:
-        """Return what a step changes."""
-        return next(part for part in self.split.parts if part.name == name)
-
-    def rmse(self, name: str) -> float:
-        """Return the root mean square of what a step changes, over the mean of the truth."""
-        return self.of(name).error.rmse or 0.0
-
-
-def split(bench: Workbench, steps: dict[str, str], shown: tuple[str, ...]) -> Figure:
-    """Beyond the paper: what each of its approximations costs, scene by scene."""
-    found = {name: _split(bench, name) for name in TITLES}
-    rows: list[tuple[Any, ...]] = [(title, *(100 * one.rmse(step) for one in found.values()),
-                                    *(100 * (one.of(step).mean or 0.0) for one in found.values()))
-                                   for step, title in steps.items()]
-    rows += [("all together", *(100 * whole(one.split) for one in found.values()),
-              *(100 * (one.split.mean or 0.0) for one in found.values())),
-             ("if they were independent", *(100 * independent(one.split) for one in found.values()),
-              *(None for _ in found))]
-    horse = found[HORSE]
-    gallery = Gallery(horse.frame, horse.pictures["clamp"])
-    gallery.indirect("lights", "a ray to each light", "Cornell Horse", horse.pictures["clamp"])
-    gallery.errors({name: (steps[name], horse.pictures[name]) for name in shown}, horse.pictures["clamp"])
-
-    def each(part: Callable[[Steps], float]) -> str:
-        return ", ".join(f"{100 * part(one):.1f}" for one in found.values())
-
-    def largest(name: str) -> str:  # of the steps between exact shadows and the full sum
-        step = max(list(steps)[2:-1], key=found[name].rmse)
-        return f"{TITLES[name]} {steps[step]} ({100 * found[name].rmse(step):.1f} %)"
-
-    return Figure(
-        facts=(f"{gallery.frame.width}² pixels", f"path tracing with {bench.scale.truth_samples} samples a pixel",
-               f"{clamped(bench, scene_of(bench, HORSE)).lights.count} lights", f"{AREA_LIGHTS} area lights"),
-        pictures=gallery.pictures,
-        tables=[Table("What each approximation changes in the picture before it, in % of the mean: root mean square, "
-                      "and change of the mean", ("", *(f"{title}, RMS" for title in TITLES.values()),
-                                                 *(f"{title}, mean" for title in TITLES.values())), rows)],
-        notes=(
-            f"Of the steps between exact shadows and the full sum the largest is: {'; '.join(map(largest, found))}.",
-            f"Against path tracing the pixel lights themselves are {each(lambda one: one.rmse('light sampling'))} % "
-            f"off, of which the clamp takes back peaks of {each(lambda one: one.rmse('clamp'))} %, interleaving and "
-            f"its blur change {each(lambda one: one.rmse('interleaving'))} %: visibility by area lights is not what "
-            "limits such a picture, as the paper claims.",
-            "Errors of the steps partly cancel: together they come to "
-            f"{each(lambda one: whole(one.split))} %, and would to {each(lambda one: independent(one.split))} % if "
-            "they were independent."))
-
-
-def whole(found: Split) -> float:
-    """Return the RMSE of the picture over the mean of the truth."""
-    return found.error.rmse or 0.0
-
-
-def independent(found: Split) -> float:
-    """Return what `whole` would be if no step took back what others did."""
-    return math.sqrt(found.squares or 0.0)
-
-
-def _split(bench: Workbench, name: str) -> Steps:
-    scene, like = scene_of(bench, name), frame_of(bench, name, SIZE)
-    renderer = Renderer(scene, TruthSettings(samples=bench.scale.truth_samples), width=like.width, height=like.height,
-                        rsm_resolution=like.rsm_resolution)
-    choice = Choice("val", (), published(bench, scene))
-    chain = chain_of(renderer, choice, 1, alone=False)
-    return Steps(split_of(chain, choice), {link.name: link.pictures[0] for link in chain.links}, renderer.frame)

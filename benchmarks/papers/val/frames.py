@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.harness import own_seconds
+from benchmarks.harness import interleaved, own_seconds
 from benchmarks.papers.records import Bar, Cell, Figure, Picture, Ratios, Table, relative
 from benchmarks.papers.val.subjects import (
     AREA_LIGHTS,
@@ -26,7 +26,7 @@ from benchmarks.papers.val.subjects import (
     shadowed,
     timed_size,
 )
-from benchmarks.papers.workbench import Gallery, Workbench, errors_of, interleaved
+from benchmarks.papers.workbench import Gallery, Workbench, errors_of
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.scene import Scene

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.records import Figure, Picture, Rows, Table, relative
 from benchmarks.papers.val.subjects import (
     AREA_LIGHTS,
@@ -25,7 +26,7 @@ from benchmarks.papers.val.subjects import (
     scene_of,
     settings_of,
 )
-from benchmarks.papers.workbench import Gallery, Workbench, changes, errors_of, interleaved, seen_by
+from benchmarks.papers.workbench import Gallery, Workbench, changes, errors_of, seen_by
 from refgi.cluster.val import val
 from refgi.frame import Frame
 from refgi.lights import PixelLights

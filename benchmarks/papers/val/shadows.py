@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.records import Figure, Picture, Table
 from benchmarks.papers.val.subjects import (
     JUDGED,
@@ -24,7 +25,7 @@ from benchmarks.papers.val.subjects import (
     settings_of,
     shadowed,
 )
-from benchmarks.papers.workbench import Gallery, Workbench, errors_of, interleaved
+from benchmarks.papers.workbench import Gallery, Workbench, errors_of
 from refgi.cluster.clustering.kmeans import cluster
 from refgi.cluster.clustering.rectangle import area_lights
 from refgi.cluster.settings import ValSettings

@@ -45,6 +45,7 @@ def _two_figures(monkeypatch):
     monkeypatch.setattr(Paper, "load", lambda _: entries)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_two_figures")
 def test_a_run_that_works_exits_with_0_and_says_the_ratios(run, tmp_path):
     code, out, _ = run("sii", "--only", "fig1", "--quick", "--out", tmp_path)
@@ -79,11 +80,13 @@ def test_what_is_not_there_is_refused_before_anything_is_made(run, arguments, wo
     assert not (tmp_path / "new").exists()
 
 
+@pytest.mark.slow
 def test_a_paper_and_a_folder_are_needed(run):
     assert run("--out", "x")[0] == 2
     assert run("sii")[0] == 2
 
 
+@pytest.mark.slow
 def test_files_of_other_programs_are_spared(run, tmp_path):
     (tmp_path / "table1_other.png").write_text("precious")
     arguments = ["sii", "--only", "table1", "--quick", "--out"]

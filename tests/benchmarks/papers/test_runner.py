@@ -7,10 +7,11 @@ import imageio.v3
 import numpy as np
 import pytest
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.records import PAPERS, Entry, choose, find_paper
 from benchmarks.papers.report import page
 from benchmarks.papers.runner import reproduce
-from benchmarks.papers.workbench import FULL, QUICK, Workbench, interleaved
+from benchmarks.papers.workbench import FULL, QUICK, Workbench
 from refgi.errors import InputError
 from refgi.image import read_exr
 from tests.benchmarks.papers.conftest import ENTRIES, TINY, gradient
@@ -22,16 +23,19 @@ def made(paper):
     return reproduce(paper, scale=TINY)
 
 
+@pytest.mark.slow
 def test_one_figure_that_fails_leaves_the_others(made):
     assert [outcome.figure is not None for outcome in made.outcomes] == [True, False, True]
     assert made.failures == {"fig2": "ZeroDivisionError: by hand"}
     assert not made.is_sound
 
 
+@pytest.mark.slow
 def test_without_a_failure_it_is_sound(paper):
     assert reproduce(paper, scale=TINY, only=["fig1", "table1"]).is_sound
 
 
+@pytest.mark.slow
 def test_figures_come_in_the_papers_order(paper):
     assert [entry.key for entry in choose(paper, ["table1", "fig1"])] == ["fig1", "table1"]
     with pytest.raises(InputError, match=r"expected some of fig1, fig2, table1, got 'fig9'"):
@@ -40,6 +44,7 @@ def test_figures_come_in_the_papers_order(paper):
         choose(paper, [])
 
 
+@pytest.mark.slow
 def test_papers_are_found_by_name():
     assert find_paper("sii") is PAPERS["sii"]
     with pytest.raises(InputError, match="got 'rsm'"):
@@ -64,6 +69,7 @@ def test_pictures_and_record_are_written(paper, tmp_path):
     assert record["scale"]["size"] == 16
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_leaves_whole_files(paper, tmp_path, monkeypatch):
     def interrupt(_bench):
         raise KeyboardInterrupt
@@ -81,6 +87,7 @@ def test_an_interrupted_run_leaves_whole_files(paper, tmp_path, monkeypatch):
     assert not list(tmp_path.glob(".*"))
 
 
+@pytest.mark.slow
 def test_the_page_refers_to_nothing_outside_itself_and_is_well_formed(made):
     html = page(made)
     assert not re.search(r"https?:|[\"'(]//|@import|url\((?!#)", html)
@@ -94,6 +101,7 @@ def test_the_page_refers_to_nothing_outside_itself_and_is_well_formed(made):
     assert targets == ["#fig1", "#table1"]
 
 
+@pytest.mark.slow
 def test_the_page_holds_every_figure(made):
     html = page(made)
     text = " ".join(Outline(html).text)
@@ -106,10 +114,12 @@ def test_the_page_holds_every_figure(made):
     assert 'class="here"><i style="width:100.00%"' in html
 
 
+@pytest.mark.slow
 def test_a_paper_of_which_nothing_works_has_a_page(paper):
     assert "0 of 1 figures and tables made." in page(reproduce(paper, scale=TINY, only=["fig2"]))
 
 
+@pytest.mark.slow
 def test_progress_names_each_figure(paper):
     told = []
     reproduce(paper, scale=TINY, progress=lambda what, done: told.append((what, round(done, 2))))
@@ -117,6 +127,7 @@ def test_progress_names_each_figure(paper):
                     ("handmade", 1.0)]
 
 
+@pytest.mark.slow
 def test_work_is_timed_in_turn_after_a_warm_up():
     order = []
     seconds = interleaved({"a": lambda: order.append("a"), "b": lambda: order.append("b")}, 2)
@@ -124,6 +135,7 @@ def test_work_is_timed_in_turn_after_a_warm_up():
     assert order == ["a", "b", "a", "b", "a", "b"]
 
 
+@pytest.mark.slow
 def test_a_workbench_makes_things_once():
     bench = Workbench(TINY)
     assert bench.frame("cornell_box") is bench.frame("cornell_box")
@@ -132,6 +144,7 @@ def test_a_workbench_makes_things_once():
     assert QUICK.size < FULL.size
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_is_refused(paper, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):

@@ -6,12 +6,22 @@ import mpmath
 import numpy as np
 import pytest
 
-from benchmarks.stability import again, elementary_range, hssil, kernels
+from benchmarks.stability import again, elementary_range, kernels, pairs, places
 from benchmarks.stability import ladder as ladders
-from benchmarks.stability.inputs import BLOCK, any_size, around, block_of, directions, sizes
 from benchmarks.stability.kernels import tasks
 from benchmarks.stability.ladder import conditions, errors, inputs_of, measure, rows
-from benchmarks.stability.maths import DIGITS, EXTENDED, spacing, trusted
+from benchmarks.stability.numbers import (
+    BLOCK,
+    DIGITS,
+    EXTENDED,
+    any_size,
+    around,
+    block_of,
+    directions,
+    sizes,
+    spacing,
+    trusted,
+)
 
 pytestmark = pytest.mark.slow  # tests/benchmarks/test_smoke.py runs a task of each part
 
@@ -19,8 +29,8 @@ KNOWN = kernels.ladders()
 CASES = 2048  # enough for each fault below; 1e5 in the short form
 
 
-def formula(name, *numbers, maths=DIGITS):
-    return [float(one[0]) for one in KNOWN[name].formula(maths, [maths.number(np.array([n])) for n in numbers])]
+def formula(name, *numbers):
+    return [float(one[0]) for one in KNOWN[name].formula(DIGITS.of(np.array(numbers, float)[:, None]))]
 
 
 def figure(name, run, real="float32", count=CASES):
@@ -65,6 +75,16 @@ def test_references_agree_with_closed_forms():
     assert formula("ray.offset", 1, -2, 4, 1) == [2.0**-19, 4 * 7 * 2.0**-24]
     assert formula("frame.basis", 0, 0, 1) == [1, 0, 0, 0, 1, 0]
     assert formula("val.z_avg", 0.9, *means_of(0.4)) == pytest.approx([0.4])
+    assert formula("val.angle", 1, 0, 0, 0, 2, 0) == pytest.approx([math.pi / 2])
+    assert formula("val.angle", 1, 0, 0, -1, 0, 0) == pytest.approx([math.pi])
+    assert formula("hemisphere.cosine", 0.25, 0.25) == pytest.approx([0, 0.5, math.sqrt(0.75)])
+    assert formula("bounds.tangent", 1) == pytest.approx([3**-0.75, 1 - 3**-0.75, 3**-0.25 * math.sqrt(2 / 3)])
+    assert formula("bounds.tangent", 2) == pytest.approx([0.5] * 3)  # F^2 = x - x^2, a sphere
+    # a floor seen along its normal: beside it 0, before it a / (a + b) = 1.5 / (1.5 + 1), on its normal 1
+    floor = (0, 0, -1, 0, 0, 1)
+    assert formula("hssil.height", *floor, 1, 0, -1, 0) == [0, 0]
+    assert formula("hssil.height", *floor, 1, 0, 0.5, 0) == pytest.approx([0.6] * 2)
+    assert formula("hssil.height", *floor, 1e-9, 0, -0.5, 0)[0] == pytest.approx(1)
 
 
 def means_of(z):
@@ -77,7 +97,7 @@ def means_of(z):
 def test_extended_numbers_have_their_bits():
     assert trusted()
     assert mpmath.mp.dps == 15  # the 50 digits are a context of their own
-    assert DIGITS.sqrt(DIGITS.number(np.array([2.0])))[0] ** 2 - 2 < 1e-49
+    assert np.sqrt(DIGITS.of(np.array([2.0])))[0] ** 2 - 2 < 1e-49
     x = np.array([0.0, 1.0, 1.5, 2.0, 3e38, 1e-40, -4.0])
     np.testing.assert_array_equal(spacing(x, np.float32), np.abs(np.spacing(x.astype(np.float32))).astype(float))
 
@@ -87,12 +107,12 @@ def test_both_references_agree(name):
     """Apart by a tenth at most of what one ULP of an input makes in float64."""
     ladder = KNOWN[name]
     x = inputs_of(ladder, 3, 0, "float64", 40)
-    wide, exact = (ladder.formula(m, [m.number(row) for row in x]) for m in (EXTENDED, DIGITS))
+    wide, exact = (ladder.formula(precision.of(x)) for precision in (EXTENDED, DIGITS))
     _, unit = errors(ladder, DIGITS, "float64", x, np.zeros((len(exact), 40)))
     condition = np.ones_like(unit) if not ladder.conditioned else conditions(ladder, DIGITS, "float64", x, unit)
     for k, (a, b) in enumerate(zip(wide, exact, strict=True)):
-        apart = np.array([abs(float(DIGITS.number(np.array([float(p)]))[0] + DIGITS.number(
-            np.array([float(p - np.longdouble(float(p)))]))[0] - q)) for p, q in zip(a, b, strict=True)])
+        apart = np.array([abs(float(DIGITS.of(float(p)) + DIGITS.of(float(p - np.longdouble(float(p)))) - q))
+                          for p, q in zip(a, b, strict=True)])
         assert (apart <= 0.1 * (unit[k] * condition[k]).astype(float)).all()
 
 
@@ -159,6 +179,50 @@ def test_cancellation_that_a_kernel_avoids_shows():
         assert figure("lobe.power", lambda x: np.exp2(x[1] * np.log2(np.maximum(1 - x[0], 1e-30)))[None]) > 1
 
 
+def squares(x):
+    """Heights with y from the root of d^2 - x^2."""
+    p, n, s, thickness = x[:3], x[3:6], x[6:9], x[9]
+    d, length = s - p, np.sqrt((p * p).sum(axis=0))
+    facing, out = -(n * p).sum(axis=0) / length, []
+    for share in (0 * thickness, thickness / np.sqrt((s * s).sum(axis=0))):
+        back = d + share * s
+        along, up = -(p * back).sum(axis=0) / length, (n * back).sum(axis=0)
+        y = np.sqrt(np.maximum((back * back).sum(axis=0) - along * along, 0))
+        a, b = np.maximum(up, 0) * y, facing * (along * along + y * y) - up * along
+        part = a / np.maximum(a + abs(b), 1e-37)
+        out.append(np.where((b < 0) & (a > 0), 2 - part, part))
+    return np.stack(out).astype(x.dtype)
+
+
+def short_series(x):
+    turn = 4 * x[1]
+    t = math.pi / 2 * (turn - np.floor(turn + 0.5))
+    square = t * t
+    cosine = 1 - square / 2 * (1 - square / 12 * (1 - square / 30))
+    sine = np.sqrt(1 - cosine * cosine) * np.sign(t)
+    c, s = (np.choose(np.floor(turn + 0.5).astype(int) % 4, choices)
+            for choices in ([cosine, -sine, -cosine, sine], [sine, cosine, -sine, -cosine]))
+    return np.sqrt(x[0]) * np.stack([c, s, np.zeros_like(s)]) + np.stack([0 * c, 0 * c, np.sqrt(1 - x[0])])
+
+
+def cancelling(x):
+    n = np.maximum(x[0], 2.0)
+    below = -4 / (n + 2)
+    power = below * math.log(0.71)
+    slope = 1 - (1 + below) * np.exp(power)
+    half = (0.71 + 0.71 * np.expm1(power) / slope) / 2
+    out = np.stack([half, half, half * np.sqrt(np.maximum(slope, 0))])
+    return np.where(x[0] < 2, places.ellipsoid_of(x), out)
+
+
+def test_a_way_that_loses_digits_shows():
+    with np.errstate(all="ignore"):
+        assert figure("hssil.height", squares) > 1
+        assert not figure("bounds.tangent", cancelling, "float64", 60) <= 1  # it ends in NaN
+    assert figure("hemisphere.cosine", short_series, "float64") > 1
+    assert figure("val.angle", lambda x: np.arccos(np.clip((x[:3] * x[3:]).sum(axis=0), -1, 1))[None], "float64") > 1
+
+
 def test_a_negative_answer_is_counted():
     ladder = KNOWN["eq2.term"]._replace(run=lambda x: KNOWN["eq2.term"].run(x) - x.dtype.type(1e-3))
     found = [row for row in rows(ladder._replace(extended=CASES, exact=0), True) if row.property.startswith("NaN")]
@@ -177,11 +241,11 @@ def test_the_worst_of_the_screened_cases_is_the_worst_of_all():
 
 def test_conditions_are_those_of_calculus():
     """x^3 as a kernel: one ULP of x moves 3 ULP of itself; the difference x - y of near numbers its size over it."""
-    ladder = KNOWN["eq2.term"]._replace(formula=lambda m, x: [x[0] ** 3], smooth=None)  # noqa: ARG005
+    ladder = KNOWN["eq2.term"]._replace(formula=lambda x: [x[0] ** 3], smooth=None)
     unit = spacing(np.array([[1.25**3]]), np.float64)
     assert float(conditions(ladder, EXTENDED, "float64", np.array([[1.25]]), unit)[0, 0]) == pytest.approx(
         3 * 1.25**2 * 2.0**-52 / unit[0, 0].astype(float))
-    ladder = ladder._replace(formula=lambda m, x: [x[0] - x[1]])  # noqa: ARG005
+    ladder = ladder._replace(formula=lambda x: [x[0] - x[1]])
     unit = spacing(np.array([[2.0**-20]]), np.float64)
     near = np.array([[1.0], [1 - 2.0**-20]])
     assert float(conditions(ladder, EXTENDED, "float64", near, unit)[0, 0]) == 2.0**20
@@ -235,15 +299,15 @@ def test_all_of_float32_catches_a_fault_in_one_pattern(name):
 
 
 def test_a_unit_that_is_no_power_of_two_shows(monkeypatch):
-    assert all(row.passed for row in hssil.unit_rows(short=True))
-    first = hssil.FORMS[0]
-    monkeypatch.setattr(hssil, "FORMS", (lambda x: first(x * x.dtype.type(1.1)),))
-    monkeypatch.setattr(hssil, "length_scale", lambda depth: 1 / depth.min())
-    found = list(hssil.unit_rows(short=True))
+    assert all(row.passed for row in pairs.unit_rows(short=True))
+    first = pairs.FORMS["point"][0]
+    monkeypatch.setattr(pairs, "FORMS", {"": (lambda x: first(x * x.dtype.type(1.1)), None)})
+    monkeypatch.setattr(pairs, "length_scale", lambda depth: 1 / depth.min())
+    found = list(pairs.unit_rows(short=True))
     assert found[0].passed  # any factor before a power of 2
     assert not found[1].passed
-    monkeypatch.setattr(hssil, "FORMS", (lambda x: first(x + x.dtype.type(1e-5)),))
-    assert not next(iter(hssil.unit_rows(short=True))).passed
+    monkeypatch.setattr(pairs, "FORMS", {"": (lambda x: first(x + x.dtype.type(1e-5)), None)})
+    assert not next(iter(pairs.unit_rows(short=True))).passed
 
 
 def test_tasks_are_of_one_name_each_and_rows_tell_how_to_see_them():

@@ -129,6 +129,7 @@ def test_rows_fail_where_files_are_torn_lost_other_or_left():
     assert {row.key for row in rows} == {("kills", row.property, "render", "") for row in rows}
 
 
+@pytest.mark.slow
 def test_full_and_short_runs_have_their_kills():
     assert sum(kills.TIMES.values()) + kills.BATCH_TIMES == 200
     assert sum(kills.SHORT_TIMES.values()) == 4

@@ -1,18 +1,20 @@
 """Ladders of val: basis and series of convolution shadow maps, mean depth of blockers, depth scale, filter widths.
 
-Formulas are those of docs/methods/val_visibility.md: f = 1/2 + sum_k w_k sin(c_k (z - d)), w_k = 2 / c_k,
-c_k = (2 k - 1) pi; z_avg = (Z / 2 - sum_k w_k (cos(c_k d) SZ_k - sin(c_k d) CZ_k)) / (1 - V); and the disc of a cone
-on a stereographic map. Depths of the series are numbers of [0, 1], so its units are those of 1.
+Formulas of scales, widths and discs are those of refgi.literal. Its series have frequencies of float64; here they are
+those of docs/methods/val_visibility.md: f = 1/2 + sum_k w_k sin(c_k (z - d)), w_k = 2 / c_k, c_k = (2 k - 1) pi;
+z_avg = (Z / 2 - sum_k w_k (cos(c_k d) SZ_k - sin(c_k d) CZ_k)) / (1 - V). Depths of the series are numbers of [0, 1],
+so its units are those of 1.
 """
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from benchmarks.stability.inputs import BLOCK, directions, sizes
-from benchmarks.stability.ladder import Ladder
-from benchmarks.stability.pair_ladders import each_of, filled
+from benchmarks.stability.ladder import Ladder, each_of
+from benchmarks.stability.numbers import BLOCK, around, directions, dot, pi_of, sizes
+from refgi.cluster.clustering.rounds import linear
 from refgi.cluster.filters.basis import DepthScale, fill_basis, series_depths, series_distance, sine_cosine
 from refgi.cluster.visibility.csm import compare_filtered, find_penumbra
 from refgi.cluster.visibility.pcf import (
@@ -32,11 +34,14 @@ from refgi.cluster.visibility.search_region import (
     FilterSizing,
 )
 from refgi.jit import kernel
+from refgi.literal.val_maps import series_depth
+from refgi.literal.val_series import LEAST_BLOCKED
+from refgi.literal.val_series import series_distance as distance_of_series
+from refgi.literal.val_visibility import STEEPEST, half_angle, square
+from refgi.literal.val_visibility import disc as disc_of_cone
 from refgi.types import Array
 
 TERMS = 4
-LEAST_BLOCKED = 0.02  # share of a search disc below which nothing blocks
-CAP = math.radians(80.0)  # the widest cone
 
 
 @kernel
@@ -46,24 +51,25 @@ def _to_series(x: Array, logarithmic: bool, out: Array) -> None:
 
 
 @kernel
-def _from_series(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = series_distance(DepthScale(True, x[1, i], x[2, i], 1.0), x[0, i])
+def _from_series(t: Any, origin: Any, slope: Any) -> Any:
+    return series_distance(DepthScale(True, origin, slope, 1.0), t)
 
 
 @kernel
-def _tangents(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = cone_tangent(x[0, i], x[1, i], x[2, i])
-        out[1, i] = published_tangent(x[0, i], x[1, i], x[2, i])
-        out[2, i] = solid_angle_tangent(x[0, i], x[1, i])
+def _tangents(size: Any, d: Any, z: Any) -> Any:
+    return cone_tangent(size, d, z), published_tangent(size, d, z), solid_angle_tangent(size, d)
 
 
 @kernel
-def _discs(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i], out[1, i], out[2, i] = disc(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i])
-        out[3, i], out[4, i], out[5, i] = published_square(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i])
+def _discs(x: Any, y: Any, z: Any, d: Any, tangent: Any) -> Any:
+    s, t, radius = disc(x, y, z, d, tangent)
+    return s, t, radius, *published_square(x, y, z, d, tangent)
+
+
+@kernel
+def _angle(ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any) -> Any:
+    zero = ax - ax
+    return linear(zero, zero, zero, ax, ay, az, zero, zero, zero, bx, by, bz, zero, zero + 1)
 
 
 def _series_weights(real: Any) -> Array:
@@ -82,15 +88,11 @@ def steps(x: Array) -> Array:
     return out
 
 
-def _frequency(m: Any, k: int) -> Any:
-    return (2 * k - 1) * m.pi
-
-
-def step(m: Any, x: Any) -> Any:
-    value = 1 / (2 + 0 * x[0])
+def step(x: Any) -> Any:
+    value = 0.5 + 0 * x[0]
     for k in range(1, TERMS + 1):
-        c = _frequency(m, k)
-        value = value + m.sin((x[1] - x[0]) * c) * (2 / c)
+        c = (2 * k - 1) * pi_of(x)
+        value = value + np.sin((x[1] - x[0]) * c) * (2 / c)
     return [np.minimum(np.maximum(value, 0), 1)]
 
 
@@ -123,29 +125,28 @@ def penumbras(x: Array) -> Array:
     return rows[DEPTH : DEPTH + 1].copy()
 
 
-def _blocked(m: Any, x: Any) -> tuple[Any, Any]:
+def _blocked(x: Any) -> tuple[Any, Any]:
     """Return the share of blockers before a receiver, by the series, and the sum of their depths."""
     d, means = x[0], x[1:]
     shade, depth = 0, 0
     for k in range(TERMS):
-        c = _frequency(m, k + 1)
-        sine, cosine = m.sin(d * c), m.cos(d * c)  # arrays come first: 50 digits times an array is slow
+        c = (2 * k + 1) * pi_of(x)
+        sine, cosine = np.sin(d * c), np.cos(d * c)  # arrays come first: 50 digits times an array is slow
         shade = shade + (cosine * means[k] - sine * means[TERMS + k]) * (2 / c)
         depth = depth + (cosine * means[2 * TERMS + k] - sine * means[3 * TERMS + k]) * (2 / c)
-    half = 1 / (2 + 0 * d)
-    return half - shade, half * means[4 * TERMS] - depth
+    return 0.5 - shade, 0.5 * means[4 * TERMS] - depth
 
 
-def penumbra(m: Any, x: Any) -> Any:
-    blocked, total = _blocked(m, x)
+def penumbra(x: Any) -> Any:
+    blocked, total = _blocked(x)
     found = blocked >= LEAST_BLOCKED
     mean = total / np.where(found, blocked, 1)
     return [np.where(found, np.minimum(np.maximum(mean, 0), x[0]), x[0])]
 
 
-def penumbra_whole(m: Any, x: Any) -> Any:
+def penumbra_whole(x: Any) -> Any:
     """Return the mean depth without limits, and what is divided by, whose own rounding decides whether it counts."""
-    blocked, total = _blocked(m, x)
+    blocked, total = _blocked(x)
     mean = total / blocked
     return [np.where(abs(blocked - LEAST_BLOCKED) < 1e-5, mean * 1e7 * x[0], mean)]
 
@@ -156,20 +157,14 @@ def draw_scales(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     return np.stack([near * 2.0 ** (span * rng.uniform(-0.1, 1.1, BLOCK)), near, 0.8 / span, np.full(BLOCK, 0.9)])
 
 
-def to_series(x: Array) -> Array:
+def to_series(logarithmic: bool, x: Array) -> Array:
     out = np.empty((1, x.shape[1]), x.dtype)
-    _to_series(x, True, out)
+    _to_series(x, logarithmic, out)
     return out
 
 
-def to_series_straight(x: Array) -> Array:
-    out = np.empty((1, x.shape[1]), x.dtype)
-    _to_series(x, False, out)
-    return out
-
-
-def scale(m: Any, x: Any) -> Any:
-    return [np.minimum(np.maximum(m.log(x[0] / x[1]) / m.log(m.number(np.array(2.0))) * x[2], 0), x[3])]
+def scale(logarithmic: bool, x: Any) -> Any:
+    return [series_depth(x[0, :, None, None], x[1], x[2], x[3, :, None, None], logarithmic).ravel()]
 
 
 def draw_straight(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
@@ -177,16 +172,12 @@ def draw_straight(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     return np.stack([near * (1 + span * rng.uniform(-0.1, 1.1, BLOCK)), near, 0.8 / (near * span), np.full(BLOCK, 0.9)])
 
 
-def scale_straight(m: Any, x: Any) -> Any:  # noqa: ARG001
-    return [np.minimum(np.maximum((x[0] - x[1]) * x[2], 0), x[3])]
-
-
 def draw_back(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     return np.stack([rng.random(BLOCK), sizes(rng, 1e-9, 1e9), 0.8 / rng.uniform(np.log2(1.05), 20, BLOCK)])
 
 
-def distance(m: Any, x: Any) -> Any:
-    return [x[1] * m.exp(x[0] / x[2] * m.log(m.number(np.array(2.0))))]
+def distance(x: Any) -> Any:
+    return [distance_of_series(x[0, :, None, None], x[1], x[2], logarithmic=True).ravel()]
 
 
 def draw_cones(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
@@ -196,35 +187,40 @@ def draw_cones(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     return np.stack([d * sizes(rng, 1e-6, 1e3), d, d * near])
 
 
-def cones(m: Any, x: Any) -> Any:
-    """tan a = Delta (d - z) / (2 d z); half of arctan(2 tan a); Delta / (2 d): no wider than 80 degrees."""
+def cones(x: Any) -> Any:
+    """Tangents of the cone, of half of twice its tangent as printed, and of the cone for blockers half-way."""
     delta, d, z = x
-    cap = m.tan(m.pi * 80 / 180)
-    tangent = np.where(d > z, np.minimum(delta * (d - z) / (2 * d * z), cap), 0)
-    return [tangent, m.tan(m.atan(2 * tangent) / 2), np.minimum(delta / (2 * d), cap)]
+    cone, halfway = (np.tan(half_angle(delta, d, at) + 0 * d) for at in (z, d / 2))
+    return [cone, np.tan(np.arctan(2 * cone) / 2), halfway]
 
 
 def draw_discs(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     w, d = directions(rng), sizes(rng, 1e-9, 1e9)
     w[2] = np.abs(w[2])
-    return np.concatenate([w * d, d[None], np.minimum(sizes(rng, 1e-9, 6.0), math.tan(CAP))[None]])
+    return np.concatenate([w * d, d[None], np.minimum(sizes(rng, 1e-9, 6.0), math.tan(STEEPEST))[None]])
 
 
-def discs(m: Any, x: Any) -> Any:
-    """Centre sin(theta) / (cos(theta) + cos(a)), radius sin(a) / (...); a square of alpha / pi of the texture."""
-    px, py, z, d, tangent = x
-    cosine = 1 / m.sqrt(1 + tangent * tangent)
-    across = z + d * cosine
-    half_alpha = m.atan(tangent)
-    return [px / across, py / across, d * tangent * cosine / across, px / (z + d), py / (z + d), 2 * half_alpha / m.pi]
+def discs(x: Any) -> Any:
+    a = np.arctan(x[4])
+    return np.concatenate([disc_of_cone(x[:3], x[3], a).T, square(x[:3], x[3], a).T])
 
 
-def sines(m: Any, x: Any) -> Any:
-    return [m.sin(m.pi * x[0]), m.cos(m.pi * x[0])]
+def draw_normals(rng: np.random.Generator, real: Any) -> Array:
+    n = directions(rng)
+    m = around(rng, n, real)
+    tilt = 10.0 ** rng.uniform(-16, 0, BLOCK)
+    m = np.where(rng.random(BLOCK) < 0.3, n + tilt * directions(rng), m)
+    return np.concatenate([n, rng.choice([-1.0, 1.0], BLOCK) * m / np.sqrt((m * m).sum(axis=0))])
+
+
+def angle(x: Any) -> Any:
+    aside = np.cross(x[:3], x[3:], axis=0)
+    return [np.arctan2(np.sqrt(dot(aside, aside)), dot(x[:3], x[3:]))]
 
 
 LADDERS = (
-    Ladder("val.basis", "t 0 .. 1", lambda rng, real: draw_depths(rng, real)[1:], each_of(sine_cosine, 1, 2), sines,
+    Ladder("val.basis", "t 0 .. 1", lambda rng, real: draw_depths(rng, real)[1:], each_of(sine_cosine, 1, 2),
+           lambda x: [np.sin(pi_of(x) * x[0]), np.cos(pi_of(x) * x[0])],
            2.5, source="2.4e-7 (float64: 4e-16), as the kernel promises, of 1.2e-7 (2.2e-16)", unit="one",
            conditioned=False, lowest=-1.000001),
     Ladder("val.step", "d and z 0 .. 1, 4 terms; near, equal, at the ends", draw_depths, steps, step, 16.0,
@@ -233,15 +229,19 @@ LADDERS = (
     Ladder("val.z_avg", "two depths of any share, d 0 .. 1, 4 terms", draw_means, penumbras, penumbra, 16.0,
            source="that of val.step, over the blocked share, which the condition knows",
            smooth=penumbra_whole, unit="one", extended=200_000, exact=1000, brief=BLOCK, brief_exact=40),
-    Ladder("val.scale", "distances 1e-9 .. 1e9 m, ratios 1.05 .. 2^20", draw_scales, to_series, scale,
+    Ladder("val.scale", "distances 1e-9 .. 1e9 m, ratios 1.05 .. 2^20", draw_scales, partial(to_series, True),
+           partial(scale, True), extended=2_000_000),
+    Ladder("val.scale_straight", "distances 1e-9 .. 1e9 m", draw_straight, partial(to_series, False),
+           partial(scale, False), source="2 roundings of the difference and its product", conditioned=False,
            extended=2_000_000),
-    Ladder("val.scale_straight", "distances 1e-9 .. 1e9 m", draw_straight, to_series_straight, scale_straight,
-           source="2 roundings of the difference and its product", conditioned=False, extended=2_000_000),
-    Ladder("val.distance", "t 0 .. 1, ratios 1.05 .. 2^20", draw_back, filled(_from_series), distance,
+    Ladder("val.distance", "t 0 .. 1, ratios 1.05 .. 2^20", draw_back, each_of(_from_series, 3), distance,
            extended=2_000_000),
     Ladder("val.filter_width", "d 1e-9 .. 1e9 m, Delta / d 1e-6 .. 1e3, z / d 1e-6 .. 1.2", draw_cones,
-           filled(_tangents, 3), cones, 8.0, source="8 roundings, each at most one ULP, of which d - z is the first",
-           conditioned=False),
-    Ladder("val.filter_place", "d 1e-9 .. 1e9 m, cones 1e-9 rad .. 80 degrees", draw_discs, filled(_discs, 6), discs,
-           8.0, source="8 roundings, each at most one ULP", lowest=-np.inf),
+           each_of(_tangents, 3, 3), cones, 8.0, conditioned=False,
+           source="8 roundings, each at most one ULP, of which d - z is the first"),
+    Ladder("val.filter_place", "d 1e-9 .. 1e9 m, cones 1e-9 rad .. 80 degrees", draw_discs, each_of(_discs, 5, 6),
+           discs, 8.0, source="8 roundings, each at most one ULP", lowest=-np.inf),
+    Ladder("val.angle", "unit normals any way, 1e-16 .. 1 rad from along and opposite", draw_normals,
+           each_of(_angle, 6), angle, 5.0, source="1e-15, as the kernel promises, and a rounding of both inputs",
+           unit="one", conditioned=False, reals=("float64",)),
 )

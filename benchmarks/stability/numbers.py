@@ -1,13 +1,70 @@
-"""Hostile numbers and vectors: coincident, one unit in the last place apart, grazing, opposite, subnormal, needles.
+"""Numbers of references, of extended precision or 50 digits, and hostile inputs.
 
-Everything is drawn from a generator of its block, so that case `i` of seed `s` is the same in every run (`block_of`).
+A formula is plain NumPy over rows of inputs, its own or a function of `refgi.literal`: arrays of longdouble (64 bits on
+x86; elsewhere more, or no more than float64, which `trusted` tells) pass through it as they are, and arrays of numbers
+of 50 digits as well, for their class has the methods that NumPy's functions ask of objects.
+
+Inputs: coincident, one unit in the last place apart, grazing, opposite, subnormal, needles. All are drawn from a
+generator of their block, so that case `i` of seed `s` is the same in every run (`block_of`).
 """
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
+import mpmath
 import numpy as np
 
 from refgi.types import Array
+
+digits: Any = mpmath.MPContext()  # of its own: nobody else's precision changes
+digits.dps = 50
+for _name, _function in {
+    "sqrt": digits.sqrt, "exp": digits.exp, "log": digits.log, "log1p": digits.log1p, "sin": digits.sin,
+    "cos": digits.cos, "tan": digits.tan, "arctan": digits.atan, "arctan2": digits.atan2,
+    "exp2": lambda x: digits.mpf(2) ** x, "log2": lambda x: digits.log(x) / digits.log(2),
+}.items():
+    setattr(digits.mpf, _name, lambda *x, function=_function: function(*x))
+
+PI = np.longdouble("3.14159265358979323846264338327950288")
+
+
+class Precision(NamedTuple):
+    """A kind of numbers, in arrays."""
+
+    name: str
+    of: Callable[[Any], Any]  # exact, from float32 or float64
+
+
+EXTENDED = Precision("longdouble", lambda x: np.asarray(x).astype(np.longdouble))
+DIGITS = Precision("mpmath, 50 digits", np.frompyfunc(lambda one: digits.mpf(float(one)), 1, 1))
+# of 50 digits alone: I_x(a, 1/2), regularised, of x and a; erfc
+incomplete_beta = np.frompyfunc(lambda x, a: digits.betainc(a, digits.mpf(0.5), 0, x, regularized=True), 2, 1)
+complementary_error = np.frompyfunc(digits.erfc, 1, 1)
+
+
+def trusted() -> bool:
+    """Return whether extended precision has the bits that are asked of it."""
+    return bool(np.finfo(np.longdouble).nmant >= 63)
+
+
+def pi_of(x: Array) -> Any:
+    """Return pi as a number of the kind of an array."""
+    return +digits.pi if x.dtype == object else PI
+
+
+def dot(a: Any, b: Any) -> Any:
+    """Return the dot product of two vectors of arrays."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def spacing(value: Array, real: Any) -> Array:
+    """Return the unit in the last place of float32 or float64 at some numbers, as extended numbers."""
+    info = np.finfo(real)
+    _, exponent = np.frexp(np.abs(value).astype(np.longdouble))
+    lowest = info.minexp - info.nmant
+    power = np.where(np.asarray(value) == 0, lowest, np.maximum(exponent - (info.nmant + 1), lowest))
+    return np.ldexp(np.longdouble(1), power)
+
 
 BLOCK = 1 << 14  # cases drawn at once
 SMALL = (1e-7, 1e-1)  # of a length: components that are tiny, angles that graze

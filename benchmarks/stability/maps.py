@@ -2,6 +2,7 @@
 
 Formulas are those of docs/rasterizer.md and docs/conventions.md: a point appears at (x, y) / z in a perspective map and
 at (x, y) / (|p| + z) in a paraboloid one, along the frame's right, down and forward; the map spans -half .. half.
+refgi.literal has the texel that holds a point alone, and the ray of a paraboloid's.
 """
 
 from functools import partial
@@ -9,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.stability.inputs import BLOCK, across, directions, sizes
-from benchmarks.stability.ladder import Ladder
-from benchmarks.stability.maths import cross, dot
-from benchmarks.stability.pair_ladders import filled
+from benchmarks.stability.ladder import Ladder, each_of
+from benchmarks.stability.numbers import BLOCK, across, directions, dot, sizes
 from refgi.jit import kernel
+from refgi.literal.val_maps import direction
 from refgi.rsm.buffers.surfaces import barycentric_axes, image_ray
 from refgi.rsm.raster.projection import (
     PARABOLOID,
@@ -48,21 +48,19 @@ def _fill_cube(maps: Projection, x: Array, out: Array) -> None:
 
 
 @kernel
-def _rays(x: Array, out: Array) -> None:
+def _ray(s: Any, t: Any) -> Any:
     zero, one = 0.0, 1.0
-    for i in range(x.shape[1]):
-        _, _, _, out[0, i], out[1, i], out[2, i] = image_ray(
-            PARABOLOID, (zero, zero, zero, one, zero, zero, zero, one, zero, zero, zero, one), x[0, i], x[1, i])
+    frame = (zero, zero, zero, one, zero, zero, zero, one, zero, zero, zero, one)
+    return image_ray(PARABOLOID, frame, s, t)[3:]
 
 
 @kernel
-def _volumes(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        first, second = barycentric_axes(
-            (x[6, i], x[7, i], x[8, i]), (x[9, i], x[10, i], x[11, i]), (x[12, i], x[13, i], x[14, i]),
-            (x[0, i], x[1, i], x[2, i]))  # fmt: skip
-        out[0, i] = x[3, i] * first[0] + x[4, i] * first[1] + x[5, i] * first[2]
-        out[1, i] = x[3, i] * second[0] + x[4, i] * second[1] + x[5, i] * second[2]
+def _volumes(  # origin and direction of a ray, and three corners
+    ox: Any, oy: Any, oz: Any, dx: Any, dy: Any, dz: Any, x0: Any, y0: Any, z0: Any, x1: Any, y1: Any, z1: Any,
+    x2: Any, y2: Any, z2: Any,
+) -> Any:
+    first, second = barycentric_axes((x0, y0, z0), (x1, y1, z1), (x2, y2, z2), (ox, oy, oz))
+    return (dx * first[0] + dy * first[1] + dz * first[2], dx * second[0] + dy * second[1] + dz * second[2])
 
 
 def draw_points(kind: int, rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
@@ -96,15 +94,14 @@ def points(kind: int, x: Array) -> Array:
     return out
 
 
-def point(kind: int, m: Any, x: Any) -> Any:
-    p = [a - b for a, b in zip(x[:3], x[3:6], strict=True)]
+def point(kind: int, x: Any) -> Any:
+    p = x[:3] - x[3:6]
     u, v, z = dot(p, x[6:9]), dot(p, x[9:12]), dot(p, x[12:15])
     half, depth, scale = HALF, z, z
     if kind == PARABOLOID:
-        half, depth = (1.0, 1.0), m.sqrt(u * u + v * v + z * z)
+        half, depth = (1.0, 1.0), np.sqrt(u * u + v * v + z * z)
         scale = depth + z
-    halves = [m.number(np.float64(h)) for h in half]
-    return [(u / scale / halves[0] + 1) / 2 * WIDTH, (v / scale / halves[1] + 1) / 2 * HEIGHT, depth]
+    return [(u / scale / half[0] + 1) / 2 * WIDTH, (v / scale / half[1] + 1) / 2 * HEIGHT, depth]
 
 
 def draw_cube(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
@@ -124,7 +121,7 @@ def cubes(x: Array) -> Array:
     return out
 
 
-def cube(m: Any, x: Any) -> Any:  # noqa: ARG001
+def cube(x: Any) -> Any:
     """Row, column and depth on the stacked faces; the face is that of the largest coordinate."""
     row, column, depth = (0 * x[0] for _ in range(3))
     largest = np.maximum(np.maximum(abs(x[0]), abs(x[1])), abs(x[2]))
@@ -144,11 +141,6 @@ def draw_image(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     return np.asarray(u / np.maximum(np.sqrt((u * u).sum(axis=0)), 1))
 
 
-def paraboloid_ray(m: Any, x: Any) -> Any:  # noqa: ARG001
-    square = x[0] * x[0] + x[1] * x[1]
-    return [2 * x[0] / (1 + square), 2 * x[1] / (1 + square), (1 - square) / (1 + square)]
-
-
 def draw_edges(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     """Return rays and triangles at any distance of them, needles and small ones far away among them."""
     origin, along = rng.uniform(-1, 1, (3, BLOCK)), directions(rng)
@@ -160,29 +152,28 @@ def draw_edges(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
 
 def _edges(x: Any) -> Any:
     """Return v1 - v0, v2 - v0 and v0 - o."""
-    v0, v1, v2 = x[6:9], x[9:12], x[12:15]
-    return tuple([p - q for p, q in zip(end, start, strict=True)] for end, start in ((v1, v0), (v2, v0), (v0, x[:3])))
+    return x[9:12] - x[6:9], x[12:15] - x[6:9], x[6:9] - x[:3]
 
 
-def volumes(m: Any, x: Any) -> Any:  # noqa: ARG001
+def volumes(x: Any) -> Any:
     """Return d . ((v2 - v0) x (v0 - o)) and d . ((v0 - o) x (v1 - v0))."""
     one, two, far = _edges(x)
-    return [dot(x[3:6], cross(two, far)), dot(x[3:6], cross(far, one))]
+    return [dot(x[3:6], np.cross(two, far, axis=0)), dot(x[3:6], np.cross(far, one, axis=0))]
 
 
-def products(m: Any, x: Any, real: Any) -> Any:
+def products(x: Any, real: Any) -> Any:
     """Return half an ULP of the six products of each volume, all taken as positive."""
-    d = [abs(c) for c in x[3:6]]
-    one, two, far = ([abs(c) for c in edge] for edge in _edges(x))
+    d = abs(x[3:6])
+    one, two, far = (abs(edge) for edge in _edges(x))
     totals = [sum(d[i] * (a[j] * far[k] + a[k] * far[j]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)))
               for a in (two, one)]  # fmt: skip
-    return np.stack([total * m.number(np.float64(np.finfo(real).eps / 2)) for total in totals])
+    return np.stack([total * float(np.finfo(real).eps / 2) for total in totals])
 
 
-def of_the_map(m: Any, x: Any, real: Any) -> Any:
+def of_the_map(x: Any, real: Any) -> Any:
     """Return 4 ULP of the map's size for columns and rows: they count from its edge, images from its middle."""
     eps = 4 * float(np.finfo(real).eps)
-    return np.stack([0 * x[0] + m.number(np.float64(size * eps)) for size in (WIDTH, HEIGHT, 0)])
+    return np.stack([0 * x[0] + size * eps for size in (WIDTH, HEIGHT, 0)])
 
 
 LADDERS = (
@@ -194,9 +185,9 @@ LADDERS = (
            reals=("float64",), lowest=-1e-3, brief=3 * BLOCK),
     Ladder("map.cube", "1e-6 .. 1e6 m away, 1e-9 of the edges and farther", draw_cube, cubes, cube,
            reals=("float64",), lowest=-1e-3, brief=3 * BLOCK),
-    Ladder("map.paraboloid_ray", "the unit disc, to the rim", draw_image, filled(_rays, 3), paraboloid_ray, 6.0,
-           source="6 roundings, each at most one ULP", lowest=-1.0),
-    Ladder("map.barycentric", "edges 1e-12 .. 1e6 m, needles, small and far", draw_edges, filled(_volumes, 2), volumes,
-           7.0, source="7 roundings of half an ULP of the six products (the unit)", scale=products, conditioned=False,
-           reals=("float64",), lowest=-np.inf, extended=4_000_000),
+    Ladder("map.paraboloid_ray", "the unit disc, to the rim", draw_image, each_of(_ray, 2, 3), lambda x: direction(*x),
+           6.0, source="6 roundings, each at most one ULP", lowest=-1.0),
+    Ladder("map.barycentric", "edges 1e-12 .. 1e6 m, needles, small and far", draw_edges, each_of(_volumes, 15, 2),
+           volumes, 7.0, source="7 roundings of half an ULP of the six products (the unit)", scale=products,
+           conditioned=False, reals=("float64",), lowest=-np.inf, extended=4_000_000),
 )

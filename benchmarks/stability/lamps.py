@@ -1,7 +1,8 @@
-"""Ladders of lamps: the edge and falloff of spots, solid angles of texels.
+"""Ladders of lamps: the edge and falloff of spots, light of a point anywhere, solid angles of texels, frames.
 
-Formulas are those of docs/radiometry.md and of `SpotLight`: t = (cos a - cos outer) / (cos inner - cos outer) in
-[0, 1], t t (3 - 2 t); a rectangle at z = 1 spans F11 - F01 - F10 + F00, F = atan(x y / sqrt(1 + x^2 + y^2)).
+Formulas of solid angles on a perspective map are those of refgi.literal. Others are those of docs/radiometry.md and of
+`SpotLight`: t = (cos a - cos outer) / (cos inner - cos outer) in [0, 1], t t (3 - 2 t), E = I / d^2; the literal ones
+take one cone at a time, and the sign of a zero from NumPy, which numbers of 50 digits have not.
 """
 
 from functools import cache
@@ -9,15 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.stability.inputs import BLOCK, across, directions, sizes
-from benchmarks.stability.ladder import Ladder
-from benchmarks.stability.maths import dot
-from benchmarks.stability.pair_ladders import each_of, filled
+from benchmarks.stability.ladder import Ladder, each_of
+from benchmarks.stability.numbers import BLOCK, across, directions, dot, sizes
 from refgi.jit import kernel
+from refgi.literal.light_flux import corner_angle, solid_angle
 from refgi.radiometry import (
     FOR_FLOAT32,
+    POINT,
     corner_solid_angle_paraboloid,
     corner_solid_angle_perspective,
+    incident_light,
     orthonormal_basis,
     smooth_edge,
     spot_falloff,
@@ -25,6 +27,7 @@ from refgi.radiometry import (
 from refgi.rsm.buffers.solid_angle import texel_solid_angles_at
 from refgi.rsm.raster.projection import Projection
 from refgi.scene.light import cone_row
+from refgi.scene.model import LightTable
 from refgi.types import Array
 
 CONES = 32  # distinct ones in a block: each takes 60 digits to make
@@ -33,9 +36,8 @@ OUTER, INNER = 6, 7  # rows of the drawn half-angles
 
 
 @kernel
-def _edges(x: Array, out: Array) -> None:
-    for i in range(x.shape[1]):
-        out[0, i] = smooth_edge(x[0, i], x[1, i], 1.0, 0.0)
+def _edge(t: Any, span: Any) -> Any:
+    return smooth_edge(t, span, 1.0, 0.0)
 
 
 @kernel
@@ -44,12 +46,19 @@ def _shares(x: Array, cones: Array, plain: float, out: Array) -> None:
         out[0, i] = spot_falloff((x[0, i], x[1, i], x[2, i]), (x[3, i], x[4, i], x[5, i]), cones[i], plain)
 
 
+@kernel
+def _light(lights: Any, points: Array, out: Array) -> None:
+    for i in range(points.shape[1]):
+        (out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i],
+         out[6, i]) = incident_light(lights, i, points[0, i], points[1, i], points[2, i])
+
+
 def draw_edges(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     span = sizes(rng, 1e-15, 1.0)
     return np.stack([span * rng.uniform(-0.1, 1.1, BLOCK), np.where(rng.random(BLOCK) < 0.02, 0.0, span)])
 
 
-def edge(m: Any, x: Any) -> Any:  # noqa: ARG001
+def edge(x: Any) -> Any:
     """A span of 0 is a step; what is at its edge counts as inside."""
     wide = np.where(x[1] > 0, x[1], 1)
     t = np.minimum(np.maximum(np.where(x[1] > 0, x[0] / wide, np.where(x[0] >= 0, 1, 0)), 0), 1)
@@ -86,30 +95,56 @@ def falloffs(plain: float) -> Any:
     return run
 
 
-def falloff(m: Any, x: Any) -> Any:
+def falloff(x: Any) -> Any:
     d, axis = x[:3], x[3:6]
-    cosine = dot(d, axis) / m.sqrt(dot(d, d) * dot(axis, axis))
-    edge_of = m.cos(x[OUTER])
-    t = np.minimum(np.maximum((cosine - edge_of) / (m.cos(x[INNER]) - edge_of), 0), 1)
-    return [t * t * (3 - 2 * t)]
+    cosine = dot(d, axis) / np.sqrt(dot(d, d) * dot(axis, axis))
+    edge_of = np.cos(x[OUTER])
+    return edge(np.stack([cosine - edge_of, np.cos(x[INNER]) - edge_of]))
+
+
+def draw_lamps(near: Any, rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
+    """Return places of lamps, which are no float32 numbers, of receivers 1e-9 .. 1e6 m away, and intensities."""
+    at = sizes(rng, 1e-3, 1e3) * directions(rng) * (1 + 1e-9 * rng.random(BLOCK))
+    place = (at + sizes(rng, 1e-9, 1e6) * directions(rng)).astype(near).astype(np.float64)
+    return np.concatenate([at, place, sizes(rng, 1e-9, 1e9, 3 * BLOCK).reshape(3, BLOCK)])
+
+
+def lit(near: Any, x: Array) -> Array:
+    n = x.shape[1]
+    lamps = LightTable(np.full(n, POINT, np.int32), np.ascontiguousarray(x[:3].T), np.zeros((n, 3)), np.zeros((n, 6)),
+                       np.ascontiguousarray(x[6:].T))
+    out = np.empty((7, n))
+    _light(lamps, np.ascontiguousarray(x[3:6], near), out)
+    return out
+
+
+def light(x: Any) -> Any:
+    d = x[:3] - x[3:6]
+    square = dot(d, d)
+    away = np.where(square > 0, square, 1 + 0 * square)
+    length = np.sqrt(away)
+    return np.where(square > 0, np.concatenate([d / length, length[None], x[6:] / away]), 0)
+
+
+def _lamp(name: str, near: Any, of: str) -> Ladder:
+    return Ladder(name, f"lamps at any place of float64, receivers of {of}, 1e-9 .. 1e6 m away",
+                  lambda rng, real: draw_lamps(near, rng, real), lambda x: lit(near, x), light, 10.0,
+                  source="10 roundings, of which those of r^2 count once more in its square", conditioned=False,
+                  reals=("float64",), extended=500_000, brief=BLOCK, lowest=-np.inf)
 
 
 def draw_corners(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     return sizes(rng, 1e-12, 1e6, 2 * BLOCK).reshape(2, BLOCK) * rng.choice([-1.0, 1.0], (2, BLOCK))
 
 
-def perspective_corner(m: Any, x: Any) -> Any:
-    return [m.atan(x[0] * x[1] / m.sqrt(1 + x[0] * x[0] + x[1] * x[1]))]
-
-
 def draw_disc(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     return sizes(rng, 1e-9, 1.0, 2 * BLOCK).reshape(2, BLOCK) * rng.choice([-1.0, 1.0], (2, BLOCK))
 
 
-def paraboloid_corner(m: Any, x: Any) -> Any:
+def paraboloid_corner(x: Any) -> Any:
     """The integral of 4 / (1 + u^2 + v^2)^2 over the rectangle from 0 to (u, v)."""
-    su, sv = (m.sqrt(1 + c * c) for c in x)
-    return [2 * (x[1] / sv * m.atan(x[0] / sv) + x[0] / su * m.atan(x[1] / su))]
+    su, sv = (np.sqrt(1 + c * c) for c in x)
+    return [2 * (x[1] / sv * np.arctan(x[0] / sv) + x[0] / su * np.arctan(x[1] / su))]
 
 
 def draw_texels(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
@@ -128,28 +163,26 @@ def texels(x: Array) -> Array:
     return out
 
 
-def texel(m: Any, x: Any) -> Any:
-    half, n = x[0], x[1]
-    (y0, y1), (x0, x1) = (((2 * k / n - 1) * half, (2 * (k + 1) / n - 1) * half) for k in (x[2], x[3]))
-    corners = [perspective_corner(m, corner)[0] for corner in ((x1, y1), (x0, y1), (x1, y0), (x0, y0))]
-    return [corners[0] - corners[1] - corners[2] + corners[3]]
+def texel(x: Any) -> Any:
+    y0, y1, x0, x1 = ((2 * (k + end) / x[1] - 1) * x[0] for k in (x[2], x[3]) for end in (0, 1))
+    return [solid_angle(x0, x1, y0, y1)]
 
 
 def draw_normals(rng: np.random.Generator, real: Any) -> Array:  # noqa: ARG001
     return directions(rng) + 0.0  # no -0: the seam lies there
 
 
-def basis(m: Any, x: Any) -> Any:
+def basis(x: Any) -> Any:
     """Duff et al. 2017: the seam lies at z = 0, where the sign is that of the zero."""
     nx, ny, nz = x
-    sign = np.where(nz < 0, -1, 1) + 0 * m.number(np.ones(1))
+    sign = np.where(nz < 0, -1, 1) + 0 * nz
     a = -1 / (sign + nz)
     b = nx * ny * a
     return [1 + sign * nx * nx * a, sign * b, -sign * nx, b, sign + ny * ny * a, -ny]
 
 
 LADDERS = (
-    Ladder("spot.edge", "span 1e-15 .. 1 and 0, t -0.1 .. 1.1", draw_edges, filled(_edges), edge, 7.0,
+    Ladder("spot.edge", "span 1e-15 .. 1 and 0, t -0.1 .. 1.1", draw_edges, each_of(_edge, 2), edge, 7.0,
            source="7 roundings: t thrice, two products, 3 - 2 t"),
     Ladder("spot.falloff", "half-angles 1e-6 rad .. 90 degrees, to 5e-15 of the edge", draw_falloffs,
            falloffs(np.inf), falloff, 8.0, source="8 ULP, as the kernel promises, without a condition",
@@ -160,7 +193,7 @@ LADDERS = (
            unit="float32", conditioned=False, reals=("float64",), extended=0, fixed=(OUTER, INNER),
            brief_exact=2000),
     Ladder("solid_angle.perspective", "corners 1e-12 .. 1e6", draw_corners, each_of(corner_solid_angle_perspective, 2),
-           perspective_corner, lowest=-np.inf),
+           lambda x: [corner_angle(*x)], lowest=-np.inf),
     Ladder("solid_angle.paraboloid", "corners 1e-9 .. 1", draw_disc, each_of(corner_solid_angle_paraboloid, 2),
            paraboloid_corner, 9.0, source="9 roundings, each at most one ULP", lowest=-np.inf),
     Ladder("solid_angle.texel", "1 .. 16384 texels a side, half extents 1e-6 .. 3", draw_texels, texels, texel, 9.0,
@@ -168,4 +201,6 @@ LADDERS = (
            conditioned=False, reals=("float64",), extended=0, exact=10_000),
     Ladder("frame.basis", "unit normals, along axes, flat, needles", draw_normals, each_of(orthonormal_basis, 3, 6),
            basis, 4.0, unit="one", lowest=-np.inf),
+    _lamp("lamp.light", np.float64, "float64"),
+    _lamp("lamp.light32", np.float32, "float32"),
 )

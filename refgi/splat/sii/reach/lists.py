@@ -207,7 +207,8 @@ class LightLists:
     def __init__(
         self, packed: Packed, settings: SiiSettings, outside: bool, width: int, projection: "Projection | None"
     ) -> None:
-        self._bound = FullBound() if outside else settings.reach.bound
+        everywhere = outside or packed.spheres is not None  # spheres reach over their horizon
+        self._bound = FullBound() if everywhere else settings.reach.bound
         self._on_screen = isinstance(self._bound, QuadBound | MeshBound)
         if self._on_screen:
             expect(projection is not None, "projection", f"the camera's map for the bound {self._bound.name()!r}", None)

@@ -160,10 +160,11 @@ def with_openness(frame: "Frame", lights: "PixelLights", settings: LightSettings
 def _walked(frame: "Frame", count: int, bounces: int, seed: int) -> "PixelLights":
     from refgi.lights.walk import walk_lights
     from refgi.scene import light_table, material_table
+    from refgi.scene.material import as_senders
 
     scene = frame.scene
-    return walk_lights(frame.tracer, scene.geometry, material_table(scene.materials), light_table(scene.lights),
-                       count, bounces, seed)
+    return walk_lights(frame.tracer, scene.geometry, material_table(as_senders(scene.materials)),
+                       light_table(scene.lights), count, bounces, seed)
 
 
 def pixel_lights(

@@ -184,6 +184,8 @@ def _add(
         parameter, _, field = leaf.partition(".")
         own = f"{GIVEN[parameter]}.{field}" if parameter in GIVEN else (
             f"{name}.given.{leaf}" if leaf in outputs else f"{name}.{leaf}")
+        if not np.array_equal(recipe.given.get(own, array), array):  # materials as they light others
+            own = f"{name}.{leaf}"
         reads[leaf] = known.name(array) or known.ids(array) or known.view(leaf, handed) or known.give(
             own, array, input_spec(own, arguments[parameter], handed) or spec_of(
                 field_description(arguments[parameter], field) or told.get(parameter), array, own))

@@ -29,7 +29,7 @@ from refgi.vectors.inputs import input_spec
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Arrays, Bug, Case, Run, Spec
 
-LEFT_OUT = frozenset({"scene.load", "rays.build", "rsm.resolve", "rsm.rasterize", "rsm.solid_angles",
+LEFT_OUT = frozenset({"scene.load", "rays.build", "rsm.resolve", "rsm.rasterize", "rsm.solid_angles", "rays.openness",
                       "rsm.lamp_irradiance", "lights.shares", "lights.map_flux", "cluster.blockers",
                       "cluster.distances"})  # parts of others, or no arrays that a port has
 GIVEN = {"geometry": "scene", "materials": "materials"}  # parameters whose arrays are the scene's

@@ -172,6 +172,19 @@ def test_fragments_off_the_surface_seen_are_not_shaded(evidence):
              + ", ".join(f"{evaluated[name, 'mesh'] / evaluated[name, 'quad']:.2f}" for name in left))
 
 
+@pytest.mark.feature("SII-30")
+def test_a_bound_before_the_surface_seen_lists_no_tile():
+    """A light whose range ends before all surfaces: its quad lists tiles, its mesh none."""
+    buffer = Frame(load_scene("cornell_box"), width=80, height=64).gbuffer
+    receivers = Receivers(*buffer.resolve("position", "normal", "covered"))
+    place, ahead, flux = (np.array(part, np.float32)[:, None] for part in ((0.278, 0.44, 0.3), (0, 0, 1), (1, 1, 1)))
+    lights = sets.PixelLights(place, ahead, flux, None, None, None, 1)
+    how = of(SiiSettings, cut_irradiance=1 / math.pi / 0.05**2)  # R_0 = 5 cm
+    evaluated = {bound: fragments(receivers, lights, replaced(how, {"bound": bound}), None, buffer.projection).evaluated
+                 for bound in ("quad", "mesh")}
+    assert evaluated["quad"] > evaluated["mesh"] == 0
+
+
 def behind_slats(scene, distance=0.1, count=9):
     """The scene seen between upright slats that hide two thirds of the picture."""
     eye, up = np.array(scene.camera.eye), np.array(scene.camera.up)

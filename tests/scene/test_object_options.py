@@ -5,13 +5,19 @@ import dataclasses
 import numpy as np
 import pytest
 
+from refgi.diagnostics import SamplingError
 from refgi.frame import Frame
+from refgi.lights.selection import choose_lights
+from refgi.lights.settings import LightSettings
 from refgi.methods import METHODS
+from refgi.pairs.estimates import with_seen_light
+from refgi.pairs.irradiance import Receivers
 from refgi.provenance.content import materials_digest
 from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.splat import SiiSettings
 from refgi.splat.sii.approximations import sii_ledger
+from refgi.sssil.cameras import equal_flux_points
 from tests.scene.samples import SCENE, write_scene
 from tests.wiring.cases import SCENES
 
@@ -68,6 +74,19 @@ def test_its_light_is_absent_and_all_others_is_there_to_the_bit(evidence):
         shares.append(theirs.flux[:, wall].sum() / theirs.flux.sum())
     evidence("flux of the object, absent: " + ", ".join(f"{share:.0%}" for share in shares)
              + " of the maps'; of all else 0 bits differ")
+
+
+def test_placed_cameras_and_stated_errors_know():
+    """Where cameras look for light, and what lights lack of the light that visible surfaces send."""
+    frames = [Frame(painted(**changes), **OPTIONS) for changes in ({"sends": False}, BLACK, {})]
+    dim = choose_lights(frames[1], LightSettings())
+    dim = dim._replace(flux=1e-6 * dim.flux, lobe_flux=None)
+    receivers = Receivers(*frames[1].gbuffer.resolve("position", "normal", "covered"))
+    silent, black, plain = ([equal_flux_points(frame)[1],
+                             with_seen_light(SamplingError(0.0, 0.0, 1, ""), frame, receivers, dim).pixel]
+                            for frame in frames)
+    assert silent == black
+    assert all(one < other for one, other in zip(silent, plain, strict=True))
 
 
 def test_the_ledger_knows():

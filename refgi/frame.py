@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
+from refgi.scene.material import as_senders
 from refgi.scene.model import LightTable, MaterialTable, Scene, light_table, material_table
 from refgi.scene.motion import near_origin
 from refgi.scene.values import is_count
@@ -92,6 +93,18 @@ class Frame:
         return material_table(self.scene.materials, self.dtype)
 
     @cached_property
+    def senders(self) -> MaterialTable:
+        """The materials as they light others, `materials` itself where all of them do (HSS Sec. 4)."""
+        black = as_senders(self.scene.materials)
+        return self.materials if black == self.scene.materials else material_table(black, self.dtype)
+
+    @cached_property
+    def sent_albedo(self) -> Array:
+        """Diffuse reflectance with which visible surfaces light others, (3, h, w)."""
+        buffer = self.gbuffer
+        return buffer.albedo if self.senders is self.materials else buffer.of_materials(self.senders).albedo
+
+    @cached_property
     def lights(self) -> LightTable:
         """The scene's lights as arrays."""
         return light_table(self.scene.lights)
@@ -110,7 +123,7 @@ class Frame:
         from refgi.rsm import reflective_shadow_map
 
         return tuple(
-            reflective_shadow_map(self.scene.geometry, self.materials, light, self.rsm_resolution, self.dtype)
+            reflective_shadow_map(self.scene.geometry, self.senders, light, self.rsm_resolution, self.dtype)
             for light in self.scene.lights
         )
 

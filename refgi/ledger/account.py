@@ -173,7 +173,7 @@ def _light_terms(frame: "Frame", settings: "LightSettings") -> LightTerms:
     """Return the account of all lights together."""
     source = settings.source
     maps = light_maps(frame, source) if isinstance(source, MapLights) else frame.rsms
-    terms = [light_terms(rsm, frame.scene.geometry, frame.materials) for rsm in maps]
+    terms = [light_terms(rsm, frame.scene.geometry, frame.senders) for rsm in maps]
     return LightTerms(*(sum(line, np.zeros(3)) for line in zip(*terms, strict=True)))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from refgi.diagnostics import is_due
 from refgi.errors import expect
+from refgi.lights.ambient_occlusion import openness_of
 from refgi.lights.footprints import with_equal_solid_angles
 from refgi.lights.settings import LightSettings, MapLights, PathLights
 from refgi.sampling import ROULETTE, draws
@@ -134,7 +135,8 @@ def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: LightSettin
     for rsm in rsms:
         free = None
         if warp.importance == "openness":
-            free = _openness(frame, rsm.position, rsm.normal, settings, _has_flux(rsm))
+            free = openness_of(frame, rsm.position, rsm.normal, _has_flux(rsm), settings=settings.openness,
+                               seed=settings.seed)
         maps.append(importance(rsm, warp.importance, free, settings.openness.floor, warp.defensive,
                                as_printed="sii_peak" in _map_lights(settings).as_published))
     return maps
@@ -146,7 +148,7 @@ def with_openness(frame: "Frame", lights: "PixelLights", settings: LightSettings
 
     if settings.openness.flux == "none":
         return lights
-    free = _openness(frame, lights.position, lights.normal, settings)
+    free = openness_of(frame, lights.position, lights.normal, settings=settings.openness, seed=settings.seed)
     if settings.openness.flux == "scale":
         scaled = scale_flux(lights, free, "sii_openness" in settings.openness.as_published)[0]
         if is_due("lights.openness_loss"):
@@ -155,23 +157,14 @@ def with_openness(frame: "Frame", lights: "PixelLights", settings: LightSettings
     return roulette(lights, free, settings.openness.floor, settings.seed)
 
 
-def _openness(
-    frame: "Frame", position: Array, normal: Array, settings: LightSettings, covered: Array | None = None
-) -> Array:
-    from refgi.rays import openness
-
-    radius = settings.openness.radius or frame.illuminated_extent.diagonal / 10
-    return openness(frame.tracer, position, normal, covered, radius=radius, rays=settings.openness.rays,
-                    seed=settings.seed)
-
-
 def _walked(frame: "Frame", count: int, bounces: int, seed: int) -> "PixelLights":
     from refgi.lights.walk import walk_lights
     from refgi.scene import light_table, material_table
+    from refgi.scene.material import as_senders
 
     scene = frame.scene
-    return walk_lights(frame.tracer, scene.geometry, material_table(scene.materials), light_table(scene.lights),
-                       count, bounces, seed)
+    return walk_lights(frame.tracer, scene.geometry, material_table(as_senders(scene.materials)),
+                       light_table(scene.lights), count, bounces, seed)
 
 
 def pixel_lights(

@@ -16,6 +16,7 @@ S = TypeVar("S", bound=Any)
 
 Pattern = Literal["grid", "halton", "all", "random"]
 
+OCCLUSION = "openness of receivers in place of visibility (SII Sec. 7)"
 MOST_LIGHTS = 1 << 24  # every texel of a map of 4096 x 4096
 
 
@@ -94,14 +95,20 @@ class PathLights(Settings):
 
 
 @dataclasses.dataclass(frozen=True)
-class OpennessSettings(Settings):
+class Openness(Settings):
+    """Short rays from surface points: the share of cosine-weighted directions that nothing blocks (SII Sec. 3.5)."""
+
+    radius: float = setting(0.0, "length of the rays; 0: a tenth of the scene's diagonal", least=0.0, most=LARGEST,
+                            unit="m", study=True)
+    rays: int = setting(16, "rays of one point", least=1, most=1 << 16, study=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class OpennessSettings(Openness):
     """How open the surroundings of a light are, and what that does to its flux (SII Sec. 3.6)."""
 
     SWITCHES: ClassVar[frozenset[str]] = frozenset({"sii_openness"})
 
-    radius: float = setting(0.0, "length of the rays; 0: a tenth of the scene's diagonal", least=0.0, most=LARGEST,
-                            unit="m", study=True)
-    rays: int = setting(16, "rays of one light", least=1, most=1 << 16, study=True)
     floor: float = setting(0.05, "least importance of a light in the open", least=0.0, most=1.0, study=True)
     flux: Literal["none", "scale", "roulette"] = setting(
         "none", "flux times 1 - openness, or roulette with it, which costs no energy in the mean")
@@ -186,6 +193,11 @@ def every_light(lights: LightSettings) -> LightSettings:
     return dataclasses.replace(lights, count=1, seed=0, source=source)
 
 
+def without_ambient_occlusion(settings: Any, _: Mapping[str, Any]) -> Any:
+    """Return settings of a method whose receivers get light as if nothing blocked it."""
+    return dataclasses.replace(settings, ambient_occlusion=None)
+
+
 def without_clamp(settings: Any, _: Mapping[str, Any]) -> Any:
     """Return settings of a method whose near pairs are not clamped."""
     return dataclasses.replace(settings, pairs=dataclasses.replace(settings.pairs, clamp=None))
@@ -209,4 +221,6 @@ RSM_RESOLUTION = Approximation(
 LIGHT_SAMPLING = Approximation(
     "light sampling", "N pixel lights for all texels of the reflective shadow map", _sampled)
 OPENNESS = Approximation("openness", "flux of lights in the open is scaled down or left to chance", _unscaled)
+AMBIENT_OCCLUSION = Approximation(
+    "ambient occlusion", "openness of receivers stands for visibility", without_ambient_occlusion)
 CLAMP = Approximation("clamp", "what bounds the light of near pairs", without_clamp)

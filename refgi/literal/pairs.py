@@ -28,6 +28,11 @@ def irradiance(
     return np.where(triangle_id >= 0, total.reshape(position.shape), 0)
 
 
+def occluded(irradiance: Any, openness: Any) -> Any:
+    """Return E (3, h, w), W/m^2, under ambient occlusion: times the openness O (h, w) of each receiver (SII Sec. 7)."""
+    return openness * irradiance
+
+
 def pairs(
     position: Any, normal: Any, light_position: Any, light_normal: Any, flux: Any, lobe_flux: Any = None,
     lobe_axis: Any = None, lobe_exponent: Any = None,

@@ -232,7 +232,7 @@ def with_seen_light(
     """Return a sampling error that is no less than what lights lack of the light of visible surfaces."""
     if stated is None:
         return None
-    lacking = seen_light(frame.scene.camera, frame.gbuffer.albedo, frame.direct, receivers, lights) - 1
+    lacking = seen_light(frame.scene.camera, frame.sent_albedo, frame.direct, receivers, lights) - 1
     return stated._replace(pixel=max(stated.pixel, lacking), mean=max(stated.mean, lacking))
 
 

@@ -88,6 +88,9 @@ def _material_json(material: Material) -> dict[str, Any]:
             fields[key] = {"image": texture.image.digest, "wrap": list(texture.wrap), "filter": texture.filter}
     if material.cutoff is None:  # absent, the digest is that of earlier versions
         del fields["alpha"], fields["cutoff"]
+    for key in ("sends", "solid"):
+        if getattr(material, key) == getattr(Material, key):
+            del fields[key]
     return fields
 
 

@@ -33,7 +33,9 @@ class Material:
     `texture` multiplies `diffuse`, `emission_texture` the emission, where a surface has texture coordinates. With a
     `cutoff` the surface has holes: it is there only where `alpha` times the texture's alpha is at least the cutoff
     (None: it is there everywhere); `alpha_texture` is one whose alpha counts in place of the texture's. `one_sided`:
-    the file leaves out its back, which is there as the front is; of no meaning but for a warning.
+    the file leaves out its back, which is there as the front is; of no meaning but for a warning. Of an object that
+    `sends` nothing the reflectance counts as 0 wherever it would light others; it is seen and lit as any other. Objects
+    of one `solid` number (0: none) count as one rigid body where points are followed back to the frame before.
     """
 
     name: str = "default"
@@ -48,6 +50,8 @@ class Material:
     emission_texture: Texture | None = None
     alpha_texture: Texture | None = None
     one_sided: bool = dataclasses.field(default=False, compare=False)
+    sends: bool = True
+    solid: int = 0
 
     def __post_init__(self) -> None:
         for key in ("diffuse", "specular"):
@@ -96,6 +100,11 @@ def reflects_too_much(diffuse: Rgb, specular: Rgb) -> bool:
 
 
 UNPAINTED = Material()  # of a mesh that names none
+
+
+def as_senders(materials: Sequence[Material]) -> tuple[Material, ...]:
+    """Return materials as they light others: those that send nothing are black (HSS Sec. 4)."""
+    return tuple(one if one.sends else dataclasses.replace(one, diffuse=BLACK, specular=BLACK) for one in materials)
 
 
 class MaterialTable(NamedTuple):

@@ -202,7 +202,7 @@ def _object_meshes(
             faults.append(f"{path}: objects[{number}].mesh: {error}")
             continue
         try:
-            meshes += [_with_material(mesh, item, materials, entry.smooth_normals, path.parent)
+            meshes += [_with_material(mesh, item, materials, entry.smooth_normals, path.parent, number + 1)
                        for mesh in found.meshes]
             if item.smooth_normals is None and "smooth_normals" not in entry.model_fields_set and any(
                     mesh.normals is not None for mesh in found.meshes):
@@ -232,8 +232,10 @@ def _read_once(contents: dict[str, Contents | InputError], name: str, folder: Pa
     return found
 
 
-def _with_material(mesh: Mesh, item: "Object", materials: dict[str, Material], smooth: bool, folder: Path) -> Mesh:
-    """Return the mesh with its material, and with normals only where the scene enables them.
+def _with_material(
+    mesh: Mesh, item: "Object", materials: dict[str, Material], smooth: bool, folder: Path, number: int
+) -> Mesh:
+    """Return the mesh with its material, and with normals only where the scene enables them; `number`: its object's.
 
     Raises `InputError` if the material's texture cannot be read, or the mesh has no coordinates for it.
     """
@@ -246,6 +248,7 @@ def _with_material(mesh: Mesh, item: "Object", materials: dict[str, Material], s
     expect(not material.textures or mesh.uv is not None, item.mesh,
            f"texture coordinates for the texture of material {material.name!r}", "none")
     has_normals = smooth if item.smooth_normals is None else item.smooth_normals
+    material = dataclasses.replace(material, sends=item.sends, solid=number if item.rigid else 0)
     return dataclasses.replace(mesh, material=material, normals=mesh.normals if has_normals else None)
 
 

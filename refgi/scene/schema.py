@@ -138,6 +138,8 @@ class Object(Entry):
     ] | None = None
     transform: Matrix | None = None
     smooth_normals: bool | None = None
+    sends: bool = True
+    rigid: bool = False
     name: str = ""
 
     @field_validator("transform")

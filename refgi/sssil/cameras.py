@@ -41,7 +41,7 @@ def equal_flux_points(frame: Frame, count: int = LIT_POINTS) -> tuple[Points, fl
 
     Points are denser where more is reflected; none where no light falls. The flux is the sum of the three channels, W.
     """
-    maps = [reflective_shadow_map(frame.scene.geometry, frame.materials, light, MAP_RESOLUTION, frame.dtype)
+    maps = [reflective_shadow_map(frame.scene.geometry, frame.senders, light, MAP_RESOLUTION, frame.dtype)
             for light in frame.scene.lights]  # fmt: skip
     lights = choose_pixel_lights(maps, count=None, pattern="all")
     cumulative = np.cumsum(lights.flux.sum(axis=0, dtype=np.float64))

@@ -19,6 +19,7 @@ from refgi.jit import kernel
 from refgi.radiometry import lobe_gap, lobe_norm, lobe_power, orthonormal_basis
 from refgi.rays import ray_offset
 from refgi.scene import LightTable, Scene, light_table, material_table
+from refgi.scene.material import as_senders
 from refgi.scene.texture.table import TextureTable
 from refgi.types import Array
 
@@ -41,11 +42,11 @@ class Surfaces(NamedTuple):
 
 
 def surfaces(scene: Scene, mirror_exponent: float = math.inf) -> Surfaces:
-    """Lay out a scene's triangles and materials for kernels.
+    """Lay out a scene's triangles and materials for kernels, as they light others.
 
     `mirror_exponent`: lobes of at least this exponent are left out. Result: dielectrics have no reflectance in it.
     """
-    geometry, table = scene.geometry, material_table(scene.materials)
+    geometry, table = scene.geometry, material_table(as_senders(scene.materials))
     table.diffuse[table.ior > 0] = 0
     table.specular[(table.ior > 0) | (table.exponent >= mirror_exponent)] = 0
     normals = geometry.vertex_normals

@@ -29,7 +29,7 @@ from refgi.vectors.inputs import input_spec
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Arrays, Bug, Case, Run, Spec
 
-LEFT_OUT = frozenset({"scene.load", "rays.build", "rsm.resolve", "rsm.rasterize", "rsm.solid_angles",
+LEFT_OUT = frozenset({"scene.load", "rays.build", "rsm.resolve", "rsm.rasterize", "rsm.solid_angles", "rays.openness",
                       "rsm.lamp_irradiance", "lights.shares", "lights.map_flux", "cluster.blockers",
                       "cluster.distances"})  # parts of others, or no arrays that a port has
 GIVEN = {"geometry": "scene", "materials": "materials"}  # parameters whose arrays are the scene's
@@ -184,6 +184,8 @@ def _add(
         parameter, _, field = leaf.partition(".")
         own = f"{GIVEN[parameter]}.{field}" if parameter in GIVEN else (
             f"{name}.given.{leaf}" if leaf in outputs else f"{name}.{leaf}")
+        if not np.array_equal(recipe.given.get(own, array), array):  # materials as they light others
+            own = f"{name}.{leaf}"
         reads[leaf] = known.name(array) or known.ids(array) or known.view(leaf, handed) or known.give(
             own, array, input_spec(own, arguments[parameter], handed) or spec_of(
                 field_description(arguments[parameter], field) or told.get(parameter), array, own))

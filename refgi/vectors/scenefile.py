@@ -16,7 +16,7 @@ def is_plain(scene: Scene) -> bool:
     geometry, bare = scene.geometry, Material()
     return geometry.cut_outs is None and all(
         getattr(one, key) == getattr(bare, key) for one in scene.materials
-        for key in ("ior", "emission", "texture", "alpha", "cutoff", "emission_texture", "alpha_texture"))
+        for key in ("ior", "emission", "texture", "alpha", "cutoff", "emission_texture", "alpha_texture", "sends"))
 
 
 def write_scene(scene: Scene, size: tuple[int, int], folder: Path) -> None:

@@ -28,7 +28,7 @@ CASES = [
     ("multires", {"visibility": "rays"}), ("multires", {"visibility": "val"}),
     ("multires", {"subsplats": "irradiance"}),
     ("multires", {"as_published": {"ams_disc", "ams_filter_all", "ams_rho_in_splat"}}),
-    ("multires", {"source": "walk", "bounces": 2}),
+    ("multires", {"source": "walk", "bounces": 2}), ("multires", {"ambient_occlusion": "openness", "detail": 0.5}),
     ("val", {}), ("val", {"interleaving": 4, "blur": "box"}), ("val", {"visibility": "none"}),
     ("val", {"visibility": "rays_vpls", "clamp": "distance", "clamp_value": 0.05}),
 ]
@@ -103,6 +103,9 @@ def test_each_loss_is_on_its_line(evidence):
     detail = lines("multires", coarsest=64, detail=0.5)
     assert detail.pop("darkened") > 1e-3
     assert not any(detail.values())
+    occluded = lines("multires", coarsest=64, ambient_occlusion="openness")
+    assert occluded.pop("shadowed") > 1e-3
+    assert not any(occluded.values())
     none = lines("val", visibility="none", interleaving=1)
     assert set(none) == {"shadowed", "interpolated"}
     assert max(map(abs, none.values())) < WHOLE

@@ -15,18 +15,24 @@ def drawn(frame, settings, lights, part, squares):
     exponents = lights.lobe_exponent if part else np.ones(len(squares))
     flux = lights.lobe_flux if part else lights.flux
     found = np.zeros((len(squares), np.count_nonzero(frame.gbuffer.covered)), bool)
-    vertices, faces = sphere_mesh(settings.reach.bound.faces)
-    center, half_width, height = ellipsoids(np.asarray(exponents, float))[:3]
     widening = settings.pairs.lobe.widening if part else 0.0
+    printed = "sii_widening" in settings.pairs.as_published  # the exponent falls without end; else it is P from a on
     for k in np.flatnonzero(flux.any(axis=0)):
-        radius, along = math.sqrt(squares[k]), np.outer(vertices @ axis[:, k], axis[:, k])
-        bodies = [position[:, k] + radius * (center[k] * axis[:, k] + half_width[k] * along
-                                             + height[k] * (vertices - along))]
-        if widening:  # the exponent is P from a on, but as printed falls without end
-            ball = radius if "sii_widening" in settings.pairs.as_published else min(widening, radius)
-            bodies.append(position[:, k] + ball * vertices)
-        found[k] = np.any([met(frame, body, faces) for body in bodies], axis=0)
+        radius = math.sqrt(squares[k])
+        ball = (radius if printed else min(widening, radius)) if widening else 0.0
+        count = settings.reach.bound.faces
+        found[k] = np.any([met(frame, body, np.arange(3 * count).reshape(-1, 3)) for body in bodies(
+            position[:, k], axis[:, k], float(exponents[k]), radius, ball, count)], axis=0)
     return found
+
+
+def bodies(position, axis, exponent, radius, ball, count):
+    """Return the meshes of a light's ellipsoid and of its ball, if any, as corners of triangles (3 count, 3), m."""
+    vertices = sphere_mesh(count)
+    center, half_width, height = (part[0] for part in ellipsoids(np.array([exponent]))[:3])
+    along = np.outer(vertices @ axis, axis)
+    solid = position + radius * (center * axis + half_width * along + height * (vertices - along))
+    return [solid, position + ball * vertices] if ball else [solid]
 
 
 def met(frame, vertices, faces):
@@ -40,10 +46,11 @@ def met(frame, vertices, faces):
 
 
 def sphere_mesh(count):
-    """Return the octahedron of 8 faces or the icosahedron of 20, each cut in four until there are enough."""
+    """Return corners (3 count, 3) of the octahedron of 8 faces or the icosahedron of 20, each cut in four until enough.
+    """
     if count == 8:
         corners = np.concatenate([np.eye(3), -np.eye(3)])
-        return corners, np.array([(a, b, c) for a in (0, 3) for b in (1, 4) for c in (2, 5)])
+        return corners[[(a, b, c) for a in (0, 3) for b in (1, 4) for c in (2, 5)]].reshape(-1, 3)
     golden = (1 + math.sqrt(5)) / 2
     corners = [np.roll((0, s, t * golden), turn) for turn in range(3) for s in (-1, 1) for t in (-1, 1)]
     triangles = [(p, q, r) for i, p in enumerate(corners) for j, q in enumerate(corners[:i]) for r in corners[:j]
@@ -51,7 +58,7 @@ def sphere_mesh(count):
     triangles = [tuple(unit(corner) for corner in triangle) for triangle in triangles]
     while len(triangles) < count:
         triangles = [four for triangle in triangles for four in cut_in_four(*triangle)]
-    return np.array(triangles).reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
+    return np.array(triangles).reshape(-1, 3)
 
 
 def cut_in_four(p, q, r):

@@ -200,9 +200,13 @@ def times(light, factor):
 
 def open_shares(position, normal, index, frame, settings):
     """Return O of points (n, 3), by rays of a tenth of what the lamps light unless a length is set."""
-    how = settings.openness
+    return open_shares_of(position, normal, index, frame, settings.openness, settings.seed)
+
+
+def open_shares_of(position, normal, index, frame, how, seed):
+    """Return O of points (n, 3) by a radius, a number of rays and a seed."""
     return openness(frame.scene.geometry, position, normal, index, how.radius or illuminated_diagonal(frame) / 10,
-                    how.rays, settings.seed)
+                    how.rays, seed)
 
 
 def illuminated_diagonal(frame):

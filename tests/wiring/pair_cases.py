@@ -1,4 +1,4 @@
-"""Cases of `PairSettings`, for every method that has them: `under("pairs", PAIR_CASES)`."""
+"""Cases of `PairSettings`, for every method that has them: `under("pairs", PAIR_CASES)`; and of ambient occlusion."""
 
 from tests.wiring.cases import Case
 
@@ -17,4 +17,10 @@ PAIR_CASES = {
     "diffuse flux as peak intensity": Case({"as_published": {"sii_no_pi"}}),
     "widening as printed": Case({"as_published": {"sii_widening"}}, over={"lobe.widening": 1.2}),
     "widening without a norm": Case({"as_published": {"sii_widening_unnorm"}}, over={"lobe.widening": 1.2}),
+}
+OCCLUSION_CASES = {
+    "ambient occlusion": Case({"ambient_occlusion": "openness"}),
+    "ambient occlusion by long rays": Case({"ambient_occlusion.radius": 1.0}, {"ambient_occlusion": "openness"}),
+    "ambient occlusion by few rays": Case({"ambient_occlusion.rays": 5},
+                                          {"ambient_occlusion": "openness", "lights.seed": 3}),
 }

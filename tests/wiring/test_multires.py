@@ -19,11 +19,11 @@ from refgi.splat.multires import ByGeometry
 from refgi.stages import observe
 from tests.literal.whole import multires as literal
 from tests.literal.whole import val as clustered
-from tests.literal.whole.pairs import with_clamp
+from tests.literal.whole.pairs import occluded_of, with_clamp
 from tests.naive.shares import nearest_grid, shares_of
 from tests.wiring.cases import Case, needed, uncovered, under
 from tests.wiring.fold import fold
-from tests.wiring.pair_cases import PAIR_CASES
+from tests.wiring.pair_cases import OCCLUSION_CASES, PAIR_CASES
 from tests.wiring.shadow_cases import shadow_cases
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
@@ -119,7 +119,7 @@ CASES = {
     "auto of roulette": Case({"lights.openness.flux": "roulette", "lights.openness.radius": 2.0}),
     "clusters": Case({"lightcuts": "bounded", "lightcuts.error": 1e-6}, same=STRICT),
     "no clusters": Case({"lightcuts": None}, same="few lights are summed in full in any case"),
-    **under("pairs", PAIR_CASES),
+    **under("pairs", PAIR_CASES), **OCCLUSION_CASES,
 }
 # pictures of so many pixels that not all are samples of the error
 WIDE = {"width": 112, "height": 84}
@@ -202,7 +202,8 @@ def by_literal_text(case, settings):
     frame, large = frame_of(case), frame_of(case, 2 if settings.supersampled else 1)
     light_at = under_shadows(frame, settings) if visibility_of(settings) == "val" else light_of(frame, settings)
     light = literal.picture(large.gbuffer, frame.scene.camera.eye, light_at, settings)
-    return halved(light, large.gbuffer.triangle_id, frame.gbuffer.covered) if settings.supersampled else light
+    light = halved(light, large.gbuffer.triangle_id, frame.gbuffer.covered) if settings.supersampled else light
+    return occluded_of(frame, settings, light)
 
 
 def light_of(frame, settings):

@@ -16,7 +16,7 @@ from tests.literal.whole.pairs import with_clamp
 from tests.naive import ledger
 from tests.wiring.cases import Case, needed, uncovered, under
 from tests.wiring.fold import fold
-from tests.wiring.pair_cases import PAIR_CASES
+from tests.wiring.pair_cases import OCCLUSION_CASES, PAIR_CASES
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
@@ -82,7 +82,7 @@ MESH_CASES = {
     **{f"a mesh of {faces}": Case({"reach.bound.faces": faces}, over=RIM, frame=FINE)
        for faces in (8, 20, 320, 1280)},
 }
-CASES = under("pairs", PAIR_CASES) | REACH_CASES | CUT_CASES | BOUND_CASES | MESH_CASES
+CASES = under("pairs", PAIR_CASES) | OCCLUSION_CASES | REACH_CASES | CUT_CASES | BOUND_CASES | MESH_CASES
 
 
 def known(settings):
@@ -93,7 +93,8 @@ def known(settings):
 
 FOLDED = fold(SiiSettings, CASES, BASE, fits=known)
 COUNTED = {name: case for name, case in FOLDED.items() if "reach.cut" in {**case.over, **case.values}}
-ACCOUNTS = ("a share, clamped", "a random share", "half the resolution, cut", "a mesh within its ellipsoid")
+ACCOUNTS = ("a share, clamped", "a random share", "half the resolution, cut", "a mesh within its ellipsoid",
+            "ambient occlusion by long rays")
 
 
 def pixel_lights(frame, settings):
@@ -212,13 +213,16 @@ def test_the_ledger_is_that_of_the_literal_text(name):
     def flux(changes):
         return (literal.sii(frame, replaced(settings, changes), *lights) * areas).sum(axis=(1, 2))
 
-    sharp = {"half_resolution": False}
-    arrived, at_each_pixel, uncut, full = map(flux, (
-        {}, sharp, sharp | {"reach.cut": "none"}, sharp | {"reach.cut": "none", "pairs.clamp": "none"}))
+    bare = {"ambient_occlusion": "none"}
+    sharp = bare | {"half_resolution": False}
+    arrived, seen, at_each_pixel, uncut, full = map(flux, (
+        {}, bare, sharp, sharp | {"reach.cut": "none"}, sharp | {"reach.cut": "none", "pairs.clamp": "none"}))
     account = sii_ledger(frame, settings)
-    for line, expected in (("arrived", arrived), ("interpolated", at_each_pixel - arrived),
+    for line, expected in (("arrived", arrived), ("interpolated", at_each_pixel - seen),
                            ("cut", uncut - at_each_pixel), ("clamped", full - uncut)):
         np.testing.assert_allclose(getattr(account, line), expected, rtol=0, atol=ROUNDING * full.max(), err_msg=line)
+    shadowed = np.zeros(3) if account.shadowed is None else account.shadowed
+    np.testing.assert_allclose(shadowed, seen - arrived, rtol=0, atol=ROUNDING * full.max())
 
 
 def areas_of(frame):

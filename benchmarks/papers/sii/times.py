@@ -40,8 +40,8 @@ def moving_and_resting(bench: Workbench, scene: str, printed: dict[str, float]) 
                         "nothing") for title, ms in taken.items()])],
         notes=(
             f"A resting camera saves {both - light:.0f} of {both:.0f} ms here and costs 0.4 of 10.4 ms in the paper, "
-            "whose splats are discarded by a depth buffer that only a moving camera redraws. These bounds know no "
-            "depth buffer, so only the buffers that are kept count.",
+            "whose splats are discarded by a depth buffer that only a moving camera redraws. Here tiles find the "
+            "depth in the positions that light receives at, so only the buffers that are kept count.",
             f"A resting light saves {both - camera:.0f} ms (paper: 1.1 of 10.4): shadow map and warp. Drawing the "
             f"splats takes {static / both:.0%} of a frame, in the paper {share:.0%}. Where nothing moves refgi keeps "
             f"the splats too: {still:.1f} ms."))

@@ -162,6 +162,10 @@ class GBuffer:
         visibility = self.visibility._replace(triangle_id=channels["triangle_id"])
         return GBuffer(self._geometry, self._materials, self.projection, visibility, dtype, known)
 
+    def of_materials(self, materials: MaterialTable) -> "GBuffer":
+        """Return the buffer of the same view with other materials."""
+        return GBuffer(self._geometry, materials, self.projection, self.visibility, self.dtype)
+
     def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
         """Return channels at some texels alone, (n,) or (3, n), with the bits that `resolve` gives.
 

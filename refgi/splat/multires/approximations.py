@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Any
 from refgi.cluster.settings import ClusteredShadows
 from refgi.ledger import Ledger, account
 from refgi.lights.selection import choose_lights
-from refgi.lights.settings import CLAMP, LIGHT_SAMPLING, OPENNESS, RSM_RESOLUTION, VISIBILITY, without_clamp
+from refgi.lights.settings import (
+    AMBIENT_OCCLUSION,
+    CLAMP,
+    LIGHT_SAMPLING,
+    OPENNESS,
+    RSM_RESOLUTION,
+    VISIBILITY,
+    without_clamp,
+)
 from refgi.method import Approximation
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
@@ -59,7 +67,7 @@ APPROXIMATIONS = (
                         off=_by_rays, limit=_ignores_visibility),
     RSM_RESOLUTION,
     LIGHT_SAMPLING._replace(from_truth=lambda settings: settings.visibility is not None),
-    OPENNESS, CLAMP._replace(off=_unclamped),
+    OPENNESS, CLAMP._replace(off=_unclamped), AMBIENT_OCCLUSION,
     Approximation("subsplats", "cells of many pixels are evaluated at one and upsampled", _every_pixel),
     Approximation("lightcuts", "clusters stand for their lights where the sum's error is bounded", _every_pair),
     Approximation("detail", "surfaces that turn away from the camera are darkened (Eq. 3)", _undarkened),
@@ -87,8 +95,12 @@ def multires_ledger(frame: "Frame", settings: MultiresSettings) -> Ledger:
     if settings.visibility is not None:
         finest = ByGeometry(coarsest=MOST_CELLS, visibility=settings.visibility)
         every = multires(frame, MultiresSettings(settings.lights, settings.pairs, finest))
-    picture = plain = multires(frame, settings)
+    picture = plain = unoccluded = multires(frame, settings)
+    if settings.ambient_occlusion is not None:
+        settings = dataclasses.replace(settings, ambient_occlusion=None)
+        plain = unoccluded = multires(frame, settings)
     if settings.detail > 0:
         plain = multires(frame, dataclasses.replace(settings, detail=0.0))
     return account(frame, settings.lights, pairs, footprint, picture,
-                   {"shadowed": unblocked - every, "interpolated": every - plain, "darkened": plain - picture})
+                   {"shadowed": unblocked - every + unoccluded - picture, "interpolated": every - plain,
+                    "darkened": plain - unoccluded})

@@ -6,6 +6,7 @@ import numpy as np
 
 from refgi.cluster.val import extra_bytes as bytes_of_shadows
 from refgi.jit import most_threads
+from refgi.lights.ambient_occlusion import occluded
 from refgi.lights.footprints import demo_footprints
 from refgi.lights.selection import choose_lights, drawn_from_maps, footprints, light_maps
 from refgi.lights.settings import MapLights, most_lights
@@ -54,10 +55,11 @@ def multires(frame: "Frame", settings: MultiresSettings) -> Array:
     """
     lights = choose_lights(frame, settings.lights)  # Sec. 3.1
     footprint = light_areas(frame, lights, settings)
-    if not settings.supersampled:
-        return _irradiance(frame, frame.gbuffer, lights, footprint, settings)
-    double = doubled(frame)  # Sec. 4: rendered at 2048^2 for 1024^2
-    return halved(_irradiance(frame, double, lights, footprint, settings), double.covered, frame.gbuffer.covered)
+    buffer = doubled(frame) if settings.supersampled else frame.gbuffer  # Sec. 4: rendered at 2048^2 for 1024^2
+    irradiance = _irradiance(frame, buffer, lights, footprint, settings)
+    if settings.supersampled:
+        irradiance = halved(irradiance, buffer.covered, frame.gbuffer.covered)
+    return occluded(frame, irradiance, settings.ambient_occlusion, settings.lights.seed)
 
 
 def _irradiance(

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 
 from refgi.cluster.settings import ClusteredShadows, ValSettings
 from refgi.errors import expect
-from refgi.lights.settings import LightSettings, MapLights, clamped_pairs, expect_footprints
+from refgi.lights.settings import OCCLUSION, LightSettings, MapLights, Openness, clamped_pairs, expect_footprints
 from refgi.pairs.settings import AutoClamp, AutoLightcuts, DiscClamp, Lightcuts, PairSettings, SphereClamp
 from refgi.scene.values import BRIGHTEST
 from refgi.settings import Settings, of, setting
@@ -201,6 +201,7 @@ class MultiresSettings(Settings):
     as_published: frozenset[str] = setting(frozenset(), "forms of the method to use as printed", study=True)
     lightcuts: AutoLightcuts | Lightcuts | None = setting(
         AutoLightcuts(), "diffuse lights are summed by clusters, to an error; auto: with subsplats 'error' and many")
+    ambient_occlusion: Openness | None = setting(None, OCCLUSION)
 
     def check(self) -> None:
         """Check what lights, pairs and subsplats ask of each other."""
@@ -212,6 +213,8 @@ class MultiresSettings(Settings):
             expect(self.pairs == bare, "pairs", "defaults with visibility 'rays'", self.pairs)
             expect(clamp is None, "pairs.clamp", "none with visibility 'rays'", chosen)
         _ = self.shadows  # refuses what shadows cannot be made of
+        expect(self.ambient_occlusion is None or self.visibility is None, "ambient_occlusion", "none with visibility",
+               self.ambient_occlusion and self.ambient_occlusion.name())
         by_error = isinstance(self.subsplats, ByError)
         if isinstance(self.lightcuts, Lightcuts):
             expect(not isinstance(clamp, SphereClamp), "pairs.clamp",
@@ -237,7 +240,7 @@ class MultiresSettings(Settings):
     @property
     def traces_rays(self) -> bool:
         """Whether the method traces rays."""
-        return (self.lights.traces_rays or self.shadow_rays is not None
+        return (self.lights.traces_rays or self.shadow_rays is not None or self.ambient_occlusion is not None
                 or (self.shadows is not None and self.shadows.traces_rays))
 
     @property

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 from refgi.ledger import Ledger, account
 from refgi.lights.selection import choose_lights, footprints
-from refgi.lights.settings import CLAMP, LIGHT_SAMPLING, OPENNESS, RSM_RESOLUTION, VISIBILITY, every_light, with_clamp
+from refgi.lights.settings import (
+    AMBIENT_OCCLUSION,
+    CLAMP,
+    LIGHT_SAMPLING,
+    OPENNESS,
+    RSM_RESOLUTION,
+    VISIBILITY,
+    every_light,
+    with_clamp,
+)
 from refgi.method import Approximation
 from refgi.pairs.irradiance import Receivers
 from refgi.settings import replaced
@@ -38,7 +47,7 @@ def _every_pair(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
 
 
 APPROXIMATIONS = (
-    VISIBILITY, RSM_RESOLUTION, LIGHT_SAMPLING._replace(off=_sampled), OPENNESS, CLAMP,
+    VISIBILITY, RSM_RESOLUTION, LIGHT_SAMPLING._replace(off=_sampled), OPENNESS, CLAMP, AMBIENT_OCCLUSION,
     Approximation("cut", "pairs whose irradiance is below a threshold are left out", _uncut),
     Approximation("lightcuts", "clusters stand for their lights where the sum's error is bounded", _every_pair),
     Approximation("upsampling", "one pixel of 2 x 2 is evaluated, the others are upsampled", _full_resolution))
@@ -55,12 +64,16 @@ def sii_ledger(frame: "Frame", settings: SiiSettings) -> Ledger:
     Lights are summed in full, without lightcuts.
     On the Cornell box at 512 x 512 it takes six times as long as the picture.
     """
-    settings = dataclasses.replace(with_clamp(settings), lightcuts=None)
+    given = dataclasses.replace(with_clamp(settings), lightcuts=None)
+    settings = dataclasses.replace(given, ambient_occlusion=None)
     footprint = footprints(frame, settings.lights, settings.pairs)
     picture = sii(frame, settings)
     between = sii(frame, replaced(settings, {"half_resolution": False})) - picture if settings.half_resolution else None
-    return account(frame, settings.lights, settings.pairs, footprint, picture,
-                   {"cut": _cut(frame, settings, footprint), "interpolated": between})
+    losses = {"cut": _cut(frame, settings, footprint), "interpolated": between}
+    if given.ambient_occlusion is not None:
+        kept = sii(frame, given)
+        losses["shadowed"], picture = picture - kept, kept
+    return account(frame, settings.lights, settings.pairs, footprint, picture, losses)
 
 
 def _cut(frame: "Frame", settings: SiiSettings, footprint: Array | None) -> Array | None:

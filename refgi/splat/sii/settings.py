@@ -8,7 +8,15 @@ from typing import ClassVar, Literal
 
 from refgi.errors import expect
 from refgi.jit import most_threads
-from refgi.lights.settings import LightSettings, MapLights, clamped_pairs, expect_footprints, most_lights
+from refgi.lights.settings import (
+    OCCLUSION,
+    LightSettings,
+    MapLights,
+    Openness,
+    clamped_pairs,
+    expect_footprints,
+    most_lights,
+)
 from refgi.method import Extent
 from refgi.pairs.lightcuts.tree import tree_bytes
 from refgi.pairs.settings import LAST_SEED, Lightcuts, PairSettings, SphereClamp
@@ -114,6 +122,7 @@ class SiiSettings(Settings):
     reach: ReachSettings = setting(ReachSettings(), "how far a light reaches")
     half_resolution: bool = setting(False, "evaluate one pixel of 2 x 2 and upsample by a joint bilateral filter")
     lightcuts: Lightcuts | None = setting(None, "diffuse lights are summed by clusters, to an error")
+    ambient_occlusion: Openness | None = setting(None, OCCLUSION)
 
     def check(self) -> None:
         """Check what fields ask of each other."""
@@ -128,7 +137,7 @@ class SiiSettings(Settings):
     @property
     def traces_rays(self) -> bool:
         """Whether the method traces rays."""
-        return self.lights.traces_rays
+        return self.lights.traces_rays or self.ambient_occlusion is not None
 
     @property
     def effective_pairs(self) -> PairSettings:

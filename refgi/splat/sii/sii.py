@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from refgi.lights.ambient_occlusion import occluded
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import with_clamp
 from refgi.pairs.estimates import report_sampling, thinned, warn_of_clamp
@@ -44,7 +45,7 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     Returns
     -------
     (3, h, w) ndarray
-        Indirect irradiance, W/m^2, linear RGB, without visibility.
+        Indirect irradiance, W/m^2, linear RGB, without visibility but for ambient occlusion where it is asked for.
     """
     settings = with_clamp(settings)
     lights = choose_lights(frame, settings.lights)  # Sec. 3.1, 3.5 to 3.7
@@ -62,7 +63,7 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     warn_of_cut(light, receivers, lights, resolved, footprint)
     report_sampling(frame, receivers, lights, settings.pairs, footprint, "sii",
                     all_summed=settings.lightcuts is None)
-    return light
+    return occluded(frame, light, settings.ambient_occlusion, settings.lights.seed)
 
 
 def splat(

@@ -39,7 +39,7 @@ def pyramid(frame: "Frame", settings: HssilSettings) -> list[Level]:
     """
     buffer = frame.gbuffer
     # positions, which direct light needs, come from the same pass
-    depth, normal, albedo, _ = buffer.resolve("depth", "normal", "albedo", "position")
+    depth, normal, _, _ = buffer.resolve("depth", "normal", "albedo", "position")
     sampling = settings.sampling
     count = useful_levels((frame.height, frame.width), sampling)
     if not left_out("sssil.levels", lambda: (sampling.levels - count, sampling.levels)):
@@ -47,7 +47,7 @@ def pyramid(frame: "Frame", settings: HssilSettings) -> list[Level]:
     if count < sampling.levels:
         skip("sssil.level", f"no texel of level {sampling.first_level + count} has another in its crown")
     downsample = settings.senders.downsample
-    return list(levels(depth, normal, albedo, frame.direct, buffer.projection, sampling.first_level, count,
+    return list(levels(depth, normal, frame.sent_albedo, frame.direct, buffer.projection, sampling.first_level, count,
                        "closest" if downsample == "resampled" else downsample, settings.as_published & {"hss_tan_f"}))
 
 
@@ -57,8 +57,8 @@ def sender_pyramid(frame: "Frame", receivers: list[Level], settings: HssilSettin
         skip("sssil.senders", "receivers are the senders")
         return receivers
     buffer = frame.gbuffer
-    depth, normal, albedo = buffer.resolve("depth", "normal", "albedo")
-    return list(drawn_senders(depth, normal, albedo, frame.direct, buffer.projection, tuple(receivers),
+    depth, normal = buffer.resolve("depth", "normal")
+    return list(drawn_senders(depth, normal, frame.sent_albedo, frame.direct, buffer.projection, tuple(receivers),
                               settings.sampling.seed, settings.as_published & {"hss_tan_f"}))
 
 

@@ -19,7 +19,7 @@ from refgi.jit import kernel, prange
 from refgi.scene.model import Geometry
 from refgi.sssil.reprojection import SourceView, reproject
 from refgi.sssil.settings import TemporalSettings
-from refgi.sssil.temporal.motion import fetch_entering, previous_points
+from refgi.sssil.temporal.motion import as_solids, fetch_entering, previous_points
 from refgi.stages import skip, stage
 from refgi.types import Array
 
@@ -160,8 +160,7 @@ def temporal_filter(
         skip("sssil.motion", "the same geometry")
     else:
         expect_same_triangles(geometry, history.geometry)
-        before = relative_to(history.geometry, frame.origin)
-        position, normal, speed = previous_points(buffer, frame.scene.geometry, before)
+        position, normal, speed = previous_points(buffer, frame.scene.geometry, earlier_geometry(frame, history))
     earlier = history.light if settings.counts_frames else history.light[:3]
     reprojected, weight = reproject(earlier, history.view, position, normal, buffer.covered,
                                     origin=frame.origin, depth_tolerance=settings.depth_tolerance,
@@ -204,11 +203,16 @@ def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
            "vertex normals in all or in none", "some with and some without")
 
 
-def relative_to(geometry: Geometry, origin: tuple[float, float, float]) -> Geometry:
-    """Return the geometry relative to a frame's origin."""
-    if not any(origin):
-        return geometry
-    return dataclasses.replace(geometry, vertices=np.asarray(geometry.vertices, np.float64) - origin)
+def earlier_geometry(frame: "Frame", history: History) -> Geometry:
+    """Return the triangles of the frame before relative to a frame's origin, solid objects in the pose of this frame.
+
+    By HSS Sec. 4 "supposing that their pose hasn't changed": the rigid motion that fits an object's vertices best.
+    """
+    before, now = history.geometry, frame.scene.geometry
+    if any(frame.origin):
+        before = dataclasses.replace(before, vertices=np.asarray(before.vertices, np.float64) - frame.origin)
+    solids = np.array([one.solid for one in frame.scene.materials])[now.material_of_face]
+    return before if not solids.any() else as_solids(now, before, solids)
 
 
 @kernel(parallel=True)

@@ -8,6 +8,7 @@ depending on the camera speed, to smoothly blend illumination values." The light
 not name, is that of the texel at the edge of the earlier picture nearest to where their point would have been in it.
 """
 
+import dataclasses
 import math
 from typing import Any, NamedTuple
 
@@ -24,6 +25,27 @@ from refgi.scene.values import Vector
 from refgi.sssil.reprojection import SourceView, pixel_transform
 from refgi.stages import stage
 from refgi.types import Array
+
+
+def as_solids(geometry: Geometry, before: Geometry, solids: Array) -> Geometry:
+    """Return earlier triangles with those of each solid, a number (m,) of each face from 1, as a rigid body.
+
+    Their vertices now, turned and moved to fit where they were with the least sum of squares (Kabsch 1976).
+    """
+    vertices, normals = np.array(before.vertices, np.float64), before.vertex_normals
+    normals = None if normals is None else np.array(normals, np.float64)
+    for solid in np.unique(solids[solids > 0]):
+        used = np.unique(geometry.faces[solids == solid])
+        now, then = geometry.vertices[used], before.vertices[used]
+        if np.array_equal(now, then):
+            continue  # at rest, to the bit
+        middle, place = now.mean(axis=0), then.mean(axis=0)
+        left, _, right = np.linalg.svd((now - middle).T @ (then - place))
+        left[:, 2] *= np.sign(np.linalg.det(left @ right))  # no mirror
+        vertices[used] = (now - middle) @ (left @ right) + place
+        if normals is not None and geometry.vertex_normals is not None:
+            normals[used] = geometry.vertex_normals[used] @ (left @ right)
+    return dataclasses.replace(before, vertices=vertices, vertex_normals=normals)
 
 
 class PreviousPoints(NamedTuple):

@@ -8,7 +8,7 @@ from refgi.rsm.raster.projection import Projection
 from refgi.scene.model import Geometry
 from refgi.sssil.reprojection import SourceView, fetched
 from refgi.sssil.settings import Fetch, TemporalSettings
-from refgi.sssil.temporal.filter import History, clamp_to_neighbourhood, relative_to
+from refgi.sssil.temporal.filter import History, clamp_to_neighbourhood, earlier_geometry
 from refgi.sssil.temporal.filter import blend as blended
 from refgi.sssil.temporal.motion import fetch_entering, previous_points
 from refgi.stages import stage
@@ -116,8 +116,7 @@ def temporal_steps(
     position, normal = buffer.resolve("position", "normal")
     view, speed, share = _seen_from(history.view, frame.origin), None, None
     if geometry is not history.geometry:
-        position, normal, speed = previous_points(buffer, frame.scene.geometry,
-                                                  relative_to(history.geometry, frame.origin))
+        position, normal, speed = previous_points(buffer, frame.scene.geometry, earlier_geometry(frame, history))
     old, count = history.light[:3], history.light[3] if settings.counts_frames else None
     light, weight, frames = reprojection(position, normal, ids, view, history.view.depth, history.view.normal, old,
                                          settings.depth_tolerance, settings.normal_cosine, settings.fetch, count)

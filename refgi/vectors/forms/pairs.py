@@ -2,7 +2,7 @@
 
 from refgi.literal import pairs
 from refgi.pairs.settings import PairSettings
-from refgi.vectors.forms.beside import Arguments, Described, form_of, ids, own
+from refgi.vectors.forms.beside import Arguments, Described, alone, form_of, ids, own
 from refgi.vectors.rows import Form
 
 EQ2 = "SII Eq. 2 and 3; unit directions and r^2 (E-SII-02)"
@@ -56,4 +56,4 @@ def pair_lists(entry: str, glossy: bool, disc: bool, count: int) -> tuple[str, .
             f"{entry}/{kind}", *(("pair/several",) if count > 1 else ()))
 
 
-FORMS = {"pairs.sum": pair_sum, "pairs.pairs": single_pairs}
+FORMS = {"pairs.sum": pair_sum, "pairs.pairs": single_pairs, "lights.occlude": alone(pairs.occluded)}

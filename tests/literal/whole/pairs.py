@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
-from refgi.literal.pairs import lobe_norm, pair
+from refgi.literal.pairs import lobe_norm, occluded, pair
 from refgi.settings import replaced
+from tests.naive.lights import open_shares_of
 from tests.naive.sphere import spherical_pair
 
 
@@ -78,6 +79,17 @@ def irradiance_of(x, normal, lights, pairs, areas=None, *, facing=False):
         axis = axis[..., None] if axis.ndim == 2 else axis
         parts.append(pair(*light, 0 * flux[..., None], (glossy, axis, exponent), area(arriving)))
     return parts
+
+
+def occluded_of(frame, settings, light):
+    """Return a picture's light (3, h, w), under ambient occlusion where the settings of its method have it."""
+    how, buffer = settings.ambient_occlusion, frame.gbuffer
+    if how is None:
+        return light
+    share, shown = np.ones(buffer.covered.shape), buffer.covered
+    share[shown] = open_shares_of(buffer.position[:, shown].T, buffer.normal[:, shown].T, np.flatnonzero(shown), frame,
+                                  how, settings.lights.seed)
+    return occluded(light, share)
 
 
 def contributions(position, normal, lights, pairs, areas=None):

@@ -8,7 +8,7 @@ import numpy as np
 from refgi.literal import sii as literal
 from refgi.literal.upsampling import joint_bilateral
 from refgi.settings import replaced
-from tests.literal.whole.pairs import irradiance_of, sent
+from tests.literal.whole.pairs import irradiance_of, occluded_of, sent
 from tests.naive.bound_mesh import drawn
 from tests.naive.draws import draw
 
@@ -17,7 +17,7 @@ STREAMS = 3, 3 + 256  # of the random shares of both parts
 
 def sii(frame, settings, lights, footprint=None):
     """Return the irradiance (3, h, w) of a frame by its pixel lights; `footprint` is the area (N,) of each."""
-    return picture(frame, settings, lights, footprint, lambda weight: weight)
+    return occluded_of(frame, settings, picture(frame, settings, lights, footprint, lambda weight: weight))
 
 
 def cut_irradiance(frame, settings, lights, footprint=None):
@@ -70,7 +70,8 @@ def weights(frame, settings, lights):
         least = (xi * low)[:, None]
         inside = literal.kept([least], b)
         weight = np.where(inside, np.maximum(1, low[:, None] / np.where(inside, np.maximum(b, least), 1)), 0.0)
-        if reach.bound.name() == "mesh" and not reach.bound.inflate:
+        spherical = settings.pairs.clamp is not None and settings.pairs.clamp.name() == "sphere"  # tested everywhere
+        if reach.bound.name() == "mesh" and not reach.bound.inflate and not spherical:
             weight *= drawn(frame, settings, lights, part, peak / np.maximum(xi * low, 1e-300))
         found.append(weight)
     return found

@@ -309,4 +309,4 @@ def test_printed_values_are_a_preset():
 def test_the_page_shows_few_keys():
     shown = {leaf.key for leaf in leaves(MultiresSettings) if not leaf.is_for_study}
     own = [key for key in shown if not key.startswith(("lights.", "pairs.", "subsplats.visibility."))]  # or of val
-    assert len(own) == 11
+    assert len(own) == 12

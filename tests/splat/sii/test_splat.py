@@ -1,5 +1,6 @@
 """The cut sum: literal twin, same bits for every bound, what it loses, its random range, its counts."""
 
+import dataclasses
 import math
 
 import numba
@@ -12,7 +13,7 @@ from refgi.jit import threads
 from refgi.lights import choose_pixel_lights
 from refgi.lights.selection import choose_lights
 from refgi.pairs.ranged_sum import LANES, range_factor
-from refgi.scene import Material, load_scene
+from refgi.scene import Geometry, Material, load_scene, merge
 from refgi.settings import of, replaced
 from refgi.splat import PairSettings, Receivers, irradiance
 from refgi.splat.sii.reach.bounds import covered_pixels, light_solids, screen_quads
@@ -24,6 +25,7 @@ from tests import lamps
 from tests.naive import bounds as naive
 from tests.naive.radiometry import lobe_fraction
 from tests.pairs import sets
+from tests.truth.scenes import rectangle
 
 CUT = of(SiiSettings, cut_irradiance=0.05)
 BOUNDS = ("full", "quad", "ellipsoid", "tangent", "mesh")
@@ -140,6 +142,62 @@ def test_fewer_pixels_are_drawn_by_tighter_bounds(corner, evidence):
     assert everything > quads > meshes > needed
     evidence(f"drawn for each fragment that counts: full {everything / needed:.1f}, quad {quads / needed:.1f}, "
              f"ellipsoid {meshes / needed:.1f}")
+
+
+@pytest.mark.feature("SII-30")
+def test_fragments_off_the_surface_seen_are_not_shaded(evidence):
+    """Fragments of meshes with and without early depth, in the open and behind slats: the same bits, less to shade."""
+    room, left, evaluated = load_scene("cornell_box"), {}, {}
+    lights = choose_pixel_lights(Frame(room, rsm_resolution=64).rsms, count=96, pattern="halton")
+    settings = of(SiiSettings, cut_irradiance=low_irradiance(lights, of(SiiSettings, cut_share=0.05,
+                                                                        reference_length=0.15)))
+    square = lights.flux.max(axis=0) / math.pi / settings.reach.cut.irradiance
+    solids = light_solids(lights.position, lights.normal, np.ones(len(square)), square, "ellipsoid")
+    for name, scene in {"in the open": room, "among occluders": behind_slats(room)}.items():
+        buffer = Frame(scene, width=80, height=64).gbuffer
+        receivers, view = Receivers(*buffer.resolve("position", "normal", "covered")), buffer.projection
+        shaded = [sum(covered_pixels(view, solids, k, 80, True, seen)[buffer.covered].sum()
+                      for k in range(len(square))) for seen in (None, buffer.visibility.inverse_depth)]
+        left[name] = shaded[1] / shaded[0]
+        expected = splat(receivers, lights, replaced(settings, {"bound": "full"}), None, view)
+        for bound in ("mesh", "quad"):
+            how = replaced(settings, {"bound": bound})
+            np.testing.assert_array_equal(splat(receivers, lights, how, None, view), expected)
+            evaluated[name, bound] = fragments(receivers, lights, how, None, view).evaluated
+        assert evaluated[name, "mesh"] < evaluated[name, "quad"]
+        assert shaded[1] >= fragments(receivers, lights, settings).total
+    assert left["among occluders"] < 0.5 * left["in the open"] < 0.5
+    evidence("fragments left by early depth: " + ", ".join(f"{name} {share:.0%}" for name, share in left.items())
+             + "; pairs evaluated over those of quads, which know no depth: "
+             + ", ".join(f"{evaluated[name, 'mesh'] / evaluated[name, 'quad']:.2f}" for name in left))
+
+
+@pytest.mark.feature("SII-30")
+def test_a_bound_before_the_surface_seen_lists_no_tile():
+    """A light whose range ends before all surfaces: its quad lists tiles, its mesh none."""
+    buffer = Frame(load_scene("cornell_box"), width=80, height=64).gbuffer
+    receivers = Receivers(*buffer.resolve("position", "normal", "covered"))
+    place, ahead, flux = (np.array(part, np.float32)[:, None] for part in ((0.278, 0.44, 0.3), (0, 0, 1), (1, 1, 1)))
+    lights = sets.PixelLights(place, ahead, flux, None, None, None, 1)
+    how = of(SiiSettings, cut_irradiance=1 / math.pi / 0.05**2)  # R_0 = 5 cm
+    evaluated = {bound: fragments(receivers, lights, replaced(how, {"bound": bound}), None, buffer.projection).evaluated
+                 for bound in ("quad", "mesh")}
+    assert evaluated["quad"] > evaluated["mesh"] == 0
+
+
+def behind_slats(scene, distance=0.1, count=9):
+    """The scene seen between upright slats that hide two thirds of the picture."""
+    eye, up = np.array(scene.camera.eye), np.array(scene.camera.up)
+    ahead = sets.unit(np.subtract(scene.camera.target, eye)[:, None])[:, 0]
+    half = 1.5 * distance * math.tan(scene.camera.vfov / 2)
+    right, step = np.cross(ahead, up), 2 * half / count
+    slats = [rectangle(eye + distance * ahead + (k * step - half) * right - half * up, 2 / 3 * step * right,
+                       2 * half * up) for k in range(count)]
+    extra, _ = merge(slats)
+    old = scene.geometry
+    return dataclasses.replace(scene, geometry=Geometry(
+        np.concatenate([old.vertices, extra.vertices]), np.concatenate([old.faces, extra.faces + len(old.vertices)]),
+        np.concatenate([old.material_of_face, extra.material_of_face])))
 
 
 def test_meshes_that_are_not_inflated_lose_pixels(corner):

@@ -10,7 +10,8 @@ around the light: the tangents from the eye, horizontally and vertically.
 To find the pixels a light may reach, graphics hardware draws a coarse sphere, scaled and turned into each light's
 ellipsoid (SII Sec. 3.4 and 4; E-SII-14 i). The sphere's vertices lie on the unit ball and its faces within it, so as
 published it misses pixels; scaled by one over the distance of its nearest face it encloses the ball. A pixel comes into
-question where the drawing covers its centre.
+question where the drawing covers its centre, and an early depth test (Sec. 3.4) leaves it there only where the surface
+seen lies neither before nor behind the solid.
 """
 
 import math
@@ -111,6 +112,7 @@ def light_solids(
 
 
 SLACK = 0.01  # pixels that a receiver may be away from its pixel's centre
+DEPTH_SLACK = 1e-5  # of the depth: of the mesh it is float32, of receivers their rounding
 ROUNDING = 1e-4  # of the axes, that receivers may be off: where a face touches the ball nothing else is to spare
 
 
@@ -170,6 +172,13 @@ def tiles_of_pixels(mask: Array, places: Array) -> Array:
     return tiles
 
 
+def inverse_depths(projection: "Projection", position: Array, places: Array) -> Array:
+    """Return 1 / depth (h, w), 1/m, of receivers (3, n) at pixels of flat indices (n,); 0 at others."""
+    inverse_depth = np.zeros(projection.shape)
+    inverse_depth.reshape(-1)[places] = 1 / (projection.frame[0, 2] @ (position - projection.origin[0][:, None]))
+    return inverse_depth
+
+
 @cache
 def sphere_mesh(faces: int) -> tuple[Array, Array]:
     """Return a mesh of unit vectors (n, 3) on the unit ball and its triangles (faces, 3), int32.
@@ -198,27 +207,47 @@ def inflation(vertices: Array, triangles: Array) -> float:
     return float(1 / distance.min())
 
 
-def covered_pixels(projection: "Projection", solids: Solids, k: int, faces: int, inflate: bool) -> Array:
+def covered_pixels(
+    projection: "Projection", solids: Solids, k: int, faces: int, inflate: bool, seen: Array | None = None
+) -> Array:
     """Rasterize the mesh bound of light k and return the pixels whose line of sight meets it, (h, w) bool.
 
-    `faces` triangles are made to enclose the ellipsoid by `inflate`. All pixels when the eye is inside.
+    `faces` triangles are made to enclose the ellipsoid by `inflate`. All pixels when the eye is inside. With `seen`
+    (h, w), 1 / depth, 1/m (0: nothing), only those where the surface at that depth lies in the mesh.
     """
-    from refgi.rsm import rasterize
-    from refgi.scene.model import Geometry
-
     vertices, triangles = sphere_mesh(faces)
     grown = vertices * ((inflation(vertices, triangles) * (1 + ROUNDING)) if inflate else 1.0)
     radius, (center, half_width, height) = math.sqrt(solids.square[k]), (part[k] for part in solids.ellipsoid)
     axis = solids.axis[:, k]
     # stretched along the axis: w where the vector has its share of the axis, h for the rest
     along = np.outer(grown @ axis, axis)
-    parts = [solids.position[:, k] + radius * (center * axis + height * (grown - along) + half_width * along)]
+    bodies = [solids.position[:, k] + radius * (center * axis + height * (grown - along) + half_width * along)]
     if solids.ball is not None:
-        parts.append(solids.position[:, k] + solids.ball[k] * grown)
-    corners = np.concatenate([triangles + i * len(vertices) for i in range(len(parts))])
-    shape = Geometry(np.concatenate(parts), corners, np.zeros(len(corners), np.int32))
-    covered: Array = rasterize(shape, projection).triangle_id >= 0
+        bodies.append(solids.position[:, k] + solids.ball[k] * grown)
+    covered = np.zeros(projection.shape, np.bool_)
+    for body in bodies:
+        far, near = _sides(projection, body, triangles)
+        drawn = (far > 0) | (near > 0)
+        if seen is not None:
+            drawn &= (far <= seen * (1 + DEPTH_SLACK)) & ((near >= seen * (1 - DEPTH_SLACK)) | (near == 0))
+        covered |= drawn
     return covered
+
+
+def _sides(projection: "Projection", body: Array, triangles: Array) -> list[Array]:
+    """Return 1 / depth (h, w), 1/m, of the faces of a convex mesh that look away from the eye and of those towards it.
+
+    0 where there is none: the eye is inside, or the line of sight misses the mesh.
+    """
+    from refgi.rsm import rasterize
+    from refgi.scene.model import Geometry
+
+    a, b, c = (body[triangles[:, corner]] for corner in range(3))
+    normal = np.cross(b - a, c - a)
+    outward = np.sign((normal * (a - body.mean(axis=0))).sum(axis=1))
+    towards = outward * (normal * (projection.origin[0] - a)).sum(axis=1) > 0
+    return [rasterize(Geometry(body, some, np.zeros(len(some), np.int32)), projection).inverse_depth
+            for some in (triangles[~towards], triangles[towards])]
 
 
 def _icosahedron() -> tuple[Array, Array]:

@@ -28,6 +28,7 @@ from refgi.skips import left_out
 from refgi.splat.sii.reach.bounds import (
     Solids,
     covered_pixels,
+    inverse_depths,
     light_solids,
     screen_quads,
     tiles_of_pixels,
@@ -206,7 +207,8 @@ class LightLists:
     def __init__(
         self, packed: Packed, settings: SiiSettings, outside: bool, width: int, projection: "Projection | None"
     ) -> None:
-        self._bound = FullBound() if outside else settings.reach.bound
+        everywhere = outside or packed.spheres is not None  # spheres reach over their horizon
+        self._bound = FullBound() if everywhere else settings.reach.bound
         self._on_screen = isinstance(self._bound, QuadBound | MeshBound)
         if self._on_screen:
             expect(projection is not None, "projection", f"the camera's map for the bound {self._bound.name()!r}", None)
@@ -261,7 +263,7 @@ class LightLists:
         def bounded() -> Array:
             packed = pack_solids(solids, lights[3:6], hollow=self._on_screen, nearest=nearest and self._tangent)
             listed = list_lights(position, normal, packed)
-            return listed & self._tiles_on_screen(places, solids) if self._on_screen else listed
+            return listed & self._tiles_on_screen(position, places, solids) if self._on_screen else listed
 
         def outside() -> tuple[int, int]:
             listed = bounded()
@@ -270,18 +272,19 @@ class LightLists:
         whole = isinstance(bound, FullBound) or not left_out("sii.bounds", outside)
         yield EVERY, np.ones((_tiles(places), count), np.bool_) if whole else bounded()
 
-    def _tiles_on_screen(self, places: Array, solids: Solids) -> Array:
+    def _tiles_on_screen(self, position: Array, places: Array, solids: Solids) -> Array:
         assert self._projection is not None
         if not isinstance(self._bound, MeshBound):
             return tiles_of_quads(screen_quads(self._projection, solids.position, np.sqrt(solids.square)), places,
                                   self._width)
-        return np.stack([tiles_of_pixels(self._drawn(solids, k), places) for k in range(solids.position.shape[1])],
-                        axis=1)
+        seen = inverse_depths(self._projection, position, places)  # Sec. 3.4: early depth test
+        return np.stack([tiles_of_pixels(self._drawn(solids, k, seen), places)
+                         for k in range(solids.position.shape[1])], axis=1)
 
-    def _drawn(self, solids: Solids, k: int) -> Array:
+    def _drawn(self, solids: Solids, k: int, seen: Array | None = None) -> Array:
         assert self._projection is not None
         assert isinstance(self._bound, MeshBound)
-        return covered_pixels(self._projection, solids, k, self._bound.faces, self._bound.inflate)
+        return covered_pixels(self._projection, solids, k, self._bound.faces, self._bound.inflate, seen)
 
 
 def listed_pairs(listed: Array, lanes: int, receivers: int) -> int:

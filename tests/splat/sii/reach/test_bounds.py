@@ -1,6 +1,6 @@
 """Bounds of the significant region: closed forms of the appendix, proofs as properties, meshes, quads, lists."""
 
-
+import itertools
 import math
 
 import numpy as np
@@ -26,6 +26,7 @@ from refgi.splat.sii.reach.bounds import (
     tiles_of_quads,
 )
 from refgi.splat.sii.reach.lists import list_lights, pack_solids
+from tests.naive import bound_mesh as naive_mesh
 from tests.naive import bounds as naive
 from tests.pairs import sets
 from tests.splat.sii.reach.regions import in_ellipsoid, significant_radius, waste
@@ -33,6 +34,7 @@ from tests.splat.sii.reach.regions import in_ellipsoid, significant_radius, wast
 TOUCH = 1e-12  # curves touch: F^2 and e^2 are equal there but for rounding
 PRINTED = 0.5e-3  # tables give three digits
 SHARE = 0.2e-2  # shares are given to 0.1 %, and the grid of the quadrature leaves as much
+NEAR_A_FACE = 1e-4  # m: nearer than float32 depth and its slack tell
 VIEW = camera_projection(Camera((0.1, 0.2, 2.0), (0.0, 0.0, 0.0), vfov=math.radians(55), width=96, height=80))
 
 
@@ -177,6 +179,37 @@ def test_inflated_meshes_miss_no_pixel(exponent, evidence):
     assert all((count == 0) == grown for (_, grown), count in missed.items())
     evidence(f"n = {exponent:g}: 0 pixels missed with inflation; without "
              + ", ".join(f"{missed[faces, False]} ({faces} faces)" for faces in (8, 20, 80)))
+
+
+@pytest.mark.parametrize("exponent", [1.0, 30.0])
+@pytest.mark.feature("SII-30")
+def test_the_depth_test_leaves_what_lies_in_the_mesh(exponent, evidence):
+    """The drawing's nearest and farthest depth against the planes of the mesh's faces, surfaces at any depth."""
+    rng = np.random.default_rng(4)
+    place, axis, square = scattered(rng)
+    solids = light_solids(place, axis, np.full(len(square), exponent), square, False, 0.2)
+    depth = rng.uniform(0.05, 3, VIEW.shape)
+    seen = (VIEW.origin[0][:, None, None] + depth * pixel_rays(VIEW)).reshape(3, -1)
+    kept = drawn = 0
+    for k, faces in itertools.product(range(len(square)), (8, 80)):
+        radius = math.sqrt(square[k])
+        bodies = naive_mesh.bodies(place[:, k], axis[:, k], exponent, radius, min(radius, 0.2), faces)
+        outside = np.min([out_of(body.reshape(-1, 3, 3), seen) for body in bodies], axis=0).reshape(VIEW.shape)
+        covered, left = (covered_pixels(VIEW, solids, k, faces, False, given) for given in (None, 1 / depth))
+        sure = np.abs(outside) > NEAR_A_FACE
+        assert not (left & ~covered).any()
+        np.testing.assert_array_equal(left[sure], outside[sure] < 0)
+        kept, drawn = kept + left.sum(), drawn + covered.sum()
+    assert kept < drawn / 2
+    evidence(f"n = {exponent:g}: {kept:,} of {drawn:,} fragments pass, those whose surface lies in the mesh")
+
+
+def out_of(triangles, points):
+    """Return how far points (3, n) lie out of a convex mesh (m, 3 corners, 3), m; below 0: within it."""
+    a, b, c = triangles.transpose(1, 0, 2)
+    normal = sets.unit(np.cross(b - a, c - a).T).T
+    normal *= np.sign((normal * (a - triangles.mean(axis=(0, 1)))).sum(axis=1))[:, None]
+    return (normal @ points - (normal * a).sum(axis=1)[:, None]).max(axis=0)
 
 
 def pixel_rays(view):

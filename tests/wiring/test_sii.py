@@ -14,6 +14,7 @@ from refgi.splat.sii.reach.fragments import fragments
 from tests.literal.whole import sii as literal
 from tests.literal.whole.pairs import with_clamp
 from tests.naive import ledger
+from tests.naive.storage import stored
 from tests.wiring.cases import Case, needed, uncovered, under
 from tests.wiring.fold import fold
 from tests.wiring.pair_cases import PAIR_CASES
@@ -58,6 +59,8 @@ REACH_CASES = {
                                frame={"width": 6, "height": 5}),
     "half the resolution": Case({"half_resolution": True}),
     "half the resolution, cut": Case({"half_resolution": True}, over=CUT),
+    "half floats and bytes": Case({"quantisation": "published"}),
+    "half floats and bytes, cut": Case({"quantisation": "published"}, over=CUT),
 }
 CUT_CASES = {
     "clusters": Case({"lightcuts": "bounded", "lightcuts.error": 1e-6}, same=STRICT),
@@ -93,12 +96,19 @@ def known(settings):
 
 FOLDED = fold(SiiSettings, CASES, BASE, fits=known)
 COUNTED = {name: case for name, case in FOLDED.items() if "reach.cut" in {**case.over, **case.values}}
-ACCOUNTS = ("a share, clamped", "a random share", "half the resolution, cut", "a mesh within its ellipsoid")
+ACCOUNTS = ("a share, clamped", "a random share", "half floats and bytes, cut", "half the resolution, cut",
+            "a mesh within its ellipsoid")
 
 
 def pixel_lights(frame, settings):
     """Return the pixel lights of a frame, and the area that each stands for where a clamp needs it."""
     return choose_lights(frame, settings.lights), footprints(frame, settings.lights, with_clamp(settings).pairs)
+
+
+def as_stored(frame, settings):
+    """Return the frame, the lights and the areas that sums read."""
+    lights, areas = pixel_lights(frame, settings)
+    return (*((frame, lights) if settings.quantisation == "none" else stored(frame, lights)), areas)
 
 
 def tolerance(settings):
@@ -131,7 +141,8 @@ def test_the_lights_are_of_every_kind():
 def test_the_literal_text(name):
     case = FOLDED[name]
     settings, frame = case.settings(SiiSettings, BASE), case.seen()
-    expected = literal.sii(frame, with_clamp(settings), *pixel_lights(frame, settings))
+    seen, *lights = as_stored(frame, settings)
+    expected = literal.sii(seen, with_clamp(settings), *lights)
     np.testing.assert_allclose(sii(frame, settings), expected, rtol=0, atol=tolerance(settings) * expected.max())
 
 
@@ -174,8 +185,8 @@ def test_the_ledger_is_that_of_the_full_sum():
 @pytest.mark.parametrize("name", COUNTED)
 def test_fragments_are_those_of_the_literal_text(name):
     case = FOLDED[name]
-    settings, frame = with_clamp(case.settings(SiiSettings, BASE)), case.seen()
-    lights, footprint = pixel_lights(frame, settings)
+    settings = with_clamp(case.settings(SiiSettings, BASE))
+    frame, lights, footprint = as_stored(case.seen(), settings)
     found = fragments(receivers_of(frame), lights, settings, footprint, frame.gbuffer.projection)
     overdraw, of_light = literal.fragments(frame, settings, lights)
     np.testing.assert_array_equal(found.overdraw, overdraw)
@@ -195,8 +206,8 @@ def test_the_paper_counts_the_same_fragments():
 @pytest.mark.parametrize("name", [name for name in COUNTED if set(COUNTED[name].parts) & set(REACH_CASES)])
 def test_what_is_cut_is_that_of_the_literal_text(name):
     case = FOLDED[name]
-    settings, frame = with_clamp(case.settings(SiiSettings, BASE)), case.seen()
-    lights, footprint = pixel_lights(frame, settings)
+    settings = with_clamp(case.settings(SiiSettings, BASE))
+    frame, lights, footprint = as_stored(case.seen(), settings)
     expected = literal.cut_irradiance(frame, settings, lights, footprint)
     np.testing.assert_allclose(cut_irradiance(receivers_of(frame), lights, settings, footprint), expected, rtol=0,
                                atol=tolerance(settings) * expected.max())
@@ -207,12 +218,14 @@ def test_the_ledger_is_that_of_the_literal_text(name):
     """What settings keep from the visible surface, as sums over pixels of the area that they see."""
     case = CASES[name]
     settings, frame = with_clamp(case.settings(SiiSettings, BASE)), case.seen()
-    lights, areas = pixel_lights(frame, settings), areas_of(frame)
+    areas = areas_of(frame)
 
     def flux(changes):
-        return (literal.sii(frame, replaced(settings, changes), *lights) * areas).sum(axis=(1, 2))
+        changed = replaced(settings, changes)
+        seen, *lights = as_stored(frame, changed)
+        return (literal.sii(seen, changed, *lights) * areas).sum(axis=(1, 2))
 
-    sharp = {"half_resolution": False}
+    sharp = {"half_resolution": False, "quantisation": "none"}
     arrived, at_each_pixel, uncut, full = map(flux, (
         {}, sharp, sharp | {"reach.cut": "none"}, sharp | {"reach.cut": "none", "pairs.clamp": "none"}))
     account = sii_ledger(frame, settings)

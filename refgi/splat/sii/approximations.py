@@ -33,6 +33,10 @@ def _full_resolution(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings
     return dataclasses.replace(settings, half_resolution=False)
 
 
+def _full_precision(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
+    return dataclasses.replace(settings, quantisation="none")
+
+
 def _every_pair(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
     return dataclasses.replace(settings, lightcuts=None)
 
@@ -41,6 +45,7 @@ APPROXIMATIONS = (
     VISIBILITY, RSM_RESOLUTION, LIGHT_SAMPLING._replace(off=_sampled), OPENNESS, CLAMP,
     Approximation("cut", "pairs whose irradiance is below a threshold are left out", _uncut),
     Approximation("lightcuts", "clusters stand for their lights where the sum's error is bounded", _every_pair),
+    Approximation("storage", "half floats and 8 bits for the buffers of lights and receivers", _full_precision),
     Approximation("upsampling", "one pixel of 2 x 2 is evaluated, the others are upsampled", _full_resolution))
 
 
@@ -58,7 +63,8 @@ def sii_ledger(frame: "Frame", settings: SiiSettings) -> Ledger:
     settings = dataclasses.replace(with_clamp(settings), lightcuts=None)
     footprint = footprints(frame, settings.lights, settings.pairs)
     picture = sii(frame, settings)
-    between = sii(frame, replaced(settings, {"half_resolution": False})) - picture if settings.half_resolution else None
+    whole = replaced(settings, {"half_resolution": False, "quantisation": "none"})
+    between = None if settings == whole else sii(frame, whole) - picture
     return account(frame, settings.lights, settings.pairs, footprint, picture,
                    {"cut": _cut(frame, settings, footprint), "interpolated": between})
 

@@ -114,6 +114,8 @@ class SiiSettings(Settings):
     reach: ReachSettings = setting(ReachSettings(), "how far a light reaches")
     half_resolution: bool = setting(False, "evaluate one pixel of 2 x 2 and upsample by a joint bilateral filter")
     lightcuts: Lightcuts | None = setting(None, "diffuse lights are summed by clusters, to an error")
+    quantisation: Literal["none", "published"] = setting(
+        "none", "half floats and 8 bits of the published textures of lights and receivers", study=True)
 
     def check(self) -> None:
         """Check what fields ask of each other."""

@@ -23,6 +23,7 @@ from refgi.splat.sii.half_resolution import half_resolution
 from refgi.splat.sii.reach.lists import EVERY, LightLists, Some, listed_pairs
 from refgi.splat.sii.reach.threshold import warn_of_cut, with_reference_length
 from refgi.splat.sii.settings import SiiSettings
+from refgi.splat.sii.storage import as_stored
 from refgi.stages import skip, stage, tally
 from refgi.types import Array
 
@@ -50,6 +51,7 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     lights = choose_lights(frame, settings.lights)  # Sec. 3.1, 3.5 to 3.7
     footprint = footprints(frame, settings.lights, settings.pairs)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))  # Sec. 3.2: deferred shading
+    receivers, lights = as_stored(receivers, lights, settings)  # Sec. 4
 
     resolved = with_reference_length(receivers, lights, settings)
 

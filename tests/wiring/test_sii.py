@@ -16,6 +16,7 @@ from tests.literal.whole.pairs import with_clamp
 from tests.naive import ledger
 from tests.naive.storage import stored
 from tests.wiring.cases import Case, needed, uncovered, under
+from tests.wiring.features import SII, featured
 from tests.wiring.fold import fold
 from tests.wiring.pair_cases import PAIR_CASES
 
@@ -137,7 +138,7 @@ def test_the_lights_are_of_every_kind():
     assert lights.flux.max() > 4 * lights.flux[:, diffuse].max(axis=0).min()
 
 
-@pytest.mark.parametrize("name", FOLDED)
+@pytest.mark.parametrize("name", featured(FOLDED, SII))
 def test_the_literal_text(name):
     case = FOLDED[name]
     settings, frame = case.settings(SiiSettings, BASE), case.seen()
@@ -182,6 +183,7 @@ def test_the_ledger_is_that_of_the_full_sum():
     np.testing.assert_array_equal(clustered.arrived, full.arrived)
 
 
+@pytest.mark.feature("SII-23", "SII-24")
 @pytest.mark.parametrize("name", COUNTED)
 def test_fragments_are_those_of_the_literal_text(name):
     case = FOLDED[name]
@@ -194,6 +196,7 @@ def test_fragments_are_those_of_the_literal_text(name):
     assert found.total == overdraw.sum()
 
 
+@pytest.mark.feature("SII-23")
 def test_the_paper_counts_the_same_fragments():
     """The overdraw of Figure 8 and the counts of Section 6, of a random range."""
     case = CASES["a random share"]

@@ -24,7 +24,7 @@ LIGHTS = {
 }
 SII = PAIRS | {
     "reach.cut": "SII-21", "reach.bound": "SII-18", "bound.faces": "SII-20", "bound.inflate": "SII-20",
-    "reach.stochastic": "REF-12", "half_resolution": "SII-22", "quantisation": "SII-31",
+    "reach.stochastic": "REF-12", "half_resolution": "SII-22", "quantisation": "SII-31", "compensation": "REF-11",
     "as_published = per_light_ilow": "SII-21 REF-20",
 }
 SHADOWS = {

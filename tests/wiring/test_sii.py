@@ -60,6 +60,8 @@ REACH_CASES = {
                                frame={"width": 6, "height": 5}),
     "half the resolution": Case({"half_resolution": True}),
     "half the resolution, cut": Case({"half_resolution": True}, over=CUT),
+    "compensated by pixels": Case({"compensation": "screen"}, over={"pairs.clamp": "geometry",
+                                                                   "pairs.clamp.value": 0.4}),
     "half floats and bytes": Case({"quantisation": "published"}),
     "half floats and bytes, cut": Case({"quantisation": "published"}, over=CUT),
 }
@@ -97,8 +99,8 @@ def known(settings):
 
 FOLDED = fold(SiiSettings, CASES, BASE, fits=known)
 COUNTED = {name: case for name, case in FOLDED.items() if "reach.cut" in {**case.over, **case.values}}
-ACCOUNTS = ("a share, clamped", "a random share", "half floats and bytes, cut", "half the resolution, cut",
-            "a mesh within its ellipsoid")
+ACCOUNTS = ("a share, clamped", "a random share", "half the resolution, cut", "a mesh within its ellipsoid",
+            "half floats and bytes, cut", "compensated by pixels")
 
 
 def pixel_lights(frame, settings):
@@ -110,6 +112,14 @@ def as_stored(frame, settings):
     """Return the frame, the lights and the areas that sums read."""
     lights, areas = pixel_lights(frame, settings)
     return (*((frame, lights) if settings.quantisation == "none" else stored(frame, lights)), areas)
+
+
+def by_literal_text(frame, settings):
+    seen, *lights = as_stored(frame, settings)
+    light = literal.sii(seen, settings, *lights)
+    if settings.compensation == "none":
+        return light
+    return light + literal.compensation(frame, settings.pairs.clamp.value)
 
 
 def tolerance(settings):
@@ -142,8 +152,7 @@ def test_the_lights_are_of_every_kind():
 def test_the_literal_text(name):
     case = FOLDED[name]
     settings, frame = case.settings(SiiSettings, BASE), case.seen()
-    seen, *lights = as_stored(frame, settings)
-    expected = literal.sii(seen, with_clamp(settings), *lights)
+    expected = by_literal_text(frame, with_clamp(settings))
     np.testing.assert_allclose(sii(frame, settings), expected, rtol=0, atol=tolerance(settings) * expected.max())
 
 
@@ -224,11 +233,9 @@ def test_the_ledger_is_that_of_the_literal_text(name):
     areas = areas_of(frame)
 
     def flux(changes):
-        changed = replaced(settings, changes)
-        seen, *lights = as_stored(frame, changed)
-        return (literal.sii(seen, changed, *lights) * areas).sum(axis=(1, 2))
+        return (by_literal_text(frame, replaced(settings, changes)) * areas).sum(axis=(1, 2))
 
-    sharp = {"half_resolution": False, "quantisation": "none"}
+    sharp = {"half_resolution": False, "quantisation": "none", "compensation": "none"}
     arrived, at_each_pixel, uncut, full = map(flux, (
         {}, sharp, sharp | {"reach.cut": "none"}, sharp | {"reach.cut": "none", "pairs.clamp": "none"}))
     account = sii_ledger(frame, settings)

@@ -33,6 +33,10 @@ def _full_resolution(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings
     return dataclasses.replace(settings, half_resolution=False)
 
 
+def _unclamped(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
+    return replaced(settings, {"pairs.clamp": "none", "compensation": "none"})
+
+
 def _full_precision(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
     return dataclasses.replace(settings, quantisation="none")
 
@@ -42,7 +46,7 @@ def _every_pair(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
 
 
 APPROXIMATIONS = (
-    VISIBILITY, RSM_RESOLUTION, LIGHT_SAMPLING._replace(off=_sampled), OPENNESS, CLAMP,
+    VISIBILITY, RSM_RESOLUTION, LIGHT_SAMPLING._replace(off=_sampled), OPENNESS, CLAMP._replace(off=_unclamped),
     Approximation("cut", "pairs whose irradiance is below a threshold are left out", _uncut),
     Approximation("lightcuts", "clusters stand for their lights where the sum's error is bounded", _every_pair),
     Approximation("storage", "half floats and 8 bits for the buffers of lights and receivers", _full_precision),
@@ -63,7 +67,7 @@ def sii_ledger(frame: "Frame", settings: SiiSettings) -> Ledger:
     settings = dataclasses.replace(with_clamp(settings), lightcuts=None)
     footprint = footprints(frame, settings.lights, settings.pairs)
     picture = sii(frame, settings)
-    whole = replaced(settings, {"half_resolution": False, "quantisation": "none"})
+    whole = replaced(settings, {"half_resolution": False, "quantisation": "none", "compensation": "none"})
     between = None if settings == whole else sii(frame, whole) - picture
     return account(frame, settings.lights, settings.pairs, footprint, picture,
                    {"cut": _cut(frame, settings, footprint), "interpolated": between})

@@ -11,7 +11,7 @@ from refgi.jit import most_threads
 from refgi.lights.settings import LightSettings, MapLights, clamped_pairs, expect_footprints, most_lights
 from refgi.method import Extent
 from refgi.pairs.lightcuts.tree import tree_bytes
-from refgi.pairs.settings import LAST_SEED, Lightcuts, PairSettings, SphereClamp
+from refgi.pairs.settings import LAST_SEED, GeometryClamp, Lightcuts, PairSettings, SphereClamp
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
 
@@ -116,6 +116,8 @@ class SiiSettings(Settings):
     lightcuts: Lightcuts | None = setting(None, "diffuse lights are summed by clusters, to an error")
     quantisation: Literal["none", "published"] = setting(
         "none", "half floats and 8 bits of the published textures of lights and receivers", study=True)
+    compensation: Literal["none", "screen"] = setting(
+        "none", "what the clamp 'geometry' takes is given back by pixels nearby (Novak et al. 2011)", study=True)
 
     def check(self) -> None:
         """Check what fields ask of each other."""
@@ -124,6 +126,8 @@ class SiiSettings(Settings):
                and self.reach.cut.name())
         expect(self.lightcuts is None or not isinstance(self.pairs.clamp, SphereClamp), "pairs.clamp",
                "another one with lightcuts, which bound no spheres", "sphere")
+        expect(self.compensation == "none" or isinstance(self.pairs.clamp, GeometryClamp), "compensation",
+               "none without the clamp 'geometry'", self.compensation)
         expect(not (self.half_resolution and self.reach.on_screen), "reach.bound",
                "one in space, not on the screen, at half resolution", self.reach.bound.name())
 

@@ -18,7 +18,9 @@ from refgi.pairs.estimates import report_sampling, thinned, warn_of_clamp
 from refgi.pairs.irradiance import Receivers, checked, irradiance, over_receivers
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.ranged_sum import LANES, sum_pairs_in_range, sum_weighted_pairs
+from refgi.pairs.settings import GeometryClamp
 from refgi.pairs.sphere_sum import sum_spheres
+from refgi.splat.sii.compensation import screen_compensation
 from refgi.splat.sii.half_resolution import half_resolution
 from refgi.splat.sii.reach.lists import EVERY, LightLists, Some, listed_pairs
 from refgi.splat.sii.reach.threshold import warn_of_cut, with_reference_length
@@ -60,11 +62,17 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
 
     light = half_resolution(receivers, evaluate) if settings.half_resolution else evaluate(receivers)
     some = (lights, footprint) if settings.lightcuts is None else thinned(lights, footprint)
-    warn_of_clamp(receivers, some[0], settings.pairs, some[1], "sii")
+    if settings.compensation == "none":
+        warn_of_clamp(receivers, some[0], settings.pairs, some[1], "sii")
     warn_of_cut(light, receivers, lights, resolved, footprint)
     report_sampling(frame, receivers, lights, settings.pairs, footprint, "sii",
                     all_summed=settings.lightcuts is None)
-    return light
+    clamp = settings.pairs.clamp
+    if settings.compensation == "none" or not isinstance(clamp, GeometryClamp) or clamp.value is None:
+        return light
+    depth, normal, albedo = frame.gbuffer.resolve("depth", "normal", "albedo")
+    given: Array = screen_compensation(depth, normal, albedo, frame.direct, frame.gbuffer.projection, clamp.value)
+    return np.asarray(light + given)
 
 
 def splat(

@@ -28,6 +28,7 @@ LAMPS = 5
 STANDARD_ERRORS = 4.0
 
 
+@pytest.mark.feature("SII-13")
 @given(st.lists(st.one_of(st.just(0.0), st.integers(1, 1000).map(float)), min_size=1, max_size=12), st.integers(0, 99))
 def test_shares_are_those_of_the_twin(flux, more):
     lit = sum(one > 0 for one in flux) or len(flux)
@@ -58,6 +59,7 @@ def test_fewer_lights_than_lamps_are_drawn_with_the_mean_of_their_flux():
                                [s / q for s, q in zip(shares, quota, strict=True) if s], rtol=1e-12)
 
 
+@pytest.mark.feature("SII-13")
 @pytest.mark.parametrize("options", [{"pattern": "halton"}, {"pattern": "random"},
                                      {"pattern": "halton", "filtered": True}, {"pattern": "grid", "filtered": True}])
 def test_fewer_lights_than_lamps_keep_the_flux_in_the_mean(options, evidence):
@@ -116,6 +118,7 @@ def test_lights_of_every_source_leave_a_dark_lamp_out(how):
         np.testing.assert_array_equal(getattr(found[0], field), getattr(found[1], field))
 
 
+@pytest.mark.feature("SII-17")
 def test_paths_go_where_the_flux_is():
     """A lamp of three times the power at the same place has three times the paths, and carries as much a path."""
     lamp = PointLight((0.278, 0.4, -0.2), (1.0, 1.0, 1.0))

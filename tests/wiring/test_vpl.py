@@ -39,7 +39,13 @@ CASES = {
 }
 
 
-FOLDED = fold(VplSettings, CASES, BASE)
+def known(settings):
+    """Tell whether maps matter if there are any: without visibility nobody looks them up."""
+    return settings.visibility or settings.maps is None
+
+
+SHADOWED = "on glossy surfaces and a smooth ball"  # which the fold leaves to a case without visibility
+FOLDED = fold(VplSettings, CASES, BASE, fits=known) | {SHADOWED: CASES[SHADOWED]}
 
 
 def test_every_field_has_a_case():

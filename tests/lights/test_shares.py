@@ -128,6 +128,17 @@ def test_paths_go_where_the_flux_is():
     np.testing.assert_allclose(lights.flux[:, : first.flux.shape[1]], first.flux, rtol=1e-12)
 
 
+@pytest.mark.feature("SII-17")
+def test_fewer_paths_than_lamps_keep_the_flux():
+    """In a closed sphere every path reflects albedo times its share: 2 paths of 4 lamps carry the flux of all."""
+    scene = load_scene("integrating_sphere:faces=500,albedo=0.6")
+    lamps = [PointLight(scene.lights[0].position, (k, k, k)) for k in (1.0, 2.0, 3.0, 4.0)]
+    for seed in range(1, 6):
+        lights = choose_lights(Frame(scene.with_lights(*lamps), **SMALL),
+                               of(LightSettings, count=2, seed=seed, source="walk"))
+        np.testing.assert_allclose(lights.flux.sum(axis=1), 0.6 * 4 * math.pi * 10, rtol=1e-6)
+
+
 def test_a_lamp_whose_trial_meets_nothing_has_one_path_beyond_the_number():
     """Nothing of a scene that only dark lamps light is drawn anew: they share the number."""
     lamps, geometry = light_table((MISSES, *BOX.lights)), BOX.geometry

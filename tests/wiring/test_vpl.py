@@ -44,8 +44,9 @@ def known(settings):
     return settings.visibility or settings.maps is None
 
 
-SHADOWED = "on glossy surfaces and a smooth ball"  # which the fold leaves to a case without visibility
-FOLDED = fold(VplSettings, CASES, BASE, fits=known) | {SHADOWED: CASES[SHADOWED]}
+ROUND = "lights and maps on a smooth ball"  # which the fold leaves to a case without visibility
+FOLDED = fold(VplSettings, CASES, BASE, fits=known) | {
+    ROUND: Case({"lights": 20, "maps": "imperfect"}, FEW_POINTS, scene="smooth")}
 
 
 def test_every_field_has_a_case():

@@ -14,6 +14,7 @@ from refgi.frame import Frame
 from refgi.scene import Camera, DirectionalLight, Scene, merge
 from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
+from refgi.splat.sii.compensation import _within
 from tests.form_factors import polygon_form_factor
 from tests.truth.scenes import rectangle
 
@@ -72,6 +73,21 @@ def test_what_the_picture_does_not_show_is_not_given_back():
     bounded, given = (sii(frame, replaced(BOUNDED, {"compensation": how})) for how in ("none", "screen"))
     assert bounded.any()
     np.testing.assert_array_equal(given, bounded)
+
+
+@pytest.mark.feature("REF-11")
+def test_no_point_near_enough_lies_outside_the_window():
+    """Property: of points nearer to each other than b^(-1/2), each one's window of columns holds the other."""
+    rng, half, count = np.random.default_rng(4), 0.7, 64
+    for _ in range(4000):
+        bound, depth = rng.uniform(0.5, 20), rng.uniform(0.3, 4)
+        here = np.array([rng.uniform(-half, half) * depth, depth])
+        turn = rng.uniform(0, 7)
+        there = here + rng.uniform(0.7, 1) / math.sqrt(bound) * np.array([math.cos(turn), math.sin(turn)])
+        column, other = ((x / z / half + 1) / 2 * count for x, z in (here, there))
+        if there[1] > 0 and 0 <= other < count:
+            first, last = _within(int(column), count, depth, half, bound)
+            assert first <= int(other) < last
 
 
 def test_there_is_a_bound_to_make_up_for():

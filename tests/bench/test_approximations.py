@@ -20,8 +20,8 @@ OPTIONS = {"width": 32, "height": 24, "rsm_resolution": 64}
 STILL = StillFrames(6, TemporalSettings(weight=0.75))
 # settings with which every approximation of a method is made; of several kinds, where one excludes another
 MADE = {
-    "sii": [{"lights": 64, "cut": "relative", "half_resolution": True, "openness.flux": "scale",
-             "ambient_occlusion": "openness"},
+    "sii": [{"lights": 64, "cut": "relative", "half_resolution": True, "quantisation": "published",
+             "openness.flux": "scale", "ambient_occlusion": "openness"},
             {"lights": 2000, "lightcuts": "bounded", "lightcuts.error": 0.5}],
     "multires": [{"lights": 64, "detail": 0.5, "supersampled": True, "openness.flux": "scale",
                   "ambient_occlusion": "openness"},

@@ -28,6 +28,7 @@ LAMPS = 5
 STANDARD_ERRORS = 4.0
 
 
+@pytest.mark.feature("SII-13")
 @given(st.lists(st.one_of(st.just(0.0), st.integers(1, 1000).map(float)), min_size=1, max_size=12), st.integers(0, 99))
 def test_shares_are_those_of_the_twin(flux, more):
     lit = sum(one > 0 for one in flux) or len(flux)
@@ -58,6 +59,7 @@ def test_fewer_lights_than_lamps_are_drawn_with_the_mean_of_their_flux():
                                [s / q for s, q in zip(shares, quota, strict=True) if s], rtol=1e-12)
 
 
+@pytest.mark.feature("SII-13")
 @pytest.mark.parametrize("options", [{"pattern": "halton"}, {"pattern": "random"},
                                      {"pattern": "halton", "filtered": True}, {"pattern": "grid", "filtered": True}])
 def test_fewer_lights_than_lamps_keep_the_flux_in_the_mean(options, evidence):
@@ -116,6 +118,7 @@ def test_lights_of_every_source_leave_a_dark_lamp_out(how):
         np.testing.assert_array_equal(getattr(found[0], field), getattr(found[1], field))
 
 
+@pytest.mark.feature("SII-17")
 def test_paths_go_where_the_flux_is():
     """A lamp of three times the power at the same place has three times the paths, and carries as much a path."""
     lamp = PointLight((0.278, 0.4, -0.2), (1.0, 1.0, 1.0))
@@ -123,6 +126,17 @@ def test_paths_go_where_the_flux_is():
     lights = choose_lights(Frame(BOX.with_lights(lamp, strong), **SMALL), of(LightSettings, count=80, source="walk"))
     first = choose_lights(Frame(BOX.with_lights(lamp), **SMALL), of(LightSettings, count=20, source="walk"))
     np.testing.assert_allclose(lights.flux[:, : first.flux.shape[1]], first.flux, rtol=1e-12)
+
+
+@pytest.mark.feature("SII-17")
+def test_fewer_paths_than_lamps_keep_the_flux():
+    """In a closed sphere every path reflects albedo times its share: 2 paths of 4 lamps carry the flux of all."""
+    scene = load_scene("integrating_sphere:faces=500,albedo=0.6")
+    lamps = [PointLight(scene.lights[0].position, (k, k, k)) for k in (1.0, 2.0, 3.0, 4.0)]
+    for seed in range(1, 6):
+        lights = choose_lights(Frame(scene.with_lights(*lamps), **SMALL),
+                               of(LightSettings, count=2, seed=seed, source="walk"))
+        np.testing.assert_allclose(lights.flux.sum(axis=1), 0.6 * 4 * math.pi * 10, rtol=1e-6)
 
 
 def test_a_lamp_whose_trial_meets_nothing_has_one_path_beyond_the_number():

@@ -28,6 +28,7 @@ def test_mip_levels_add_a_third(evidence):
     evidence(f"bytes of 5 levels over those of full-resolution buffers: {', '.join(figures)}")
 
 
+@pytest.mark.feature("HSS-20")
 def test_doubles_and_means_of_radiance_take_more():
     pixels = 1280 * 720
     assert level_bytes(of(HssilSettings, start="full", levels=1), pixels, 8) == pixels * 92
@@ -36,6 +37,7 @@ def test_doubles_and_means_of_radiance_take_more():
     assert level_bytes(of(HssilSettings, start="half", levels=1, downsample="closest"), 1, 4) == 48
 
 
+@pytest.mark.feature("HSS-20")
 def test_drawn_senders_are_levels_of_their_own():
     """All but the depth, which is the receivers'; pixels are senders as they are."""
     frame = Frame(load_scene("cornell_box"), width=32, height=32, rsm_resolution=8)

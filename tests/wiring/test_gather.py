@@ -11,6 +11,7 @@ from refgi.splat import GatherSettings, Receivers, gather
 from refgi.splat.gather.gather import gather_counted, gather_irradiance
 from tests.literal.whole import gather as naive
 from tests.wiring.cases import LAMPS, SCENES, Case, uncovered
+from tests.wiring.features import GATHER, featured
 from tests.wiring.fold import fold
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
@@ -44,7 +45,7 @@ def test_every_field_has_a_case():
     assert "GatherSettings.interpolation = none" not in uncovered(GatherSettings, {"exact": EXACT})
 
 
-@pytest.mark.parametrize("name", FOLDED)
+@pytest.mark.parametrize("name", featured(FOLDED, GATHER))
 def test_the_literal_text(name):
     check(FOLDED[name].seen(), FOLDED[name].settings(GatherSettings, BASE))
 

@@ -12,6 +12,7 @@ from refgi.sssil.settings import HssilSettings
 from tests.literal.whole.hssil import picture as by_hand
 from tests.sssil.cameras.hidden_side import SIDE_VIEW
 from tests.wiring.cases import Case, uncovered
+from tests.wiring.features import HSSIL, featured
 from tests.wiring.fold import fold
 
 ROUNDING = 1e-9  # of the brightest pixel: float64 in another order
@@ -144,7 +145,7 @@ def made(request):
     return case, frame, settings, hssil(frame, settings)
 
 
-@pytest.mark.parametrize("name", FOLDED)
+@pytest.mark.parametrize("name", featured(FOLDED, HSSIL))
 def test_the_literal_text(name, evidence):
     """Where cameras are placed is tested elsewhere: placed views are views."""
     case = FOLDED[name]

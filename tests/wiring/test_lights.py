@@ -12,6 +12,7 @@ from refgi.rsm import incident_flux
 from refgi.settings import of
 from tests.naive.lights import drawn, pixel_lights
 from tests.wiring.cases import uncovered
+from tests.wiring.features import LIGHTS, featured
 from tests.wiring.light_cases import BASE, LIGHT_CASES
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
@@ -29,7 +30,7 @@ def test_every_field_has_a_case():
     assert not uncovered(LightSettings, LIGHT_CASES, BASE)
 
 
-@pytest.mark.parametrize("name", LIGHT_CASES)
+@pytest.mark.parametrize("name", featured(LIGHT_CASES, LIGHTS))
 def test_the_lights_are_those_of_the_twin(name):
     case = LIGHT_CASES[name]
     settings = case.settings(LightSettings, BASE)

@@ -22,6 +22,7 @@ from tests.literal.whole import val as clustered
 from tests.literal.whole.pairs import occluded_of, with_clamp
 from tests.naive.shares import nearest_grid, shares_of
 from tests.wiring.cases import Case, needed, uncovered, under
+from tests.wiring.features import MULTIRES, featured
 from tests.wiring.fold import fold
 from tests.wiring.pair_cases import OCCLUSION_CASES, PAIR_CASES
 from tests.wiring.shadow_cases import shadow_cases
@@ -231,8 +232,7 @@ def test_every_field_has_a_case():
     assert not uncovered(MultiresSettings, ALL, BASE) - set(needed(LightSettings))  # those: test_lights, test_shared
 
 
-@pytest.mark.feature("AMS-05", "AMS-11", "AMS-14")
-@pytest.mark.parametrize("name", FOLDED)
+@pytest.mark.parametrize("name", featured(FOLDED, MULTIRES))
 def test_the_literal_text(name, evidence):
     """Oracle: the picture is that of the literal text."""
     case = FOLDED[name]

@@ -11,6 +11,7 @@ from refgi.lights.selection import choose_lights
 from refgi.splat import MultiresSettings, SiiSettings, multires, sii
 from refgi.stages import observe
 from tests.wiring.cases import under
+from tests.wiring.features import LIGHTS, featured
 from tests.wiring.light_cases import BASE, LIGHT_CASES
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
@@ -22,7 +23,7 @@ CASES = under("lights", LIGHT_CASES)
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", featured(CASES, LIGHTS))
 def test_the_method_sums_the_chosen_lights(name, method):
     function, kind, over = METHODS[method]
     case = CASES[name]

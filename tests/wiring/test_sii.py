@@ -12,9 +12,11 @@ from refgi.splat import Receivers, SiiSettings, cut_irradiance, sii
 from refgi.splat.sii.approximations import sii_ledger
 from refgi.splat.sii.reach.fragments import fragments
 from tests.literal.whole import sii as literal
-from tests.literal.whole.pairs import with_clamp
+from tests.literal.whole.pairs import occluded_of, with_clamp
 from tests.naive import ledger
+from tests.naive.storage import stored
 from tests.wiring.cases import Case, needed, uncovered, under
+from tests.wiring.features import SII, featured
 from tests.wiring.fold import fold
 from tests.wiring.pair_cases import OCCLUSION_CASES, PAIR_CASES
 
@@ -58,6 +60,10 @@ REACH_CASES = {
                                frame={"width": 6, "height": 5}),
     "half the resolution": Case({"half_resolution": True}),
     "half the resolution, cut": Case({"half_resolution": True}, over=CUT),
+    "compensated by pixels": Case({"compensation": "screen"}, over={"pairs.clamp": "geometry",
+                                                                   "pairs.clamp.value": 0.4}),
+    "half floats and bytes": Case({"quantisation": "published"}),
+    "half floats and bytes, cut": Case({"quantisation": "published"}, over=CUT),
 }
 CUT_CASES = {
     "clusters": Case({"lightcuts": "bounded", "lightcuts.error": 1e-6}, same=STRICT),
@@ -94,12 +100,26 @@ def known(settings):
 FOLDED = fold(SiiSettings, CASES, BASE, fits=known)
 COUNTED = {name: case for name, case in FOLDED.items() if "reach.cut" in {**case.over, **case.values}}
 ACCOUNTS = ("a share, clamped", "a random share", "half the resolution, cut", "a mesh within its ellipsoid",
-            "ambient occlusion by long rays")
+            "ambient occlusion by long rays", "half floats and bytes, cut", "compensated by pixels")
 
 
 def pixel_lights(frame, settings):
     """Return the pixel lights of a frame, and the area that each stands for where a clamp needs it."""
     return choose_lights(frame, settings.lights), footprints(frame, settings.lights, with_clamp(settings).pairs)
+
+
+def as_stored(frame, settings):
+    """Return the frame, the lights and the areas that sums read."""
+    lights, areas = pixel_lights(frame, settings)
+    return (*((frame, lights) if settings.quantisation == "none" else stored(frame, lights)), areas)
+
+
+def by_literal_text(frame, settings):
+    seen, *lights = as_stored(frame, settings)
+    light = literal.sii(seen, replaced(settings, {"ambient_occlusion": "none"}), *lights)
+    if settings.compensation != "none":
+        light = light + literal.compensation(frame, settings.pairs.clamp.value)
+    return occluded_of(frame, settings, light)
 
 
 def tolerance(settings):
@@ -128,11 +148,11 @@ def test_the_lights_are_of_every_kind():
     assert lights.flux.max() > 4 * lights.flux[:, diffuse].max(axis=0).min()
 
 
-@pytest.mark.parametrize("name", FOLDED)
+@pytest.mark.parametrize("name", featured(FOLDED, SII))
 def test_the_literal_text(name):
     case = FOLDED[name]
     settings, frame = case.settings(SiiSettings, BASE), case.seen()
-    expected = literal.sii(frame, with_clamp(settings), *pixel_lights(frame, settings))
+    expected = by_literal_text(frame, with_clamp(settings))
     np.testing.assert_allclose(sii(frame, settings), expected, rtol=0, atol=tolerance(settings) * expected.max())
 
 
@@ -172,11 +192,12 @@ def test_the_ledger_is_that_of_the_full_sum():
     np.testing.assert_array_equal(clustered.arrived, full.arrived)
 
 
+@pytest.mark.feature("SII-23", "SII-24")
 @pytest.mark.parametrize("name", COUNTED)
 def test_fragments_are_those_of_the_literal_text(name):
     case = FOLDED[name]
-    settings, frame = with_clamp(case.settings(SiiSettings, BASE)), case.seen()
-    lights, footprint = pixel_lights(frame, settings)
+    settings = with_clamp(case.settings(SiiSettings, BASE))
+    frame, lights, footprint = as_stored(case.seen(), settings)
     found = fragments(receivers_of(frame), lights, settings, footprint, frame.gbuffer.projection)
     overdraw, of_light = literal.fragments(frame, settings, lights)
     np.testing.assert_array_equal(found.overdraw, overdraw)
@@ -184,6 +205,7 @@ def test_fragments_are_those_of_the_literal_text(name):
     assert found.total == overdraw.sum()
 
 
+@pytest.mark.feature("SII-23")
 def test_the_paper_counts_the_same_fragments():
     """The overdraw of Figure 8 and the counts of Section 6, of a random range."""
     case = CASES["a random share"]
@@ -196,8 +218,8 @@ def test_the_paper_counts_the_same_fragments():
 @pytest.mark.parametrize("name", [name for name in COUNTED if set(COUNTED[name].parts) & set(REACH_CASES)])
 def test_what_is_cut_is_that_of_the_literal_text(name):
     case = FOLDED[name]
-    settings, frame = with_clamp(case.settings(SiiSettings, BASE)), case.seen()
-    lights, footprint = pixel_lights(frame, settings)
+    settings = with_clamp(case.settings(SiiSettings, BASE))
+    frame, lights, footprint = as_stored(case.seen(), settings)
     expected = literal.cut_irradiance(frame, settings, lights, footprint)
     np.testing.assert_allclose(cut_irradiance(receivers_of(frame), lights, settings, footprint), expected, rtol=0,
                                atol=tolerance(settings) * expected.max())
@@ -208,13 +230,13 @@ def test_the_ledger_is_that_of_the_literal_text(name):
     """What settings keep from the visible surface, as sums over pixels of the area that they see."""
     case = CASES[name]
     settings, frame = with_clamp(case.settings(SiiSettings, BASE)), case.seen()
-    lights, areas = pixel_lights(frame, settings), areas_of(frame)
+    areas = areas_of(frame)
 
     def flux(changes):
-        return (literal.sii(frame, replaced(settings, changes), *lights) * areas).sum(axis=(1, 2))
+        return (by_literal_text(frame, replaced(settings, changes)) * areas).sum(axis=(1, 2))
 
     bare = {"ambient_occlusion": "none"}
-    sharp = bare | {"half_resolution": False}
+    sharp = bare | {"half_resolution": False, "quantisation": "none", "compensation": "none"}
     arrived, seen, at_each_pixel, uncut, full = map(flux, (
         {}, bare, sharp, sharp | {"reach.cut": "none"}, sharp | {"reach.cut": "none", "pairs.clamp": "none"}))
     account = sii_ledger(frame, settings)

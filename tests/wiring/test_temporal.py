@@ -13,6 +13,7 @@ from refgi.sssil.settings import HssilSettings, TemporalSettings
 from refgi.sssil.temporal import Sequence
 from tests.literal.whole import temporal
 from tests.wiring.cases import SCENES, Case, uncovered
+from tests.wiring.features import TEMPORAL, featured
 from tests.wiring.fold import fold
 
 ROUNDING = 1e-9  # of the brightest pixel: float64 in another order
@@ -88,7 +89,7 @@ def test_every_field_has_a_case():
     assert uncovered(TemporalSettings, CASES) == set()
 
 
-@pytest.mark.parametrize("name", FOLDED)
+@pytest.mark.parametrize("name", featured(FOLDED, TEMPORAL))
 def test_the_literal_text(name, computed, evidence):
     settings = FOLDED[name].settings(TemporalSettings)
     expected = temporal.filtered(*computed, settings)

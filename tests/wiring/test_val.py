@@ -9,6 +9,7 @@ from refgi.lights.settings import LightSettings
 from tests.literal.whole import val as clustered
 from tests.literal.whole.pairs import with_clamp
 from tests.wiring.cases import Case, needed, uncovered, under
+from tests.wiring.features import VAL, featured
 from tests.wiring.fold import fold
 from tests.wiring.pair_cases import PAIR_CASES
 from tests.wiring.shadow_cases import FEW, few, shadow_cases
@@ -55,7 +56,7 @@ def made(request):
     return case, frame, settings, val(frame, settings)
 
 
-@pytest.mark.parametrize("name", FOLDED)
+@pytest.mark.parametrize("name", featured(FOLDED, VAL))
 def test_the_literal_text(name, evidence):
     case = FOLDED[name]
     frame, settings = case.seen(), case.settings(ValSettings, BASE)

@@ -9,6 +9,7 @@ from refgi.lights import choose_pixel_lights
 from refgi.truth.vpl import VplSettings, vpl
 from tests.literal.whole.vpl import picture as twin
 from tests.wiring.cases import Case, uncovered
+from tests.wiring.features import VPL, featured
 from tests.wiring.fold import fold
 
 SINGLE = 2e-6  # of the brightest pixel: rays and what they carry are float32, some 30 roundings of 6e-8
@@ -38,7 +39,14 @@ CASES = {
 }
 
 
-FOLDED = fold(VplSettings, CASES, BASE)
+def known(settings):
+    """Tell whether maps matter if there are any: without visibility nobody looks them up."""
+    return settings.visibility or settings.maps is None
+
+
+ROUND = "lights and maps on a smooth ball"  # which the fold leaves to a case without visibility
+FOLDED = fold(VplSettings, CASES, BASE, fits=known) | {
+    ROUND: Case({"lights": 20, "maps": "imperfect"}, FEW_POINTS, scene="smooth")}
 
 
 def test_every_field_has_a_case():
@@ -53,7 +61,7 @@ def made(request):
     return case, frame, settings, vpl(frame, settings)
 
 
-@pytest.mark.parametrize("name", FOLDED)
+@pytest.mark.parametrize("name", featured(FOLDED, VPL))
 def test_the_literal_text(name, evidence):
     case = FOLDED[name]
     frame, settings = case.seen(), case.settings(VplSettings, BASE)

@@ -42,14 +42,24 @@ def _full_resolution(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings
     return dataclasses.replace(settings, half_resolution=False)
 
 
+def _unclamped(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
+    return replaced(settings, {"pairs.clamp": "none", "compensation": "none"})
+
+
+def _full_precision(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
+    return dataclasses.replace(settings, quantisation="none")
+
+
 def _every_pair(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
     return dataclasses.replace(settings, lightcuts=None)
 
 
 APPROXIMATIONS = (
-    VISIBILITY, RSM_RESOLUTION, LIGHT_SAMPLING._replace(off=_sampled), OPENNESS, CLAMP, AMBIENT_OCCLUSION,
+    VISIBILITY, RSM_RESOLUTION, LIGHT_SAMPLING._replace(off=_sampled), OPENNESS, CLAMP._replace(off=_unclamped),
+    AMBIENT_OCCLUSION,
     Approximation("cut", "pairs whose irradiance is below a threshold are left out", _uncut),
     Approximation("lightcuts", "clusters stand for their lights where the sum's error is bounded", _every_pair),
+    Approximation("storage", "half floats and 8 bits for the buffers of lights and receivers", _full_precision),
     Approximation("upsampling", "one pixel of 2 x 2 is evaluated, the others are upsampled", _full_resolution))
 
 
@@ -68,7 +78,8 @@ def sii_ledger(frame: "Frame", settings: SiiSettings) -> Ledger:
     settings = dataclasses.replace(given, ambient_occlusion=None)
     footprint = footprints(frame, settings.lights, settings.pairs)
     picture = sii(frame, settings)
-    between = sii(frame, replaced(settings, {"half_resolution": False})) - picture if settings.half_resolution else None
+    whole = replaced(settings, {"half_resolution": False, "quantisation": "none", "compensation": "none"})
+    between = None if settings == whole else sii(frame, whole) - picture
     losses = {"cut": _cut(frame, settings, footprint), "interpolated": between}
     if given.ambient_occlusion is not None:
         kept = sii(frame, given)

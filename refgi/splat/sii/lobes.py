@@ -13,6 +13,7 @@ from refgi.settings import replaced
 from refgi.splat.sii.reach.lists import LightLists
 from refgi.splat.sii.reach.threshold import with_reference_length
 from refgi.splat.sii.settings import FullBound, SiiSettings, TangentBound
+from refgi.splat.sii.storage import as_stored
 from refgi.stages import stage
 from refgi.types import Array
 
@@ -26,16 +27,16 @@ def sii_lobes(frame: "Frame", settings: SiiSettings) -> Array:
     (3, h, w), W/m^2/sr, linear RGB, without visibility; 0 where there is no lobe. Every glossy pixel sums all lights,
     one by one, whatever `half_resolution` and `lightcuts` say of irradiance. A cut leaves out the same pairs as from
     the irradiance: its threshold is of the irradiance that a light causes at most, and knows nothing of the receiver's
-    lobe.
+    lobe. Lights are as `quantisation` stores them; glossy pixels, which the paper has none of, keep their floats.
     """
     settings = with_clamp(settings)
-    lights = choose_lights(frame, settings.lights)
+    receivers, lights = as_stored(Receivers(*frame.gbuffer.resolve("position", "normal", "covered")),
+                                  choose_lights(frame, settings.lights), settings)
     footprint = footprints(frame, settings.lights, settings.pairs)
     points = frame.glossy_points
     if settings.reach.cut is None:
         radiance = glossy_radiance(points, lights, settings.pairs, footprint, frame.width)
     else:
-        receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
         resolved = with_reference_length(receivers, lights, settings)
         radiance = glossy_in_range(points, lights, resolved, footprint, frame.width)
     return spread_over_picture(points, radiance, (frame.height, frame.width))

@@ -19,7 +19,7 @@ from refgi.lights.settings import (
 )
 from refgi.method import Extent
 from refgi.pairs.lightcuts.tree import tree_bytes
-from refgi.pairs.settings import LAST_SEED, Lightcuts, PairSettings, SphereClamp
+from refgi.pairs.settings import LAST_SEED, GeometryClamp, Lightcuts, PairSettings, SphereClamp
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
 
@@ -122,6 +122,10 @@ class SiiSettings(Settings):
     reach: ReachSettings = setting(ReachSettings(), "how far a light reaches")
     half_resolution: bool = setting(False, "evaluate one pixel of 2 x 2 and upsample by a joint bilateral filter")
     lightcuts: Lightcuts | None = setting(None, "diffuse lights are summed by clusters, to an error")
+    quantisation: Literal["none", "published"] = setting(
+        "none", "half floats and 8 bits of the published textures of lights and receivers", study=True)
+    compensation: Literal["none", "screen"] = setting(
+        "none", "what the clamp 'geometry' takes is given back by pixels nearby (Novak et al. 2011)", study=True)
     ambient_occlusion: Openness | None = setting(None, OCCLUSION)
 
     def check(self) -> None:
@@ -131,6 +135,8 @@ class SiiSettings(Settings):
                and self.reach.cut.name())
         expect(self.lightcuts is None or not isinstance(self.pairs.clamp, SphereClamp), "pairs.clamp",
                "another one with lightcuts, which bound no spheres", "sphere")
+        expect(self.compensation == "none" or isinstance(self.pairs.clamp, GeometryClamp), "compensation",
+               "none without the clamp 'geometry'", self.compensation)
         expect(not (self.half_resolution and self.reach.on_screen), "reach.bound",
                "one in space, not on the screen, at half resolution", self.reach.bound.name())
 

@@ -19,11 +19,14 @@ from refgi.pairs.estimates import report_sampling, thinned, warn_of_clamp
 from refgi.pairs.irradiance import Receivers, checked, irradiance, over_receivers
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.ranged_sum import LANES, sum_pairs_in_range, sum_weighted_pairs
+from refgi.pairs.settings import GeometryClamp
 from refgi.pairs.sphere_sum import sum_spheres
+from refgi.splat.sii.compensation import screen_compensation
 from refgi.splat.sii.half_resolution import half_resolution
 from refgi.splat.sii.reach.lists import EVERY, LightLists, Some, listed_pairs
 from refgi.splat.sii.reach.threshold import warn_of_cut, with_reference_length
 from refgi.splat.sii.settings import SiiSettings
+from refgi.splat.sii.storage import as_stored
 from refgi.stages import skip, stage, tally
 from refgi.types import Array
 
@@ -51,6 +54,7 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     lights = choose_lights(frame, settings.lights)  # Sec. 3.1, 3.5 to 3.7
     footprint = footprints(frame, settings.lights, settings.pairs)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))  # Sec. 3.2: deferred shading
+    receivers, lights = as_stored(receivers, lights, settings)  # Sec. 4
 
     resolved = with_reference_length(receivers, lights, settings)
 
@@ -59,10 +63,15 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
 
     light = half_resolution(receivers, evaluate) if settings.half_resolution else evaluate(receivers)
     some = (lights, footprint) if settings.lightcuts is None else thinned(lights, footprint)
-    warn_of_clamp(receivers, some[0], settings.pairs, some[1], "sii")
+    if settings.compensation == "none":
+        warn_of_clamp(receivers, some[0], settings.pairs, some[1], "sii")
     warn_of_cut(light, receivers, lights, resolved, footprint)
     report_sampling(frame, receivers, lights, settings.pairs, footprint, "sii",
                     all_summed=settings.lightcuts is None)
+    clamp = settings.pairs.clamp
+    if settings.compensation == "screen" and isinstance(clamp, GeometryClamp) and clamp.value is not None:
+        depth, normal, albedo = frame.gbuffer.resolve("depth", "normal", "albedo")
+        light = light + screen_compensation(depth, normal, albedo, frame.direct, frame.gbuffer.projection, clamp.value)
     return occluded(frame, light, settings.ambient_occlusion, settings.lights.seed)
 
 

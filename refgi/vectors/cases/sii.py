@@ -59,6 +59,8 @@ FULL_PLANS: Plans = {
                                 coloured(room(SPOT, BULB)), (24, 18), 13, 18, {"seed": 1}),
     "sii-occluded": lambda: Plan("ambient occlusion of receivers; openness is given", room(SPOT), (24, 18), 13, 18,
                                  {"ambient_occlusion": "openness", "ambient_occlusion.radius": 1.0}),
+    "sii-bytes": lambda: Plan("places in half floats, directions and flux in 8 bits, as in the published textures",
+                              room(SPOT, BULB), (17, 13), 13, 20, {"seed": 1, "quantisation": "published"}),
     "sii-large": lambda: Plan("64 x 48 pixels, 256 lights of two lamps", room(SPOT, BULB), (64, 48), 48, 128,
                               {"seed": 1, "warp": "A"}),
 }

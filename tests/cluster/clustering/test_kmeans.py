@@ -36,7 +36,7 @@ def box(diagonal):
     return np.array([[0.0, 0, 0], [diagonal, 0, 0]])
 
 
-@pytest.mark.feature("VAL-05")
+@pytest.mark.feature("VAL-05", "VAL-08", "VAL-25")
 @pytest.mark.parametrize("mode", MODES)
 def test_the_rounds_are_those_of_the_literal_text(mode, evidence):
     lights = 0

@@ -46,7 +46,7 @@ def shadow(areas, maps, points, normals, **settings):
     return visibility(maps, areas, 0, points, normals, of(ValSettings, **scale | settings))
 
 
-@pytest.mark.feature("VAL-12")
+@pytest.mark.feature("VAL-12", "VAL-13", "VAL-14")
 @pytest.mark.parametrize("axial", [True, False])
 @pytest.mark.parametrize("plane", [True, False])
 @pytest.mark.parametrize("cone", [True, False])

@@ -6,6 +6,7 @@ What the literal text has no word for: random shares of the threshold, and meshe
 import numpy as np
 
 from refgi.literal import sii as literal
+from refgi.literal.hssil_levels import first_level
 from refgi.literal.upsampling import joint_bilateral
 from refgi.settings import replaced
 from tests.literal.whole.pairs import irradiance_of, occluded_of, sent
@@ -35,6 +36,20 @@ def picture(frame, settings, lights, footprint, share):
         for part, weight in zip(parts, weights(frame, settings, lights), strict=False))
     surfaces = buffer.position, buffer.normal, buffer.covered
     return joint_bilateral(*surfaces, result) if settings.half_resolution else result
+
+
+def compensation(frame, bound):
+    """Return the sum (3, h, w) of L ds max(0, G - b) over all pixels: literal senders, pair by pair."""
+    view, shown = frame.gbuffer.projection, frame.gbuffer.covered
+    _, _, n, radiance, area, *_ = first_level(*frame.gbuffer.resolve("depth", "normal", "albedo"), frame.direct,
+                                              view.frame, view.half, 0)
+    x, result = frame.gbuffer.position[:, shown], np.zeros(frame.direct.shape)
+    d = x[:, None] - x[..., None]
+    square = (d**2).sum(axis=0)
+    cx, cl = (n[:, shown][..., None] * d).sum(axis=0), -(n[:, shown][:, None] * d).sum(axis=0)
+    term = np.divide(np.maximum(cx, 0) * np.maximum(cl, 0), square**2, out=np.zeros_like(square), where=square > 0)
+    result[:, shown] = (radiance * area)[:, shown] @ np.maximum(term - bound, 0).T
+    return result
 
 
 def fragments(frame, settings, lights):

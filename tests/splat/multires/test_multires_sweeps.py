@@ -17,6 +17,8 @@ from refgi.settings import of, replaced
 from refgi.splat.multires.multires import multires, shared_subsplats
 from refgi.splat.multires.settings import MultiresSettings
 from refgi.stages import observe
+from tests.literal.whole import multires as literal
+from tests.literal.whole.pairs import irradiance_of
 from tests.naive import eq2
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
@@ -215,7 +217,10 @@ def test_subsplats_along_a_flight(evidence):
         eye = np.array((0.3, 0.5, 1.6)) + k / 7 * np.array((0.0, -0.2, -1.5))
         seen = scene.with_camera(eye=tuple(eye), target=(eye[0] - 0.3, 0.15, eye[2] - 1.2))
         frame = Frame(seen, width=128, height=128)
-        leaves = shared_subsplats(frame.gbuffer, MultiresSettings().subsplats)
+        settings = MultiresSettings().subsplats
+        leaves = shared_subsplats(frame.gbuffer, settings)
+        level, *_ = literal.shared_list(frame.gbuffer, settings.criteria, leaves.top, settings.finest)
+        np.testing.assert_array_equal(leaves.counts, np.bincount(level, minlength=leaves.top + 1))
         series.append(int(leaves.counts.sum()))
     assert max(series) > 2 * min(series)
     evidence(f"subsplats {', '.join(map(str, series))}: most over least {max(series) / min(series):.2f}")
@@ -232,6 +237,13 @@ def test_flicker_falls_with_the_number_of_lights(evidence):
     def light(**changes):
         return np.stack([multires(f, clamped(f, 0.04, coarsest=EVERY_PIXEL, **changes)) for f in frames])
 
+    few = light(lights=64)
+    for frame, picture in zip(frames, few, strict=True):
+        lights, covered = choose_lights(frame, of(MultiresSettings, lights=64).lights), frame.gbuffer.covered
+        points = (plane[:, covered].astype(float) for plane in (frame.gbuffer.position, frame.gbuffer.normal))
+        (expected,) = irradiance_of(*points, lights, clamped(frame, 0.04).pairs)
+        assert all((place % 16 == 8).all() for place in np.divmod(lights.texel, 128))  # middles of 8 x 8 cells
+        np.testing.assert_allclose(picture[:, covered], expected.sum(axis=1), rtol=PAIR_SUM, atol=PAIR_SUM * few.max())
     smooth = light(pattern="all")
     found = {n: 100 * np.abs(np.diff(light(lights=n * n) - smooth, axis=0)).mean() / smooth.mean()
              for n in (8, 16, 32, 64)}

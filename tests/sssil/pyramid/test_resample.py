@@ -33,6 +33,7 @@ def flux(level):
     return (level.radiance.astype(float) * level.area).sum(axis=(1, 2))
 
 
+@pytest.mark.feature("HSS-09")
 @pytest.mark.parametrize("start", ["full", "half", "quarter"])
 def test_every_level_sends_the_flux_of_the_pixels(frame, start, evidence):
     pixels = levels_of(frame, start="full", downsample="closest")[0][0]
@@ -43,6 +44,7 @@ def test_every_level_sends_the_flux_of_the_pixels(frame, start, evidence):
     evidence(f"from {start}: flux of each level over that of the pixels is 1 to 1e-5; of the closest {grown}")
 
 
+@pytest.mark.feature("HSS-09")
 def test_a_sender_is_one_of_its_pixels(frame):
     _, senders = levels_of(frame, seed=3)
     position, normal = frame.gbuffer.resolve("position", "normal")
@@ -56,6 +58,7 @@ def test_a_sender_is_one_of_its_pixels(frame):
         np.testing.assert_allclose(level.position[:, rows, columns] + eye[:, None], position[:, row, column], atol=2e-6)
 
 
+@pytest.mark.feature("HSS-09")
 def test_the_place_is_unbiased(frame, evidence):
     """Statistical: the mean place of senders, weighted by flux, is that of pixels, within 4 standard errors."""
     pixels = levels_of(frame, start="full", downsample="closest")[0][0]

@@ -95,6 +95,7 @@ PLATE = ((-0.6, -0.2, 2.0), (0.5, 0.9, 2.2))
 CASES = [("interleaved", "disc", 0), ("row", "disc", 0), ("fixed", "point", 1), ("pixel", "disc", 1)]
 
 
+@pytest.mark.feature("HSS-17")
 @pytest.mark.parametrize(("pattern", "form", "index"), CASES)
 def test_twin(pattern, form, index):
     settings = replaced(SETTINGS, {"pattern": pattern, "form_factor": form})
@@ -140,6 +141,7 @@ def test_nothing_blocks_in_a_convex_room(evidence):
 LOST_TO_ROUNDED_OFFSETS = 0.005  # samples of a slice lie up to half a texel beside it: its cut is not quite convex
 
 
+@pytest.mark.feature("HSS-17")
 @pytest.mark.parametrize(("thickness", "lamp_height", "share"), [(0.0, 0.2, 1), (3.0, 0.2, 0), (3.0, 3.5, 1)])
 def test_a_post_hides_the_lamp_behind_it(thickness, lamp_height, share):
     """A floor, a post's upper end before it and a lamp: the post reaches down to the floor where it is thick."""

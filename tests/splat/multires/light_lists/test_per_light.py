@@ -122,6 +122,7 @@ def brightest_sum(buffer, lights, top):
     return float(irradiance(points, lights, unclamped(widening=WIDENING).effective_pairs).max())
 
 
+@pytest.mark.feature("AMS-08")
 @pytest.mark.parametrize("finest", [0, 1])
 @pytest.mark.parametrize("form", ["absolute", "relative", "brightest"])
 def test_lists_are_the_published_ones(form, finest):
@@ -137,6 +138,7 @@ def test_lists_are_the_published_ones(form, finest):
     np.testing.assert_allclose(summed(buffer, lights, settings), expected, rtol=TWIN, atol=TWIN * expected.max())
 
 
+@pytest.mark.feature("AMS-08")
 def test_lists_go_on_from_the_shared_one():
     """Oracle: the pseudo-code with the cells that the shared list refines."""
     buffer, lights = wall(21, 30, holes=0.15), lamps(5)

@@ -8,8 +8,8 @@ from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.util import logging
 
 LONG = 24  # characters of an inline formula from which on it may scroll on a narrow screen
-# plain braces, brackets and bars are as high as a line; a minus behind them or a sign belongs to what follows
-PLAIN = re.compile(r"<mo>([{}⟨⟩‖|])</mo>")
+# plain braces, brackets and bars are as high as a line, bars without space; a minus behind a sign is one itself
+PLAIN, BAR = re.compile(r"<mo>(?=[{}⟨⟩‖|]</mo>)"), re.compile(r"<mo[^>]*>(?=[‖|]</mo>)")
 SIGN = re.compile(r"(<mo[^>]*>[({⟨,=⋅]</mo>\s*<mo)(?=>\u2212</mo>)")
 
 logger = logging.getLogger(__name__)
@@ -35,7 +35,8 @@ def converted(node: nodes.math | nodes.math_block, as_block: bool) -> str:
     except (SyntaxError, IndexError, KeyError, ValueError) as error:
         logger.warning("no MathML of %r: %s", node.astext(), error, location=node)
         return f"<code>{node.astext()}</code>"
-    return SIGN.sub(r'\1 form="prefix"', PLAIN.sub(r'<mo stretchy="false">\1</mo>', made))
+    plain = BAR.sub('<mo stretchy="false" lspace="0" rspace="0">', PLAIN.sub('<mo stretchy="false">', made))
+    return SIGN.sub(r'\1 form="prefix"', plain)
 
 
 def setup(app: Any) -> dict[str, bool]:

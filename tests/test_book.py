@@ -51,6 +51,7 @@ def sphinx(*arguments):
     done = subprocess.run([sys.executable, "-m", "sphinx", "-q", "-b", "html", *map(str, arguments)], check=False,
                           capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)})
     assert done.returncode == 0, done.stderr
+    assert "no MathML" not in done.stderr, done.stderr
 
 
 @pytest.fixture(scope="module")

@@ -2,22 +2,32 @@
 
 import inspect
 import re
+import sys
+from pathlib import Path
 from typing import Any
 
 from refgi import __version__
 from refgi.vectors.docstrings import documented
 
+sys.path.insert(0, str(Path(__file__).parent))  # mathml.py
+
 project = "refgi"
 author = "the refgi authors"
 release = __version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "numpydoc"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "numpydoc", "sphinx_copybutton", "mathml"]
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
 myst_heading_anchors = 3
 numpydoc_show_class_members = False
 autodoc_default_options = {"members": True, "member-order": "bysource"}
 autodoc_typehints = "none"
-html_theme = "alabaster"
-html_theme_options = {"description": release, "page_width": "1100px"}
+html_theme = "furo"
+html_title = f"refgi {release}"
+html_static_path = ["_static"]
+html_css_files = ["book.css"]
+html_copy_source = False
+html_show_copyright = False
+html_math_renderer = "mathml"
+toc_object_entries = False  # the thousand names of api.md would be copied into every page
 exclude_patterns = ["_build"]
 suppress_warnings = ["myst.header"]
 

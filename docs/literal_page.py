@@ -1,18 +1,22 @@
-"""Write docs/literal.md: every function of refgi/literal, what it says, and the tests that know it from elsewhere.
+"""Write docs/literal.md and docs/equations.md: `python docs/literal_page.py`.
 
-`python docs/literal_page.py` writes the page from docstrings and from the names that tests in tests/literal use.
+The first has every function of refgi/literal, what it says, and the tests that know it from elsewhere, from docstrings
+and from the names that tests in tests/literal use; the second every printed equation with its functions.
 """
 
 import ast
 import inspect
 import re
+import tomllib
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
+from typing import Any
 
 import refgi.literal
 
 PAGE, TESTS = Path(__file__).with_name("literal.md"), Path(__file__).parents[1] / "tests" / "literal"
+EQUATIONS, ROWS = PAGE.with_name("equations.md"), PAGE.with_name("equations.toml")
 SHOWN = 2  # tests by name
 HEAD = """# The papers as plain NumPy
 
@@ -33,6 +37,18 @@ over pixel lights, rectangles of area lights, and the blur and upsampling of lev
 This page is made by `python docs/literal_page.py`.
 """
 
+PAPERS = {"SII": "Splatting Indirect Illumination (2006)", "AMS": "Adaptive multiresolution splatting (2009)",
+          "VAL": "Clustered visibility (2009)", "HSS": "Hierarchical screen-space indirect illumination (2009)"}
+EQUATIONS_HEAD = """# Equations
+
+Each equation of the four papers once: as printed, as refgi has it where that is another form ([why](errata.md)), the
+lines that say it in plain NumPy, the kernel that computes it, and tests that know the lines from elsewhere
+(`tests/literal`). [](literal.md) lists all functions of `refgi/literal`; steps of the papers without an equation stand
+in the tables of the methods' pages. Symbols are the papers' own.
+
+This page is made by `python docs/literal_page.py` from `docs/equations.toml`.
+"""
+
 
 def page() -> str:
     """Return the page."""
@@ -44,6 +60,34 @@ def page() -> str:
         lines += [f"| `{one.__name__}` | {summary(one)} | {some_of(tests)} |" for one, tests in functions(name)]
         lines.append("")
     return "\n".join(lines)
+
+
+def equations_page() -> str:
+    """Return the page of the papers' equations."""
+    rows = tomllib.loads(ROWS.read_text(encoding="utf-8"))["equation"]
+    lines = [EQUATIONS_HEAD]
+    for short, title in PAPERS.items():
+        lines += [f"## {title}", "", *(line for row in rows if row["name"].startswith(short) for line in equation(row))]
+    return "\n".join(lines)
+
+
+def equation(row: dict[str, Any]) -> list[str]:
+    """Return the lines of one equation."""
+    said = [f"In print, {row['what']}:", "", f"$${row['printed']}$$", "",
+            *(["Here:", "", f"$${row['here']}$$", ""] if "here" in row else [])]
+    tests = {test: None for one in row["literal"] for test in tests_of_function(one)}
+    facts = {"kernel": ", ".join(f"`{one}`" for one in row["kernel"]), "tests": some_of(list(tests)),
+             "gaps and misprints": ", ".join(f"[{one}](errata.md)" for one in row.get("errata", ()))}
+    shown = [line for module, name in (one.split(".") for one in row["literal"])
+             for line in ("```{literalinclude} ../refgi/literal/" + f"{module}.py", f":pyobject: {name}",
+                          ":class: narrow", "```", "")]
+    return [f"### {row['name']}", "", *said, *shown, *(f"- {name}: {fact}" for name, fact in facts.items() if fact), ""]
+
+
+def tests_of_function(name: str) -> list[str]:
+    """Return the tests that reach a literal function, by its module and name."""
+    module, _, function = name.partition(".")
+    return next(tests for one, tests in functions(module) if one.__name__ == function)
 
 
 def some_of(tests: list[str]) -> str:
@@ -109,3 +153,4 @@ def summary(thing: object) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")
+    EQUATIONS.write_text(equations_page(), encoding="utf-8")

@@ -27,7 +27,7 @@ SMALLER = {
 def examples(text):
     """Lines of fenced blocks that start with `refgi`, as a shell splits them."""
     blocks = re.findall(r"^```[^\n]*\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-    lines = [line for block in blocks for line in block.splitlines() if line.startswith("refgi ")]
+    lines = [line for block in blocks for line in block.replace("\\\n", "").splitlines() if line.startswith("refgi ")]
     return [shlex.split(line, comments=True)[1:] for line in lines]
 
 
@@ -59,7 +59,7 @@ def test_every_example_runs_as_printed(clone, evidence):
 
 
 def test_the_examples_of_a_text_are_found():
-    text = "refgi no\n```\nrefgi a 'b c'  # why\nmake\n```\n```python\nimport refgi\n```\n```sh\nrefgi d\n```\n"
+    text = "refgi no\n```\nrefgi a \\\n    'b c'  # why\nmake\n```\n```python\nimport refgi\n```\n```sh\nrefgi d\n```\n"
     assert examples(text) == [["a", "b c"], ["d"]]
 
 

@@ -1,7 +1,8 @@
-"""Property tests of pages that programs make: docs/stages.md and docs/literal.md are what they make of the code."""
+"""Property tests of pages that programs make: docs/stages.md, literal.md and equations.md are what they make of it."""
 
 import importlib.util
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,25 @@ def test_the_page_of_the_literal_text_is_that_of_the_code():
     assert (DOCS / "literal.md").read_text(encoding="utf-8") == literal.page(), "run python docs/literal_page.py"
 
 
+def test_the_page_of_equations_is_that_of_the_code():
+    literal = loaded("literal_page")
+    assert (DOCS / "equations.md").read_text(encoding="utf-8") == literal.equations_page(), \
+        "run python docs/literal_page.py"
+
+
+def test_every_numbered_equation_has_lines_a_kernel_and_a_test_that_knows_it(evidence):
+    literal = loaded("literal_page")
+    rows = {row["name"]: row for row in tomllib.loads((DOCS / "equations.toml").read_text("utf-8"))["equation"]}
+    numbered = [re.fullmatch(r"(\w+) Eq\. (\d)(?: (?:to|and) (\d))?", name) for name in rows]
+    numbers = [(one[1], number) for one in numbered if one for number in range(int(one[2]), int(one[3] or one[2]) + 1)]
+    assert sorted(numbers) == sorted([*(("SII", k) for k in range(1, 9)), *(("AMS", k) for k in range(1, 4)),
+                                      *(("HSS", k) for k in range(1, 5))])
+    kernels = {one for row in rows.values() for one in row["kernel"]}
+    assert [one for one in sorted(kernels) if not is_there(f"refgi.{one}")] == []
+    assert [name for name, row in rows.items() if not any(map(literal.tests_of_function, row["literal"]))] == []
+    evidence(f"{len(rows)} printed equations, {len(kernels)} kernels")
+
+
 def test_few_literal_functions_lack_a_test_that_knows_them_from_elsewhere(evidence):
     literal = loaded("literal_page")
     tests = {f"{module}.{one.__name__}": found for module in literal.order()
@@ -46,3 +66,24 @@ def test_literal_functions_that_methods_pages_name_are_there():
         importlib.import_module(f"refgi.literal.{one.partition('.')[0]}"), one.partition(".")[2])]
     assert missing == []
     assert len(named) > 40
+
+
+@pytest.mark.parametrize(("page", "packages"), {
+    "sii": ("",), "multires": ("", "splat.multires."), "val": ("", "cluster.", "cluster.filters."),
+    "hssil": ("", "sssil.", "sssil.crown.")}.items())
+def test_functions_that_methods_pages_name_beside_the_paper_are_there(page, packages):
+    rows = re.findall(r"^\| .*? \| (.*?) \| .* \|$", (DOCS / "methods" / f"{page}.md").read_text("utf-8"), re.MULTILINE)
+    named = {one for cell in rows for one in re.findall(r"`([a-z]\w*(?:\.\w+)+)[`(]", cell)}
+    assert [one for one in sorted(named) if not any(is_there(f"refgi.{package}{one}") for package in packages)] == []
+
+
+def is_there(name):
+    """Whether a dotted name is a module or something in one."""
+    module, _, last = name.rpartition(".")
+    for one, rest in ((name, ()), (module, (last,))):
+        try:
+            found = importlib.import_module(one)
+        except ModuleNotFoundError:
+            continue
+        return all(hasattr(found, attribute) for attribute in rest)
+    return False

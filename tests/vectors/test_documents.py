@@ -17,7 +17,7 @@ from refgi.vectors.options import OPTIONS
 from tests.vectors.port import Port
 
 ROOT = Path(__file__).parents[2]
-DOCUMENTS = {name: (ROOT / name).read_text(encoding="utf-8")
+DOCUMENTS = {name: (ROOT / name).read_text(encoding="utf-8").replace("\\\n", "")
              for name in ("docs/vectors.md", "refgi/vectors/files/README.md")}
 CASE = "sii-halton"  # to which each check is narrowed
 

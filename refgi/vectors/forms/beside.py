@@ -17,6 +17,9 @@ Arguments = Mapping[str, Any]
 Names = Mapping[str, str]  # leaf of a stage's parameters or output: the case's name of that array
 
 
+MOST_WORK = 100_000_000  # a second or two for each likely bug, and some GB
+
+
 @dataclass(frozen=True)
 class Described:
     """What a run of a stage has beside its function; arrays by leaf: parameter or field of the output."""
@@ -32,6 +35,7 @@ class Described:
     variants: tuple[Callable[[Run, Names, Names], Run], ...] = ()  # other ways, of the stage, what it reads and writes
     bugs: tuple[Callable[[Run, Names, Names], tuple[Bug, ...]], ...] = ()  # those that are no rows, likewise
     without: tuple[str, ...] = ()  # words of causes of rows that cannot show
+    work: int = 0  # of the form: triangles times texels; rows are left out beyond `MOST_WORK`
 
 
 def form_of(

@@ -73,8 +73,9 @@ def depth_maps(arguments: Arguments) -> Described:
     usual = arguments["renderer"] == "raster" and arguments["near_geometry"] == "ball"
     if not usual or arguments["geometry"].cut is not None:
         return Described(exact=exact)
+    work = arguments["blocks"].sum() * len(arguments["center"]) * arguments["texels"] ** 2
     return Described(form_of(val_maps.depth_maps, arguments, others=MESH), own("depth_maps", "depth_maps/ahead"), exact,
-                     facts={"projection": "paraboloid (x, y) / (1 + z)"})
+                     facts={"projection": "paraboloid (x, y) / (1 + z)"}, work=work)
 
 
 def interleaving(arguments: Arguments) -> Described:

@@ -24,7 +24,7 @@ from refgi.settings import flat
 from refgi.types import Array
 from refgi.vectors.docstrings import field_description, returned, spec_of, summary, taken
 from refgi.vectors.forms import described
-from refgi.vectors.forms.beside import MOST_WORK, Described
+from refgi.vectors.forms.beside import MOST_WORK, NO_BUGS, Described
 from refgi.vectors.inputs import input_spec
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Arrays, Bug, Case, Run, Spec
@@ -201,7 +201,7 @@ def _add(
                exact=tuple(reads[leaf] for leaf in beside.exact), **_beside(beside, stage, reads, writes))
     numbers = plain({key: value for key, value in arguments.items() if not isinstance(value, str) or value})
     if beside.work > MOST_WORK:
-        numbers["likely bugs"] = f"left out: their text would handle {beside.work:.0e} triangles times texels"
+        numbers[NO_BUGS] = f"left out: their text would handle {beside.work:.0e} triangles times texels"
     if numbers or beside.facts:
         recipe.facts[name] = {**numbers, **beside.facts}
     recipe.factors |= {f"{what} of {name}": float(value) for what, value in beside.factors.items()}

@@ -17,7 +17,11 @@ Arguments = Mapping[str, Any]
 Names = Mapping[str, str]  # leaf of a stage's parameters or output: the case's name of that array
 
 
-MOST_WORK = 100_000_000  # a second or two for each likely bug, and some GB
+# a unit direction by the inverse of its length, as many machines divide
+BY_INVERSE = (("w = np.divide(d, r, out=np.zeros_like(d), where=r > 0)",
+               "w = d * np.divide(1, r, out=np.zeros_like(r), where=r > 0)"),)
+NO_BUGS = "likely bugs"  # fact of a stage that has none, and why
+MOST_WORK = 10_000_000  # half a second for each likely bug, and some hundred MB
 
 
 @dataclass(frozen=True)

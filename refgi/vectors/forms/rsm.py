@@ -35,6 +35,9 @@ BY_SHARES = ("position = o + depth * d",
 RAYS = (IN_FLOAT32,), (IN_FLOAT32, MOELLER), (IN_FLOAT32, MOELLER, BY_SHARES)  # a surface found otherwise
 
 
+SIDES_IN_FLOAT32 = ("x0, x1 = ((2 * (column + end) / columns - 1)",
+                    "row, column = row.astype(np.float32), column.astype(np.float32); "
+                    "x0, x1 = ((2 * (column + end) / columns - 1)")
 SNAP = 1 / 32  # of a texel: by what OpenGL may move a corner at its coarsest (SUBPIXEL_BITS of 4), float32's edges less
 
 
@@ -106,7 +109,8 @@ def reflected_flux(arguments: Arguments) -> Described:
                  *(("buffers", one) for one in (*(("view/frame",) if glossy else ()),
                                                 *(("view/cube rows",) if cube else ()),
                                                 *(("view/cube",) if glossy and cube else ()))))
-    return Described(form, lists, facts=facts, variants=(summed_in_float32,) if spot else ())
+    single = written(form, (SIDES_IN_FLOAT32,))
+    return Described(form, lists, facts=facts, variants=(summed_in_float32, *single) if spot else single)
 
 
 def summed_in_float32(stage: Run, reads: Names, writes: Names) -> Run:  # noqa: ARG001

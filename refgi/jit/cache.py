@@ -5,6 +5,8 @@ behind. Here the key covers the kernel's own bytecode and constants, the kernels
 reads, and versions and sources of what compiles it; comments, docstrings, line numbers and the rest of its module are
 no part of it. Intrinsics, and overloads registered by `refgi.jit.by_type`, count with their code as well.
 
+Of processes that want the same kernel at once one compiles it, and the others wait: they lock a byte of a file, `LOCK`.
+
 One file holds one specialisation of one kernel. Its name says the kernel, the key of its code (`code_key`) and a hash
 of the argument types, and nothing about where the sources lie or when they were written. What is in it stands in
 `refgi.jit.kernelfile`; one that is damaged, even inside machine code, counts as absent and is written anew.
@@ -143,6 +145,7 @@ def _is_library(module: str) -> bool:
 
 
 FOLDER = "REFGI_CACHE_DIR"
+LOCK = ".lock"  # empty; a specialisation has one byte of it, by the hash of its name
 ANOTHER_CAN_WRITE = 0o022  # bits of a mode: group and others
 
 sigutils: Any = untyped_sigutils
@@ -181,6 +184,20 @@ class KernelCache:
         mark = hashlib.sha256(FORMAT + text.encode()).hexdigest()[:16]
         return _usable(cache_root()) / f"{name}-{_code_key(self._function)}-{mark}.kernel"
 
+    @contextlib.contextmanager
+    def made_by_one(self, signature: Any) -> Iterator[None]:
+        """Let one process at a time make a specialisation; others wait, and then find it on the disk."""
+        path = self.path(signature)
+        if path.exists() or (lock := _lock(path.parent)) is None:
+            yield
+            return
+        byte = int.from_bytes(hashlib.sha256(path.name.encode()).digest()[:6])
+        lock(True, byte)
+        try:
+            yield
+        finally:
+            lock(False, byte)
+
     def load_overload(self, signature: Any, target: Any) -> Any:
         """Return a specialisation, or None where there is none that can be used."""
         path = self.path(signature)
@@ -214,6 +231,23 @@ class KernelCache:
             if temporary is not None:
                 with contextlib.suppress(OSError):
                     temporary.unlink(missing_ok=True)
+
+
+@cache
+def _lock(folder: Path) -> Callable[[bool, int], None] | None:
+    """Return what locks and unlocks a byte of the folder's lock file, None where there are no such locks."""
+    try:
+        import fcntl
+
+        file = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o600)  # open as long as the process: closing unlocks
+    except (ImportError, OSError):
+        return None
+
+    def call(taken: bool, byte: int) -> None:
+        with contextlib.suppress(OSError):  # without a lock both make it, and the second file takes the place
+            fcntl.lockf(file, fcntl.LOCK_EX if taken else fcntl.LOCK_UN, 1, byte)
+
+    return call
 
 
 def _own_bytes(path: Path) -> bytes | None:

@@ -157,7 +157,8 @@ class Kernel(CPUDispatcher):
         collecting = gc.isenabled()
         gc.disable()  # a compiler makes millions of objects and no garbage of size: a tenth of its time
         try:
-            return super().compile(signature)
+            with self._cache.made_by_one(signature):
+                return super().compile(signature)
         finally:
             if collecting:
                 gc.enable()

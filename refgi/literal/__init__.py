@@ -12,8 +12,17 @@ This is what each equation says; kernels say how it is fast, and never import it
 methods, to step through: `sii.sii`, `multires_splatting.multires`, `val.val`, `hssil.hssil`.
 
 Vectors are arrays whose first axis is x, y, z (or red, green, blue); metres, watts, radians, linear RGB. Arithmetic is
-in the type of the arrays. Which variant and number is the default stands in the settings (`refgi settings METHOD`), not
-here; E-SII-02 and its like are errata of the papers (docs/errata), VAL-03 and its like features (docs/features).
+in the type of the arrays. E-SII-02 and its like are errata of the papers (docs/errata), VAL-03 and its like features
+(docs/features). Which variant and number is the default stands in the settings (`refgi settings METHOD`); these count
+most:
+
+- sii: pairs.clamp=auto, `area` bounds each pair; reach.cut=none, all pairs are summed; lights.source.warp=none.
+- multires: subsplats.criteria.depth.measure=relative, subsplats.criteria.depth.threshold=0.1,
+  subsplats.criteria.normal.threshold=0.25, subsplats.criteria.rim=0, subsplats.coarsest=16.
+- val: clusters.distance=normalised, clusters.position_weight=0.7, clusters.normal_weight=0.3, clusters.rounds=50,
+  clusters.count=30, visibility=csm, visibility.terms=4, maps.resolution=256.
+- hssil: sampling.radius=20.0, sampling.samples=64, sampling.levels=4, sampling.start=half, upsampling.depth_sigma=0.02,
+  upsampling.normal_power=8.0; from frame to frame a share of 0.9 of the light before.
 
 Beside each file lie its likely bugs, `*.bugs`: one row each, an edit of one line (`refgi.vectors.rows`).
 """

@@ -2,7 +2,8 @@
 
 Symbols: r inner radius of the crown, texels; (u, v) point of the unit square: u says how far from the receiver, 2 pi v
 in which direction; x, n receiver and its normal; y, m sender and its normal; L its radiance, W/m^2/sr; ds surface that
-a sample stands for, m^2; E irradiance, W/m^2. Offsets are (right, down), in texels of the level.
+a sample stands for, m^2; E irradiance, W/m^2. Offsets are (right, down), in texels of the level, r the same on all of
+them; the finest alone also has the disc within r.
 """
 
 import math

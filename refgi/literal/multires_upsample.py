@@ -2,7 +2,8 @@
 
 Each layer of the illumination buffer holds all of a cell's light or none: interpolated by itself it makes halos and
 rings (Fig. 7). So the light of the coarser level is doubled, cells that were evaluated at this level (leaves) are
-inserted, the result is filtered among the cells that hold light, down to the pixels.
+inserted, the result is filtered among the cells that hold light, down to the pixels. At an edge of depth only
+the cells that were refined there keep light apart: no weight knows depths or normals.
 
 Symbols: C light of a cell, W/m^2; m 1 where it holds any; w weight; level, row, column (n,) and irradiance (3, n) of
 the list of subsplats; `at` the level at hand.

@@ -1,7 +1,8 @@
 """One pixel light at one receiver, and their sum (SII Sec. 3, Eq. 2 and 3).
 
 Symbols: x, n receiver and its normal; p, m pixel light and its normal; w unit direction from p to x; r its distance;
-flux Phi (3,) W; lobe: flux, axis, exponent P; A the surface that a light stands for, m^2.
+flux Phi (3,) W; lobe: flux, axis, exponent P; A the surface that a light stands for, m^2. A bounds a pair near its
+light as a disc of that area does; without it, as printed, nothing does.
 """
 
 from functools import cache

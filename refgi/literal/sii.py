@@ -137,7 +137,8 @@ def range_sum(
 def ellipsoids(exponent: Any) -> Any:
     """Return centre, half width and height (n,) in R_0 of two bounds each of B >= I_low for cos^n: Eq. 8's, tangent's.
 
-    Ellipsoids of revolution about the light's axis; the tangent one touches the region at x_0 and meets the light.
+    Ellipsoids of revolution about the light's axis, along which half the width lies; the diffuse part has n = 1. The
+    tangent one touches the region at x_0 and meets the light. They bound what is drawn, and change no sum.
     """
     n = exponent.astype(np.float64)  # k below falls as 1/n
     # Eq. (8)

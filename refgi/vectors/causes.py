@@ -206,7 +206,7 @@ def _axes(difference: Difference) -> Iterator[tuple[str, Array]]:
             yield "rows and columns are exchanged", np.swapaxes(expected, row, column)
         turned = np.swapaxes(expected, row, column)
         yield "written column by column instead of row by row", turned.reshape(expected.shape)
-    if names[0] in ("xyz", "rgb"):
+    if names[0] in ("xyz", "rgb") and len(expected) == len(names[0]):
         yield "components lie beside each other (h, w, 3) instead of in planes (3, h, w)", np.moveaxis(
             expected, 0, -1).reshape(expected.shape)
         yield ("vectors take 4 numbers each, as a vec3 of std430 does, and are read as planes",

@@ -8,7 +8,7 @@ import pydantic
 
 from refgi.errors import InputError, shortened
 
-VERSION = "2.0.0"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
+VERSION = "2.0.1"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
 # a case, a major changes what an array means or its name
 KIT, CASE, RESULT = "kit.json", "manifest.json", "result.json"
 

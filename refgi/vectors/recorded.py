@@ -24,7 +24,7 @@ from refgi.settings import flat
 from refgi.types import Array
 from refgi.vectors.docstrings import field_description, returned, spec_of, summary, taken
 from refgi.vectors.forms import described
-from refgi.vectors.forms.beside import Described
+from refgi.vectors.forms.beside import MOST_WORK, NO_BUGS, Described
 from refgi.vectors.inputs import input_spec
 from refgi.vectors.recipe import Recipe
 from refgi.vectors.spec import Arrays, Bug, Case, Run, Spec
@@ -202,6 +202,8 @@ def _add(
                paper=beside.paper or paper or f"{function.__module__}.{function.__name__}",
                exact=tuple(reads[leaf] for leaf in beside.exact), **_beside(beside, stage, reads, writes))
     numbers = plain({key: value for key, value in arguments.items() if not isinstance(value, str) or value})
+    if beside.work > MOST_WORK:
+        numbers[NO_BUGS] = f"left out: their text would handle {beside.work:.0e} triangles times texels"
     if numbers or beside.facts:
         recipe.facts[name] = {**numbers, **beside.facts}
     recipe.factors |= {f"{what} of {name}": float(value) for what, value in beside.factors.items()}
@@ -211,7 +213,7 @@ def _add(
 def _beside(beside: Described, stage: Run, reads: Mapping[str, str], writes: Mapping[str, str]) -> dict[str, Any]:
     """Return the likely bugs and other ways of a stage by the names that a case has for its arrays."""
     bugs, variants = tuple[Bug, ...](), tuple[Run, ...]()
-    if beside.form is not None:
+    if beside.form is not None and beside.work <= MOST_WORK:
         form = beside.form.named(reads, writes)
         rows = (bug for module, name, *most in beside.lists for bug in form.bugs(name, of=module)[:most[0] if most else
                                                                                               None])

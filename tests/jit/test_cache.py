@@ -98,7 +98,7 @@ def test_a_damaged_cache_is_dropped_and_rebuilt(compiled, damage):
 
 
 def test_only_entry_points_are_kept(once):
-    assert [path.name.partition("-")[0] for path in (once.parent / "cache").iterdir()] == ["outer.outer"]
+    assert [path.name.partition("-")[0] for path in (once.parent / "cache").glob("*.kernel")] == ["outer.outer"]
 
 
 def test_a_folder_that_cannot_be_written_is_named(package):
@@ -169,7 +169,7 @@ def test_a_folder_that_others_can_write_is_refused(compiled, bits):
 
 
 def test_a_kernel_that_others_can_write_is_not_run(compiled):
-    file, = (compiled.parent / "cache").iterdir()
+    file, = (compiled.parent / "cache").glob("*.kernel")
     file.chmod(0o620)
     assert run(compiled, "other users can write to it: this compiled kernel is not run") == "5.0 0"
     assert mode(file) == 0o600
@@ -180,13 +180,33 @@ def test_a_kernel_that_others_can_write_is_not_run(compiled):
 @pytest.mark.parametrize("what", ["file", "folder"])
 def test_what_another_user_owns_is_not_run(compiled, what):
     folder = compiled.parent / "cache"
-    file, = folder.iterdir()
+    file, = folder.glob("*.kernel")
     os.chown(folder if what == "folder" else file, 65534, 65534)
     said = f"{(folder if what == 'folder' else file).name}: "
     said += "compiled kernels cannot be kept (it belongs" if what == "folder" else "it belongs to another user"
     assert run(compiled, said) == "5.0 0"
     assert file.stat().st_uid == 0  # made anew, or left alone
     assert run(compiled, said if what == "folder" else "") == ("5.0 0" if what == "folder" else "5.0 1")
+
+
+def test_of_two_processes_at_once_one_compiles(package):
+    code = """
+        import sys, time
+        from pathlib import Path
+        from package_a.outer import outer
+        save, here = outer._cache.save_overload, Path(sys.argv[1])
+        outer._cache.save_overload = lambda *given: (time.sleep(0.5), save(*given))
+        (here / sys.argv[2]).touch()
+        while len(list(here.iterdir())) < 2:
+            time.sleep(0.001)
+        print(outer(1.5), sum(outer.stats.cache_hits.values()))
+        """
+    here = package.parent / "here"
+    here.mkdir()
+    environment = os.environ | {"REFGI_CACHE_DIR": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
+    both = [subprocess.Popen([sys.executable, "-c", textwrap.dedent(code), str(here), name], env=environment, text=True,
+                             stdout=subprocess.PIPE) for name in "ab"]
+    assert sorted(one.communicate()[0].strip() for one in both) == ["5.0 0", "5.0 1"]
 
 
 def test_processes_that_compile_ahead_share_the_folder_that_takes_the_place(package):

@@ -14,7 +14,7 @@ from refgi.methods import find_method, render
 from refgi.scene import Camera, Material, Mesh, PointLight, Scene, SpotLight
 from refgi.scene.model import merge
 from refgi.settings import replaced
-from refgi.vectors.bounds import distance, large_value
+from refgi.vectors.bounds import distance, isolated_bounds, large_value
 from refgi.vectors.check import Asked, check_output
 from refgi.vectors.docstrings import returned, taken
 from refgi.vectors.export import export_case
@@ -224,6 +224,31 @@ def diffuse_light(read):
         term = np.divide(cosines, np.pi * square * (square + area / np.pi), out=np.zeros_like(square), where=square > 0)
         total += flux[:, None, None] * term
     return total
+
+
+@pytest.mark.parametrize(("beyond", "masked"), [(0.01, 18), (-0.02, 18), (0.25, 0), (0.06, 0)])
+def test_ids_beside_an_edge_that_a_gpu_may_move_are_masked(beyond, masked):
+    """A wall's edge lies so many texels beyond the centres of a column of 18."""
+    half = np.tan(0.45) * 24 / 18
+    edge = 2 * half * (2 * (10.5 + beyond) / 24 - 1)
+    wall = Mesh(np.array([[edge, -50.0, 0], [edge, 50, 0], [-100, 0, 0]]), np.array([[0, 1, 2]]), material=Material())
+    behind = Mesh(np.array([[-100.0, -100, -1], [100, -100, -1], [0, 200, -1]]), np.array([[0, 1, 2]]),
+                  material=Material())
+    lamp = SpotLight((0.3, 0.2, 2.0), (0.0, 0.0, -1.0), 0.5, 0.7, (5.0, 4.0, 3.0))
+    scene = Scene("edge", *merge([wall, behind]), Camera((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), vfov=0.9), (lamp,))
+    case = recorded_case("sii-edge", scene, "sii", only="rsm.visible_triangles", **SIZE)
+    step, = case.stages
+    mask = isolated_bounds(case, step, expected_of(case), 1)[step.writes[0]].masked
+    assert np.count_nonzero(mask) == np.count_nonzero(mask[:, 10]) == masked
+
+
+@pytest.mark.parametrize(("most", "some"), [(1e3, False), (1e6, True)])
+def test_likely_bugs_of_a_scene_too_large_for_their_text_are_left_out_and_that_is_said(monkeypatch, most, some):
+    monkeypatch.setattr("refgi.vectors.recorded.MOST_WORK", most)
+    case = recorded_case("sii-heap", heap(), "sii", only="rsm.visible_triangles", **SIZE)
+    step, = case.stages
+    assert bool(step.bugs) == some
+    assert ("likely bugs" in case.facts[step.name]) != some
 
 
 def test_more_than_the_room_is_refused_before_anything_is_written(tmp_path):

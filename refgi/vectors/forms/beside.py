@@ -17,6 +17,13 @@ Arguments = Mapping[str, Any]
 Names = Mapping[str, str]  # leaf of a stage's parameters or output: the case's name of that array
 
 
+# a unit direction by the inverse of its length, as many machines divide
+BY_INVERSE = (("w = np.divide(d, r, out=np.zeros_like(d), where=r > 0)",
+               "w = d * np.divide(1, r, out=np.zeros_like(r), where=r > 0)"),)
+NO_BUGS = "likely bugs"  # fact of a stage that has none, and why
+MOST_WORK = 10_000_000  # half a second for each likely bug, and some hundred MB
+
+
 @dataclass(frozen=True)
 class Described:
     """What a run of a stage has beside its function; arrays by leaf: parameter or field of the output."""
@@ -32,6 +39,7 @@ class Described:
     variants: tuple[Callable[[Run, Names, Names], Run], ...] = ()  # other ways, of the stage, what it reads and writes
     bugs: tuple[Callable[[Run, Names, Names], tuple[Bug, ...]], ...] = ()  # those that are no rows, likewise
     without: tuple[str, ...] = ()  # words of causes of rows that cannot show
+    work: int = 0  # of the form: triangles times texels; rows are left out beyond `MOST_WORK`
 
 
 def form_of(

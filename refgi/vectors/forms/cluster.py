@@ -8,7 +8,7 @@ from refgi.cluster.settings import GeometryBlur
 from refgi.literal import val_areas, val_filters, val_maps
 from refgi.rsm.buffers.extent import SAMPLES
 from refgi.vectors.forms import visibility
-from refgi.vectors.forms.beside import Arguments, Described, alone, form_of, ids, own, written
+from refgi.vectors.forms.beside import BY_INVERSE, Arguments, Described, alone, form_of, ids, own, written
 from refgi.vectors.rows import Form
 
 MESH = {"vertices": "geometry.vertices", "faces": "geometry.faces"}
@@ -73,8 +73,9 @@ def depth_maps(arguments: Arguments) -> Described:
     usual = arguments["renderer"] == "raster" and arguments["near_geometry"] == "ball"
     if not usual or arguments["geometry"].cut is not None:
         return Described(exact=exact)
+    work = arguments["blocks"].sum() * len(arguments["center"]) * arguments["texels"] ** 2
     return Described(form_of(val_maps.depth_maps, arguments, others=MESH), own("depth_maps", "depth_maps/ahead"), exact,
-                     facts={"projection": "paraboloid (x, y) / (1 + z)"})
+                     facts={"projection": "paraboloid (x, y) / (1 + z)"}, work=work)
 
 
 def interleaving(arguments: Arguments) -> Described:
@@ -96,7 +97,7 @@ def parts(arguments: Arguments) -> Described:
         "position": "receivers.position", "normal": "receivers.normal", "triangle_id": "receivers.covered"},
         adapt={"triangle_id": ids})
     dealt = () if arguments["subset"] is None else ("parts/interleaved",)
-    return Described(form, own("parts", *dealt), exact, facts=facts)
+    return Described(form, own("parts", *dealt), exact, facts=facts, variants=written(form, BY_INVERSE))
 
 
 def shadowed(arguments: Arguments) -> Described:

@@ -60,9 +60,10 @@ def texels(arguments: Arguments) -> Described:
     if arguments["gain"] != 1 or arguments["renormalise"]:
         return Described(specs=specs)
     warped = arguments["density_weight"] is not None
-    return Described(form_of(lights.texels, arguments, ("texel", "weight")), own(
-        "texels", *(["texels/warped"] if warped else [])), ("points",), specs, facts={"T": total, "N": count},
-        factors={"T/N": total / count, "number of lights N": count, "number of texels T": total})
+    lists = "texels", *(["texels/warped"] if warped else []), *(["texels/maps"] if arguments["maps"] > 1 else [])
+    return Described(form_of(lights.texels, arguments, ("texel", "weight")), own(*lists), ("points",), specs,
+                     facts={"T": total, "N": count},
+                     factors={"T/N": total / count, "number of lights N": count, "number of texels T": total})
 
 
 def pixel_lights(arguments: Arguments) -> Described:

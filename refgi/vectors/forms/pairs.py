@@ -2,7 +2,7 @@
 
 from refgi.literal import pairs
 from refgi.pairs.settings import PairSettings
-from refgi.vectors.forms.beside import Arguments, Described, alone, form_of, ids, own
+from refgi.vectors.forms.beside import BY_INVERSE, Arguments, Described, alone, form_of, ids, own, written
 from refgi.vectors.rows import Form
 
 EQ2 = "SII Eq. 2 and 3; unit directions and r^2 (E-SII-02)"
@@ -19,7 +19,7 @@ def pair_sum(arguments: Arguments) -> Described:
     form = Form(pairs.irradiance, {**pair_reads(glossy), **({"area": "footprint"} if disc else {})}, ("",),
                 adapt={"triangle_id": ids})
     return Described(form, own(*pair_lists("irradiance", glossy, disc, count)), POINTS, paper=EQ2, facts=facts,
-                     factors={"number of lights": count})
+                     factors={"number of lights": count}, variants=written(form, BY_INVERSE))
 
 
 def clamp_of(settings: PairSettings) -> str:
@@ -44,8 +44,9 @@ def single_pairs(arguments: Arguments) -> Described:
     """Return pairs of one light and one receiver each."""
     glossy = arguments["lobe_flux"] is not None
     lists = own(*pair_lists("pairs", glossy, False, arguments["flux"].shape[1]))
-    return Described(form_of(pairs.pairs, arguments), lists, ("position", "light_position"), {"": {"alone": True}},
-                     paper=EQ2, facts={"clamp": "none", "lobe_norm": NORM})
+    form = form_of(pairs.pairs, arguments)
+    return Described(form, lists, ("position", "light_position"), {"": {"alone": True}}, paper=EQ2,
+                     facts={"clamp": "none", "lobe_norm": NORM}, variants=written(form, BY_INVERSE))
 
 
 def pair_lists(entry: str, glossy: bool, disc: bool, count: int) -> tuple[str, ...]:

@@ -1,6 +1,10 @@
 """Literal forms of stages of buffers and of direct light."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
 
 from refgi.literal import buffers, direct, light_flux, val_areas
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
@@ -10,7 +14,7 @@ from refgi.vectors.bounds import ROUNDING
 from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, ids, own, written
 from refgi.vectors.recipe import writing
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Run
+from refgi.vectors.spec import Arrays, Run
 
 KINDS = "perspective", "parallel", "paraboloid"  # of maps, in names of lists
 QUADRATURE = 8.0  # roundings that a float32 sum over a texel's nodes gathers; the bound is SAFETY times as wide
@@ -31,6 +35,30 @@ BY_SHARES = ("position = o + depth * d",
 RAYS = (IN_FLOAT32,), (IN_FLOAT32, MOELLER), (IN_FLOAT32, MOELLER, BY_SHARES)  # a surface found otherwise
 
 
+SIDES_IN_FLOAT32 = ("x0, x1 = ((2 * (column + end) / columns - 1)",
+                    "row, column = row.astype(np.float32), column.astype(np.float32); "
+                    "x0, x1 = ((2 * (column + end) / columns - 1)")
+SNAP = 1 / 32  # of a texel: by what OpenGL may move a corner at its coarsest (SUBPIXEL_BITS of 4), float32's edges less
+
+
+def snapped(columns: int, rows: int, parallel: bool) -> tuple[Callable[[Run, Names, Names], Run], ...]:
+    """Return other ways to cover texels: all corners off by `SNAP` of a texel, towards each of four sides."""
+    def variant(side: tuple[int, int], stage: Run, reads: Names, writes: Names) -> Run:  # noqa: ARG001
+        def run(arrays: Arrays, real: Any) -> Arrays:
+            frame, half = (arrays[reads[f"projection.{leaf}"]] for leaf in ("frame", "half"))
+            x, y = 2 * SNAP * half * side / np.array((columns, rows))
+            if parallel:
+                leaf, moved = "origin", arrays[reads["projection.origin"]] + x * frame[:, 0] + y * frame[:, 1]
+            else:  # a point's place on the image is right / forward, down / forward
+                leaf, moved = "frame", np.stack([frame[:, 0] - x * frame[:, 2], frame[:, 1] - y * frame[:, 2],
+                                                 frame[:, 2]], axis=1)
+            return stage({**arrays, reads[f"projection.{leaf}"]: moved}, real)
+
+        return run
+
+    return tuple(partial(variant, side) for side in ((1, 1), (1, -1), (-1, 1), (-1, -1)))
+
+
 def visible_triangles(arguments: Arguments) -> Described:
     """Return the nearest triangles of a view of planes."""
     maps = arguments["projection"]
@@ -40,7 +68,8 @@ def visible_triangles(arguments: Arguments) -> Described:
     form = form_of(buffers.visible_triangles, sizes(maps), others={**MESH, **VIEW}, double=True)
     return Described(form, own("triangles", f"triangles/{KINDS[maps.kind]}", "view/upwards", *VIEWS,
                                *(("triangles/cube", "view/cube", "view/cube down") if maps.maps > 1 else ())),
-                     facts=facts)
+                     facts=facts, work=len(arguments["geometry"].faces) * maps.maps * maps.height * maps.width,
+                     variants=snapped(maps.width, maps.height, maps.kind == ORTHOGRAPHIC))
 
 
 def surface(arguments: Arguments) -> Described:
@@ -80,7 +109,8 @@ def reflected_flux(arguments: Arguments) -> Described:
                  *(("buffers", one) for one in (*(("view/frame",) if glossy else ()),
                                                 *(("view/cube rows",) if cube else ()),
                                                 *(("view/cube",) if glossy and cube else ()))))
-    return Described(form, lists, facts=facts, variants=(summed_in_float32,) if spot else ())
+    single = written(form, (SIDES_IN_FLOAT32,))
+    return Described(form, lists, facts=facts, variants=(summed_in_float32, *single) if spot else single)
 
 
 def summed_in_float32(stage: Run, reads: Names, writes: Names) -> Run:  # noqa: ARG001

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from refgi.literal import val_back_projection, val_filters, val_maps, val_series, val_visibility
-from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, ids, own
+from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, ids, own, written
 from refgi.vectors.spec import Arrays, Run
 
 PLACES = {"position": "places.position", "center": "places.center", "frame": "places.frame"}
@@ -44,12 +44,20 @@ def map_depths(arguments: Arguments) -> Described:
         "map_depths", kind, *(("map_depths/mirrored",) if arguments["mirrored"] else ())), ("depth",))
 
 
+BY_ADDITION = (("s, co = np.sin(c * z), np.cos(c * z)",
+                "waves, s2, c2 = [(np.sin(np.pi * z), np.cos(np.pi * z))], np.sin(2 * np.pi * z), "
+                "np.cos(2 * np.pi * z); "
+                "[waves.append((a * c2 + b * s2, b * c2 - a * s2)) for _ in range(terms - 1) for a, b in waves[-1:]]; "
+                "s, co = (np.concatenate(one, axis=1) for one in zip(*waves))"),)  # sines of sums: two for all terms
+
+
 def basis(arguments: Arguments) -> Described:
     """Return the channels of texels."""
     kept = {"sines and cosines": "8 bits: floor((x + 1) 127.5 + 0.5001) / 127.5 - 1",
             "times the depth, and the depth": "half floats"} if arguments["in_bytes"] else {}
-    return Described(form_of(val_maps.basis, arguments),
-                     own("basis", *(("basis/bytes",) if arguments["in_bytes"] else ())), ("t",), facts=kept)
+    form = form_of(val_maps.basis, arguments)
+    return Described(form, own("basis", *(("basis/bytes",) if arguments["in_bytes"] else ())), ("t",), facts=kept,
+                     variants=() if arguments["in_bytes"] else written(form, BY_ADDITION))
 
 
 def mip_levels(arguments: Arguments) -> Described:

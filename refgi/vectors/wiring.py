@@ -53,11 +53,10 @@ def wirings(case: Case, step: Stage, known: Arrays) -> Iterator[Bug]:
         if len(names) < 2:
             continue
         for other in dict.fromkeys(_home(one) for one in before):
-            wrong = {name: known[f"{other}.{_leaf(name)}"] for name in names if f"{other}.{_leaf(name)}" in known}
-            if other != home and len(wrong) == len(names) and all(
-                    _fits(known[name], one, decides=form is None and name in step.exact)
-                    for name, one in wrong.items()):
-                yield from bug(f"{kind_of(home)} is bound to {kind_of(other)}, all of it", _bound_to, wrong)
+            all_ = {name: known[f"{other}.{_leaf(name)}"] for name in names if f"{other}.{_leaf(name)}" in known}
+            if other != home and len(all_) == len(names) and all(
+                    _fits(known[name], one, decides=form is None and name in step.exact) for name, one in all_.items()):
+                yield from bug(f"{kind_of(home)} is bound to {kind_of(other)}, all of it", _bound_to, all_)
         for name, other in combinations(names, 2):
             if _fits(known[name], known[other], decides=form is None):
                 yield from bug(f"{kind_of(name)} and {_leaf(other)} are exchanged", _bound_to,

@@ -155,6 +155,36 @@ def ellipsoids(exponent: Any) -> Any:
     return center, half_width, height, *tangent
 
 
+def stored_surface(position: Any, normal: Any) -> Any:
+    """Return what textures keep of receivers (3, h, w): half floats, normals of 8 bits a component (SII Sec. 4)."""
+    return in_half(position), in_bytes(normal)
+
+
+def stored_lights(
+    light_position: Any, light_normal: Any, flux: Any, lobe_flux: Any = None, lobe_axis: Any = None,
+) -> Any:
+    """Return what textures keep of lights (3, N): flux as 256 even shares of the largest of all parts (SII Sec. 6)."""
+    place, n = in_half(light_position), in_bytes(light_normal)
+    largest = flux.max(initial=0) if lobe_flux is None else max(flux.max(initial=0), lobe_flux.max(initial=0))
+    step = (largest or 1) / 255
+    phi = np.floor(flux / step + 0.5) * step
+    if lobe_flux is None:
+        return place, n, phi
+    return place, n, phi, np.floor(lobe_flux / step + 0.5) * step, in_bytes(lobe_axis)
+
+
+def in_half(position: Any) -> Any:
+    """Return the nearest half floats, of equally near ones the even."""
+    return position.astype(np.float16).astype(position.dtype)
+
+
+def in_bytes(vectors: Any) -> Any:
+    """Return unit vectors of components that are the nearest of 256 from -1 to 1; what is 0 stays 0."""
+    code = np.floor((vectors + 1) / 2 * 255 + 0.5)
+    read = 2 * code / 255 - 1
+    return np.where(vectors.any(axis=0), read / np.sqrt((read**2).sum(axis=0)), 0)
+
+
 def one_or_two(parts: Any) -> Any:
     """Return what there is of the parts of lights as a pair: None for lobes where there are none."""
     return parts if isinstance(parts, tuple) else (parts, None)

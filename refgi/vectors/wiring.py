@@ -7,10 +7,10 @@ change places. An input of vectors or colours is read as triples side by side as
 numbers, so that a bug has one name in all cases.
 """
 
+import re
 from collections.abc import Callable, Iterator
 from functools import partial
-from itertools import combinations, takewhile
-from typing import Any
+from itertools import chain, combinations, product, takewhile
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from refgi.vectors.rows import Form
 from refgi.vectors.spec import Arrays, Bug, Case, Run, Stage, axes_of, kind_of
 
 Layout = Callable[[Array], Array]
+Fits = Callable[[str, Array], bool]  # whether a stage runs with an array in the place of an input
 ANOTHER = "that of another lamp, level or round"
 
 
@@ -30,51 +31,76 @@ def wirings(case: Case, step: Stage, known: Arrays) -> Iterator[Bug]:
         return
     form = next((one for one in step.variants if isinstance(one, Form)), None)
     run = step.run if form is None else form  # NumPy says where an index is none, a kernel reads what lies there
-    earlier = takewhile(lambda one: one is not step, case.stages)
-    before = [*case.given, *(name for one in earlier for name in one.writes)]
     told = set()
 
-    def bug(cause: str, make: Callable[..., Arrays], *given: Any) -> Iterator[Bug]:
+    def fits(name: str, wrong: Array) -> bool:
+        return _fits(known[name], wrong, decides=form is None and name in step.exact)
+
+    for cause, wrong in chain(_one_by_one(case, step, known, fits), _together(case, step, known, fits)):
         if cause not in told:
             told.add(cause)
-            yield Bug(cause, partial(make, run, *given))
-
+            yield Bug(cause, partial(_bound_to, run, wrong))
     for name in step.reads:
-        right, decides = known[name], form is None and name in step.exact
-        for other in before:
-            wrong = known[other] if _leaf(other) != _leaf(name) else _cut_to(known[other], right.shape)
-            if other != name and _fits(right, wrong, decides=decides):
-                yield from bug(_cause(name, other), _bound_to, {name: wrong})
         for said, layout in LAYOUTS.items():
-            if _is_planes(case, name, right) and name not in step.exact:
-                yield from bug(f"{kind_of(name)} {said}", _laid_out, name, layout)
-    fields = {home: [one for one in step.reads if _home(one) == home] for home in map(_home, step.reads) if home}
-    for home, names in fields.items():
-        if len(names) < 2:
+            cause = f"{kind_of(name)} {said}"
+            if _is_planes(case, name, known[name]) and name not in step.exact and cause not in told:
+                told.add(cause)
+                yield Bug(cause, partial(_laid_out, run, name, layout))
+
+
+def _one_by_one(case: Case, step: Stage, known: Arrays, fits: Fits) -> Iterator[tuple[str, Arrays]]:
+    """Yield causes, and the array that takes an input's place."""
+    earlier = takewhile(lambda one: one is not step, case.stages)
+    before = [*case.given, *(name for one in earlier for name in one.writes)]
+    for name, other in product(step.reads, before):
+        if other == name:
             continue
-        for other in dict.fromkeys(_home(one) for one in before):
-            all_ = {name: known[f"{other}.{_leaf(name)}"] for name in names if f"{other}.{_leaf(name)}" in known}
-            if other != home and len(all_) == len(names) and all(
-                    _fits(known[name], one, decides=form is None and name in step.exact) for name, one in all_.items()):
-                yield from bug(f"{kind_of(home)} is bound to {kind_of(other)}, all of it", _bound_to, all_)
-        for name, other in combinations(names, 2):
-            if _fits(known[name], known[other], decides=form is None):
-                yield from bug(f"{kind_of(name)} and {_leaf(other)} are exchanged", _bound_to,
-                               {name: known[other], other: known[name]})
+        read = [known[other]] if _leaf(other) != _leaf(name) else _read_by(known[other], known[name].shape)
+        for wrong, how in zip(read, ("", ", by its index"), strict=False):
+            if fits(name, wrong):
+                yield _cause(name, other) + how, {name: wrong}
+
+
+def _together(case: Case, step: Stage, known: Arrays, fits: Fits) -> Iterator[tuple[str, Arrays]]:
+    """Yield causes, and the arrays that take the places of several inputs at once."""
+    groups: dict[str, dict[str, list[str]]] = {}
+    for name in step.reads:
+        groups.setdefault(kind_of(_home(name)), {}).setdefault(_leaf(name), []).append(name)
+    homes = dict.fromkeys(_home(one) for one in (*case.given, *(
+        name for stage in case.stages if stage is not step for name in stage.writes)))
+    wrong: list[tuple[str, dict[str, str]]] = []
+    for home, fields in groups.items():
+        wrong += [(f"{home} is bound to {kind_of(other)}, all of it", {
+            name: f"{other}{name[len(_home(name)):]}" for names in fields.values() for name in names})
+            for other in homes if len(fields) > 1 and kind_of(other) != home]
+        wrong += [(f"{kind_of(one[0])} and {_leaf(two[0])} are exchanged",
+                   dict(zip([*one, *two], [*two, *one], strict=True)))
+                  for one, two in combinations(fields.values(), 2) if len(one) == len(two)]
+        wrong += [(f"{kind_of(names[0])} is that of the first for all", dict.fromkeys(names[1:], names[0]))
+                  for names in fields.values() if len(names) > 2]
+    for cause, taken in wrong:
+        if all(other in known and fits(name, known[other]) for name, other in taken.items()):
+            yield cause, {name: known[other] for name, other in taken.items()}
 
 
 def _home(name: str) -> str:
-    return name.rpartition(".")[0]
+    """Return what an array is a field of, or a list of fields: multires.depth_ranges of multires.depth_ranges.low.1."""
+    return re.sub(r"\.\d+$", "", name).rpartition(".")[0]
 
 
 def _leaf(name: str) -> str:
-    return name.rpartition(".")[2].rstrip("0123456789")
+    return kind_of(name.removeprefix(f"{_home(name)}."))
 
 
-def _cut_to(array: Array, shape: tuple[int, ...]) -> Array:
-    """Return the first numbers along each axis of an array that is larger than a shape."""
-    larger = array.ndim == len(shape) and all(here >= one for here, one in zip(array.shape, shape, strict=True))
-    return array[tuple(slice(one) for one in shape)] if larger else array
+def _read_by(array: Array, shape: tuple[int, ...]) -> list[Array]:
+    """Return an array as one of a smaller shape reads it: by row and column, and by the index within its planes."""
+    if array.ndim != len(shape) or array.shape == shape or any(
+            here < one for here, one in zip(array.shape, shape, strict=True)):
+        return [array]
+    cut = array[tuple(slice(one) for one in shape)]
+    if len(shape) != 3:
+        return [cut]
+    return [cut, array[: shape[0]].reshape(shape[0], -1)[:, : shape[1] * shape[2]].reshape(shape)]
 
 
 def _cause(name: str, other: str) -> str:

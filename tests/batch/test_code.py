@@ -76,7 +76,9 @@ def test_a_digest_knows_a_docstring_from_code():
 def test_methods_depend_on_what_they_use():
     of = {name: reached(place_of(name)) for name in ("sii", "multires", "val", "hssil", "gather", "vpl")}
     assert {"refgi.splat.sii.sii", "refgi.lights.pixel_lights", "refgi.pairs.pair_sum"} <= of["sii"]
-    assert not {name for name in of["sii"] if "multires" in name or name.startswith(("refgi.cluster.", "refgi.sssil."))}
+    assert not {name for name in of["sii"] if "multires" in name or name.startswith("refgi.cluster.")}
+    of_hssil = {name.split(".")[2] for name in of["sii"] if name.startswith("refgi.sssil.")}
+    assert of_hssil <= {"pyramid", "crown", "settings"}  # compensation=screen sums over its first level
     assert not {name for name in of["hssil"] if name.startswith(("refgi.splat.", "refgi.cluster."))}
     assert "refgi.cluster.val" in of["val"]
     assert "refgi.truth.vpl" in of["vpl"]

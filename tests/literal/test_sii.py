@@ -6,7 +6,19 @@ import numpy as np
 import pytest
 
 from refgi.literal import pairs
-from refgi.literal.sii import ellipsoids, kept, low_irradiance, peaks, reference_length, sii, squares, strengths
+from refgi.literal.sii import (
+    ellipsoids,
+    kept,
+    low_irradiance,
+    peaks,
+    reference_length,
+    sii,
+    squares,
+    stored_lights,
+    stored_surface,
+    strengths,
+)
+from tests.naive import storage
 
 UP = np.array([[0.0], [0.0], [1.0]])
 PRINTED = 0.5e-3  # E-SII-13 and E-SII-15 give three digits
@@ -85,3 +97,18 @@ def test_ellipsoids_have_the_published_numbers_and_hold_the_region():
         r = np.cos(angle) ** (n[:, None] / 2)  # the region's border, in R_0
         inside = ((r * np.cos(angle) - center) / half_width) ** 2 + (r * np.sin(angle) / height) ** 2
         assert (inside <= 1 + 1e-9).all()
+
+
+@pytest.mark.feature("SII-31")
+def test_stored_numbers_are_those_of_ieee_halves_and_codes_of_bytes():
+    rng = np.random.default_rng(3)
+    position, vectors = rng.normal(size=(3, 5, 7)) * 100, rng.normal(size=(3, 5, 7))
+    vectors[:, 0] = 0
+    vectors /= np.maximum(np.linalg.norm(vectors, axis=0), 1)
+    place, normal = stored_surface(position, vectors)
+    np.testing.assert_array_equal(place, storage.halves(position))
+    np.testing.assert_allclose(normal, storage.directions(vectors), atol=1e-15)
+    flux, lobe_flux = np.array([[0.0, 0.2, 255]]), np.array([[510.0, 1.0, 0.9]])  # steps of 510 / 255 = 2
+    _, _, phi, lobe, axis = stored_lights(position[:, 0, :3], vectors[:, 1, :3], flux, lobe_flux, vectors[:, 2, :3])
+    np.testing.assert_allclose([*phi, *lobe], [[0, 0, 256], [510, 2, 0]], atol=1e-12)
+    np.testing.assert_allclose(axis, storage.directions(vectors[:, 2, :3]), atol=1e-15)

@@ -50,5 +50,6 @@ def test_steps_make_what_the_fused_stages_make(changed):
 def test_all_but_inputs_is_made_and_every_step_has_a_literal_form(id):
     case = made(id)[0]
     given = [name for name in case.given if not INPUTS.match(name)]
-    assert given == (["sii.low_irradiance.length"] if id == "sii-range-length" else [])  # of the settings
+    others = {"sii-range-length": ["sii.low_irradiance.length"], "sii-occluded": ["lights.occlude.openness"]}
+    assert given == others.get(id, [])  # of the settings, of rays
     assert [step.name for step in case.stages if not any(isinstance(one, Form) for one in step.variants)] == []

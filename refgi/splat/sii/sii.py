@@ -21,7 +21,6 @@ from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.ranged_sum import LANES, sum_pairs_in_range, sum_weighted_pairs
 from refgi.pairs.settings import GeometryClamp
 from refgi.pairs.sphere_sum import sum_spheres
-from refgi.splat.sii.compensation import screen_compensation
 from refgi.splat.sii.half_resolution import half_resolution
 from refgi.splat.sii.reach.lists import EVERY, LightLists, Some, listed_pairs
 from refgi.splat.sii.reach.threshold import warn_of_cut, with_reference_length
@@ -70,6 +69,8 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
                     all_summed=settings.lightcuts is None)
     clamp = settings.pairs.clamp
     if settings.compensation == "screen" and isinstance(clamp, GeometryClamp) and clamp.value is not None:
+        from refgi.splat.sii.compensation import screen_compensation  # hssil's levels, which no other sii needs
+
         depth, normal, albedo = frame.gbuffer.resolve("depth", "normal", "albedo")
         light = light + screen_compensation(depth, normal, albedo, frame.direct, frame.gbuffer.projection, clamp.value)
     return occluded(frame, light, settings.ambient_occlusion, settings.lights.seed)

@@ -1,7 +1,7 @@
 """Literal forms of the range of pixel lights."""
 
 from refgi.literal import sii
-from refgi.vectors.forms.beside import Arguments, Described, form_of, ids, own
+from refgi.vectors.forms.beside import Arguments, Described, alone, form_of, ids, own
 from refgi.vectors.forms.pairs import POINTS, pair_reads, unknown
 from refgi.vectors.rows import Form
 
@@ -82,6 +82,18 @@ def ellipsoids(arguments: Arguments) -> Described:
     return Described(form_of(sii.ellipsoids, arguments, fields), own("ellipsoids"))
 
 
-FORMS = {"sii.peaks": peaks, "sii.strengths": strengths, "sii.reference_length": reference_length,
+def stored_lights(arguments: Arguments) -> Described:
+    """Return lights as textures keep them."""
+    lights = arguments["lights"]
+    lobes = ("lobe_flux", "lobe_axis") if lights.lobe_flux is not None else ()
+    names = "position", "normal", "flux", *lobes
+    reads = {("light_" if one in ("position", "normal") else "") + one: f"lights.{one}" for one in names}
+    kept = {"lobe_exponent": "lights.lobe_exponent"} if lobes else {}
+    return Described(Form(sii.stored_lights, reads, names, kept=kept), own("stored", "stored/lights"))
+
+
+FORMS = {"sii.stored_surface": alone(sii.stored_surface, ("position", "normal"), lists=("stored",)),
+         "sii.stored_lights": stored_lights, "sii.peaks": peaks, "sii.strengths": strengths,
+         "sii.reference_length": reference_length,
          "sii.low_irradiance": low_irradiance, "sii.squares": squares, "sii.kept": kept, "sii.range_sum": range_sum,
          "sii.ellipsoids": ellipsoids}

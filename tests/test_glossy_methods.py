@@ -473,6 +473,8 @@ def test_without_a_visible_glossy_surface_no_code_of_lobes_runs():
         again = Frame(scene, width=16, height=16, rsm_resolution=32)
         assert again.glossy_receivers
         assert not METHODS["sii"].light(again, of(SiiSettings, lights=16)).lobes.any()
+
+
 @pytest.mark.feature("REF-27")
 def test_glass_has_no_lobe():
     """Whatever reflectances its material states, alone in the picture or beside lobes."""

@@ -96,10 +96,6 @@ def slivers(rng: np.random.Generator) -> Case:
                 f"{int((stays & (share < FLAT)).sum())} flat ones left")
 
 
-
-
-
-
 def _terrain(rng: np.random.Generator) -> tuple[Array, Array]:
     """Return places, with steps in depth among them, and unit normals, (3, SIDE, SIDE)."""
     across = np.stack(np.meshgrid(*[np.arange(SIDE) / SIDE] * 2))

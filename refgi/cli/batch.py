@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from refgi.bench.results import Result
     from refgi.cli.session import Tell
 
+
 class Done(NamedTuple):
     """What became of a batch."""
 

@@ -41,6 +41,7 @@ from refgi.stages import stage
 if TYPE_CHECKING:
     from refgi.frame import Frame
 
+
 def _seen_by(settings: ValSettings, visibility: Visibility) -> ValSettings:
     """Return settings with another kind of visibility and the same maps, whatever is best for that kind."""
     return dataclasses.replace(settings, maps=settings.drawn_maps, visibility=visibility)

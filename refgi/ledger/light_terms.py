@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from refgi.scene import Geometry, MaterialTable
     from refgi.scene.model import Light
 
+
 class LightTerms(NamedTuple):
     """Power of one light by where it goes, (3,) float64 each, W."""
 

@@ -31,6 +31,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.lights.steps import MapPlanes
 
+
 class Drawn(NamedTuple):
     """Texels of one map, drawn as pixel lights; those without flux included."""
 

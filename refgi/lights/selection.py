@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from refgi.pairs.settings import PairSettings
     from refgi.rsm import Rsm
 
+
 @stage("lights.scale_flux")
 def scale_flux(
     lights: "PixelLights", openness: Array, as_printed: bool = False

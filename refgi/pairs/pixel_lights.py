@@ -27,6 +27,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.frame import Frame
 
+
 class PixelLights(NamedTuple):
     """N' <= N point lights with a surface normal, in the order they were drawn."""
 

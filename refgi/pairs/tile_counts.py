@@ -24,6 +24,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.pairs.packing import Packed, PackedLobes
 
+
 def tiles_behind(position: Array, normal: Array, lights: Array, lanes: int = TILE) -> tuple[int, int]:
     """Return how many pairs of tile and packed diffuse light `sum_pairs` passes over, and of how many.
 

@@ -34,6 +34,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.frame import Frame
 
+
 def hssil(frame: "Frame", settings: HssilSettings) -> Array:
     """Light what a camera sees by what it sees, near by at high and far away at low resolution.
 

@@ -48,6 +48,7 @@ Prepare = Callable[[Scene, Any, Array, Array, Array, TruthSettings], Task]
 STOPPING = {"samples", "seconds", "target_error", "checkpoint", "batch"}  # settings that change no pass
 MORE, MOST_SAMPLES = 4, 2**31  # samples for each one where few are switched off; as many as there may be
 
+
 def truth(frame: "Frame", settings: TruthSettings | None = None) -> Array:
     """Compute the one-bounce irradiance by path tracing.
 

@@ -318,7 +318,6 @@ def test_any_value_under_any_key_is_taken_or_refused(
     assert not refusal or str(path) in refusal
 
 
-
 def test_reflectances_that_add_up_to_one_are_taken(tmp_path: Path) -> None:
     for diffuse in np.linspace(0, 1, 101).round(2).tolist():
         specular = round(1 - diffuse, 2)

@@ -120,7 +120,6 @@ CASES = {
 }
 
 
-
 def known(settings):
     """Tell whether there is a picture: tan f ends below the angle of other cameras, some levels alone are dark."""
     wide = settings.cameras.views or settings.cameras.count

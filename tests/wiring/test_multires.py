@@ -136,6 +136,8 @@ PROMISES = {
                                             frame=WIDE),
 }
 ALL = CASES | PROMISES
+
+
 def visibility_of(settings):
     """Return the name of what finds which lights a subsplat sees."""
     found = None if settings.subsplats.name() == "irradiance" else settings.subsplats.visibility

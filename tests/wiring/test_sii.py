@@ -14,7 +14,6 @@ from refgi.splat.sii.reach.fragments import fragments
 from tests.literal.whole import sii as literal
 from tests.literal.whole.pairs import occluded_of, with_clamp
 from tests.naive import ledger
-from tests.naive.storage import stored
 from tests.wiring.cases import Case, needed, uncovered, under
 from tests.wiring.features import SII, featured
 from tests.wiring.fold import fold
@@ -111,7 +110,7 @@ def pixel_lights(frame, settings):
 def as_stored(frame, settings):
     """Return the frame, the lights and the areas that sums read."""
     lights, areas = pixel_lights(frame, settings)
-    return (*((frame, lights) if settings.quantisation == "none" else stored(frame, lights)), areas)
+    return (*((frame, lights) if settings.quantisation == "none" else literal.stored(frame, lights)), areas)
 
 
 def by_literal_text(frame, settings):

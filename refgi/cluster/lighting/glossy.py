@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from refgi.lights import PixelLights
     from refgi.rays import Tracer
 
+
 @stage("cluster.glossy")
 def clustered_radiance(
     points: GlossyPoints, facing: Array, lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps | None",

@@ -20,6 +20,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.rays import Tracer
 
+
 @stage("cluster.map_views", kept=False)
 def map_views(
     visible: Extent, illuminated: Extent, center: Array, normal: Array, radius: Array, near_distance: float

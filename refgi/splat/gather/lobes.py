@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.rsm import Rsm
 
+
 def gather_lobes(frame: "Frame", settings: GatherSettings) -> Array:
     """Return the radiance towards the eye that receivers' lobes make of the texels in their discs.
 

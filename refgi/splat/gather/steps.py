@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from refgi.rsm import Rsm
     from refgi.splat.gather.gather import DiscSettings, Interpolation
 
+
 @stage("gather.pattern", kept=False)
 def pattern(xi: Array, weight_squared: bool) -> tuple[Array, Array]:
     """Spread samples over a disc of radius 1 (RSM 2005, Sec. 4; docs/methods/gather).

@@ -26,6 +26,7 @@ from refgi.stages import stage
 if TYPE_CHECKING:
     from refgi.frame import Frame
 
+
 def _ignores_visibility(settings: MultiresSettings) -> Mapping[str, Any]:
     return {} if settings.visibility is not None else {"visibility": False}
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from refgi.lights import PixelLights
     from refgi.rsm import GBuffer
 
+
 def multires_lobes(frame: "Frame", settings: MultiresSettings) -> Array:
     """Return the radiance towards the eye that receivers' lobes make of the pixel lights of `multires`.
 

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from refgi.lights import PixelLights
     from refgi.rsm import GBuffer
 
+
 def multires(frame: "Frame", settings: MultiresSettings) -> Array:
     """Compute indirect irradiance from pixel lights that are evaluated at subsplats.
 

@@ -27,6 +27,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.frame import Frame
 
+
 def _sampled(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
     reach = settings.reach if settings.reach.cut else dataclasses.replace(settings.reach, seed=0)  # draws none
     return dataclasses.replace(settings, lights=every_light(settings.lights), reach=reach)

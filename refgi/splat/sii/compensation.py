@@ -67,6 +67,7 @@ def _sum_one(
     position: Array, normal: Array, radiance: Array, area: Array, bound: float, i: Any, j: Any, rows: tuple[int, int],
     columns: tuple[int, int], result: Array,
 ) -> None:
+    # L ds max(0, G - b), G = cos cos / r^2
     x, y, z = float(position[0, i, j]), float(position[1, i, j]), float(position[2, i, j])
     nx, ny, nz = float(normal[0, i, j]), float(normal[1, i, j]), float(normal[2, i, j])
     red, green, blue = 0.0, 0.0, 0.0

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.lights import PixelLights
 
+
 def sii_lobes(frame: "Frame", settings: SiiSettings) -> Array:
     """Return the radiance towards the eye that receivers' lobes make of the pixel lights of `sii`.
 

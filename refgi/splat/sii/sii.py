@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from refgi.lights import PixelLights
     from refgi.rsm import Projection
 
+
 def sii(frame: "Frame", settings: SiiSettings) -> Array:
     """Light every pixel by pixel lights.
 

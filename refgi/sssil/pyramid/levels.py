@@ -22,6 +22,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.frame import Frame
 
+
 def pyramid(frame: "Frame", settings: HssilSettings) -> list[Level]:
     """Return what a camera sees at the resolutions at which light is gathered.
 

@@ -26,6 +26,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.frame import Frame
 
+
 def clamp_to_neighbourhood(new: Array, covered: Array, deviations: float, radius: int, earlier: Array) -> None:
     """Clamp earlier light to so many standard deviations about the mean of the new light around each pixel.
 

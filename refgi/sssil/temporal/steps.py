@@ -17,6 +17,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.frame import Frame
 
+
 @stage("sssil.reprojection", kept=False)
 def reprojection(
     position: Array, normal: Array, triangle_id: Array, projection: Projection, depth: Array, normal_before: Array,

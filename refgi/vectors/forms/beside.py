@@ -21,7 +21,7 @@ Names = Mapping[str, str]  # leaf of a stage's parameters or output: the case's 
 BY_INVERSE = (("w = np.divide(d, r, out=np.zeros_like(d), where=r > 0)",
                "w = d * np.divide(1, r, out=np.zeros_like(r), where=r > 0)"),)
 NO_BUGS = "likely bugs"  # fact of a stage that has none, and why
-MOST_WORK = 10_000_000  # half a second for each likely bug, and some hundred MB
+MOST_WORK = 10_000_000  # a second and 600 MB for each likely bug
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ EQ2 = "SII Eq. 2 and 3; unit directions and r^2 (E-SII-02)"
 NORM = "(P + 1) / (2 pi K), K the share of the lobe's integral above the surface; 0 where K is below 1e-12"
 POINTS = ("receivers.position", "lights.position")
 
+
 def pair_sum(arguments: Arguments) -> Described:
     """Return Eq. 2 and 3 without clamp or with discs."""
     lights, settings, count = arguments["lights"], arguments["settings"], arguments["lights"].flux.shape[1]

@@ -31,6 +31,7 @@ from tests.benchmarks.papers.conftest import PAPER_STEPS, table
 
 pytestmark = pytest.mark.slow  # the whole paper is made
 
+
 @pytest.fixture
 def figures(reproduced):
     return reproduced("val")[1]

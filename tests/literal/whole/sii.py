@@ -3,6 +3,8 @@
 What the literal text has no word for: random shares of the threshold, and meshes that are drawn (tests/naive).
 """
 
+import copy
+
 import numpy as np
 
 from refgi.literal import sii as literal
@@ -19,6 +21,17 @@ STREAMS = 3, 3 + 256  # of the random shares of both parts
 def sii(frame, settings, lights, footprint=None):
     """Return the irradiance (3, h, w) of a frame by its pixel lights; `footprint` is the area (N,) of each."""
     return occluded_of(frame, settings, picture(frame, settings, lights, footprint, lambda weight: weight))
+
+
+def stored(frame, lights):
+    """Return a frame with the G-buffer that textures keep, and the lights that they do."""
+    buffer, seen = frame.gbuffer, copy.copy(frame)
+    position, normal = literal.stored_surface(buffer.position, buffer.normal)
+    vars(seen)["gbuffer"] = buffer.with_channels(
+        {**buffer.recorded(), "position": position, "normal": normal}, np.float64)
+    names = "position", "normal", "flux", *(("lobe_flux", "lobe_axis") if lights.lobe_flux is not None else ())
+    kept = literal.stored_lights(*(getattr(lights, name) for name in names))
+    return seen, lights._replace(**dict(zip(names, kept, strict=True)))
 
 
 def cut_irradiance(frame, settings, lights, footprint=None):

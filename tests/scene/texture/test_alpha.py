@@ -252,8 +252,6 @@ def test_merge_gives_meshes_their_holes() -> None:
         pytest.fail("a texture without coordinates was taken")
 
 
-
-
 def obj(folder: Path, library: str, faces: str = "f 1/1 2/2 3/3\n") -> Path:
     """Write a triangle whose coordinates are the corners of a picture, and two pictures."""
     (folder / "wood.png").write_bytes(encoded(Pictures.fromarray(CODES[..., :3])))

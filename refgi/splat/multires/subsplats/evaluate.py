@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from refgi.rays import Tracer
     from refgi.rsm import GBuffer
 
+
 def _point_steps(*arguments: Any, **named: Any) -> tuple[Array, Array]:
     from refgi.splat.multires.subsplats.steps import point_steps
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.rsm import GBuffer
 
+
 @stage("multires.subsplat_facing", kept=False)
 def subsplat_facing(
     vertices: Array, faces: Array, point_normal: Array, triangle_id: Array, pixel: Array

@@ -26,6 +26,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.rsm import GBuffer
 
+
 @stage("multires.points", kept=False)
 def points(
     position: Array, normal: Array, covered: Array, level: Array, row: Array, column: Array, pixel: Array,

@@ -28,8 +28,8 @@ likely bugs of its stages as rows, `cause :: list :: old => new :: paper`, each 
 Who would contradict it: kernels must agree with it (`tests/vectors/test_forms.py`), and functions are held by tests
 that are neither a kernel nor a copy, by closed forms, printed numbers, cases counted by hand, quadrature or rays
 (`tests/literal`); those that reach a function are named beside it, `-` where none does. The ports to C and GLSL
-(`examples/ports`) know neither. Where it casts nothing it runs with 64 significant bits and with 50 digits as well, and is
-then what the rounding of kernels is measured against ([](precision.md)).
+(`examples/ports`) know neither. Where it casts nothing it runs with 64 significant bits and with 50 digits as well, and
+is then what the rounding of kernels is measured against ([](precision.md)).
 
 `refgi render SCENE --size 64x48 --engine literal` makes a picture with it in place of the kernels of direct light, sums
 over pixel lights, rectangles of area lights, and the blur and upsampling of levels, and says how long each took.

@@ -4,9 +4,11 @@ import dataclasses
 import json
 from typing import ClassVar, Literal
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import refgi
 from refgi.cli.group import VerbGroup
 from refgi.cli.settings import by_method, has_seed, settings_for
 from refgi.errors import InputError
@@ -87,6 +89,14 @@ def test_presets_are_settings_of_their_method(method):
         assert of(known.settings, **flat(preset)) == preset
     with pytest.raises(InputError, match=f"preset: expected one of default.* for {method}, got 'other'"):
         settings_for(method, [], preset="other")
+
+
+@pytest.mark.filterwarnings("ignore::refgi.errors.RefgiWarning")  # of what printed values cost
+@pytest.mark.parametrize(("method", "preset"), [(method, name) for method in METHODS for name in METHODS[method].presets])
+def test_presets_make_a_picture(method, preset):
+    picture = refgi.render("cornell_box", method, METHODS[method].preset(preset), width=18, height=14)
+    assert np.isfinite(picture.radiance).all()
+    assert picture.irradiance.any()
 
 
 def test_papers_have_their_presets():

@@ -73,7 +73,8 @@ def _irradiance(
     _resolve_channels(buffer, subsplats)
     few = isinstance(subsplats, ByError) and subsplats.visibility is None and clusters(lights, settings.lightcuts)
     some = thinned(lights, footprint) if few or settings.bounded is not None else (lights, footprint)
-    receivers = Receivers(buffer.position, buffer.normal, buffer.covered)
+    seen = frame.gbuffer  # its pixels are those of the frame's albedo and direct light, also where `buffer` is finer
+    receivers = Receivers(seen.position, seen.normal, seen.covered)
     warn_of_clamp(receivers, some[0], pairs, some[1], "multires")
     report_sampling(frame, receivers, lights, pairs, footprint, "multires", all_summed=some[0] is lights)
     if isinstance(subsplats, ByError):

@@ -30,6 +30,7 @@ from numba.np.arrayobj import make_array
 from refgi.jit.cache import OVERLOADS, KernelCache
 
 WIDEST = "avx512f"
+WIDE_VECTORS = '"prefer-vector-width"="512"'
 
 
 def has_wide_registers() -> bool:
@@ -71,7 +72,21 @@ OPTIONS = {"nopython": True, "nogil": True, "fastmath": False, "error_model": "n
            "no_cfunc_wrapper": True}
 
 
-class CalleeLibrary(JITCodeLibrary):
+class Library(JITCodeLibrary):
+    """LLVM code whose loops take registers of 512 bits where there are such.
+
+    Unless told so, LLVM takes 256 bits on processors that once ran slower with wider ones.
+    """
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        """Add a module, its functions marked."""
+        for function in ir_module.functions:
+            if function.blocks:
+                set.add(function.attributes, WIDE_VECTORS)  # past llvmlite's list, which has no attributes with values
+        super().add_ir_module(ir_module)
+
+
+class CalleeLibrary(Library):
     """LLVM code of a callee: linked into its callers, not made native by itself.
 
     Loops are optimised before that: as a part of a large caller the compiler would no longer find that their arrays do
@@ -94,6 +109,19 @@ class EntryPoint:
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
+class KernelLowering(NativeLowering):
+    """Lower a function to LLVM code of a `Library`, and make it native."""
+
+    _name = "kernel_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower."""
+        state.library = Library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return bool(super().run_pass(state))
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
 class CalleeLowering(NativeLowering):
     """Lower a function to LLVM code without an interface to Python."""
 
@@ -112,16 +140,24 @@ class CalleeLowering(NativeLowering):
         return True
 
 
-class CalleeCompiler(CompilerBase):
-    """Numba's usual passes, with `CalleeLowering` at their end."""
+class KernelCompiler(CompilerBase):
+    """Numba's usual passes, with a lowering of ours at their end."""
+
+    lowering: type[NativeLowering] = KernelLowering
 
     def define_pipelines(self) -> list[Any]:
         """Return the one pipeline."""
         manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        manager.passes = [(CalleeLowering if step is NativeLowering else step, text) for step, text in manager.passes]
+        manager.passes = [(self.lowering if step is NativeLowering else step, text) for step, text in manager.passes]
         manager._finalized = False  # so that the pass that is new is looked up
         manager.finalize()
         return [manager]
+
+
+class CalleeCompiler(KernelCompiler):
+    """The same for what other kernels call."""
+
+    lowering = CalleeLowering
 
 
 class Callee(CPUDispatcher):
@@ -144,7 +180,7 @@ class Kernel(CPUDispatcher):
     """
 
     def __init__(self, function: Callable[..., Any], compiled: Callable[[], Callable[..., Any]] | None = None) -> None:
-        super().__init__(function, {}, dict(OPTIONS))
+        super().__init__(function, {}, dict(OPTIONS), KernelCompiler)
         self._cache = KernelCache(function)
         self.callee = Callee(function, {}, dict(OPTIONS), CalleeCompiler)
         if compiled is not None:

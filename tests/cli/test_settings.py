@@ -92,7 +92,8 @@ def test_presets_are_settings_of_their_method(method):
 
 
 @pytest.mark.filterwarnings("ignore::refgi.errors.RefgiWarning")  # of what printed values cost
-@pytest.mark.parametrize(("method", "preset"), [(method, name) for method in METHODS for name in METHODS[method].presets])
+@pytest.mark.parametrize(("method", "preset"),
+                         [(method, name) for method in METHODS for name in METHODS[method].presets])
 def test_presets_make_a_picture(method, preset):
     picture = refgi.render("cornell_box", method, METHODS[method].preset(preset), width=18, height=14)
     assert np.isfinite(picture.radiance).all()

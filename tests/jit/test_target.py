@@ -1,5 +1,9 @@
 """The width of registers that loops are shaped for."""
 
+import os
+import subprocess
+import sys
+
 import llvmlite.binding
 import pytest
 
@@ -26,3 +30,25 @@ def test_else_the_processor_does(monkeypatch, name):
     for has in (True, False):
         monkeypatch.setattr(llvmlite.binding, "get_host_cpu_features", lambda has=has: {"avx512f": has})
         assert has_wide_registers() is has
+
+
+SCALE = """
+from numba import float32
+from refgi.jit import kernel
+
+@kernel
+def scale(a, b):
+    for i in range(a.size):
+        b[i] *= a[i]
+
+scale.compile((float32[::1], float32[::1]))
+print("".join(scale.inspect_asm().values()))
+"""
+
+
+def test_registers_of_512_bits_are_used_where_llvm_would_take_half(tmp_path):
+    (tmp_path / "scale.py").write_text(SCALE)
+    target = {"NUMBA_CPU_NAME": "skylake-avx512", "NUMBA_CPU_FEATURES": "", "REFGI_CACHE_DIR": str(tmp_path / "cache")}
+    run = subprocess.run([sys.executable, tmp_path / "scale.py"], env=os.environ | target, check=True,
+                         capture_output=True, text=True)
+    assert "zmm" in run.stdout

@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 # a file's tests run in one process, so that few kernels are compiled twice; files in the order of tests/conftest.py
 PYTEST := $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --durations 25 --durations-min 5
 
-.PHONY: demo test quick test-for test-all check evidence bench stress mutate kit-score docs clean
+.PHONY: demo test quick test-for test-all check evidence bench stress mutate kit-score records docs clean
 
 demo: $(VENV)/run.stamp
 	$(BIN)/refgi compare cornell_box --methods sii,multires,val,hssil --out out/
@@ -31,6 +31,7 @@ check: $(VENV)/dev.stamp
 	$(BIN)/lint-imports
 	$(BIN)/numpydoc lint $$(git ls-files 'refgi/*.py' ':!refgi/cli')
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/python -m benchmarks records
 
 evidence: $(VENV)/dev.stamp
 	$(PYTEST) tests -m feature --all --evidence -q
@@ -46,6 +47,9 @@ mutate: $(VENV)/dev.stamp
 
 kit-score: $(VENV)/dev.stamp
 	$(BIN)/python -m benchmarks kit-score --out out/kit-score
+
+records: $(VENV)/dev.stamp
+	$(BIN)/python -m benchmarks records --make
 
 docs: $(VENV)/dev.stamp
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html

@@ -6,7 +6,8 @@ faults into a copy of the sources and counts those that no test catches; `python
 ports and counts those that the conformance kit names; `python -m benchmarks kill-batch` kills a batch at random
 moments and counts what is lost; `python -m benchmarks skips` tells what each skip saves; `python -m benchmarks
 accuracy` makes benchmarks/results again; `python -m benchmarks before-after` holds two results of `refgi bench` against
-each other; `python -m benchmarks stability` tells what is promised of numbers, files and processes, and the worst that
+each other; `python -m benchmarks records` lists what was measured by older code, and makes it again;
+`python -m benchmarks stability` tells what is promised of numbers, files and processes, and the worst that
 was found.
 """
 
@@ -28,9 +29,9 @@ FOLDER = Path(__file__).parent
 COMMANDS = {"accuracy": "benchmarks.accuracy", "before-after": "benchmarks.before_after",
             "paper": "benchmarks.papers.runner", "mutate": "benchmarks.mutate.runner",
             "kit-score": "benchmarks.kit_score", "kill-batch": "benchmarks.kill_batch", "skips": "benchmarks.skips",
-            "stability": "benchmarks.stability.runner"}
+            "records": "benchmarks.records", "stability": "benchmarks.stability.runner"}
 NOT_TOPICS = {"__init__", "__main__", "accuracy", "before_after", "harness", "signatures", "kit_score", "kill_batch",
-              "skips", "llvmpipe", "embree_packets", "mitsuba_worker"}
+              "records", "skips", "llvmpipe", "embree_packets", "mitsuba_worker"}
 
 
 def topics() -> list[str]:

@@ -1,0 +1,47 @@
+"""Records that were measured: stale where the code they rest on is another, made again, stamped one by one."""
+
+import pytest
+
+from benchmarks.records import RECORDS, ROOT, Record, digest, make, stamps, table
+
+SCRIPT = "import pathlib; p = pathlib.Path('made'); p.write_text((p.read_text() if p.exists() else '') + '.')"
+
+
+@pytest.fixture
+def root(tmp_path):
+    (tmp_path / "refgi").mkdir()
+    (tmp_path / "benchmarks/results").mkdir(parents=True)
+    (tmp_path / "refgi/sums.py").write_text('"""Sums."""\n\n\ndef twice(x):\n    """Double."""\n    return 2 * x\n')
+    return tmp_path
+
+
+def states(root, records):
+    return list(table(root, records).columns[3].cells)
+
+
+def test_a_record_is_made_again_where_its_code_changed(root):
+    records = {"sums": Record(("-c", SCRIPT), "docs/sums.md")}
+    assert states(root, records) == ["stale"]
+    assert make(root, records) == make(root, records) == []
+    assert (root / "made").read_text() == "."
+    assert states(root, records) == ["fresh"]
+    path = root / "refgi/sums.py"
+    path.write_text(path.read_text().replace("Double", "Twice as much").replace("2 * x", "2 * x  # exact"))
+    assert states(root, records) == ["fresh"]
+    path.write_text(path.read_text().replace("2 * x", "3 * x"))
+    assert states(root, records) == ["stale"]
+    make(root, records)
+    assert (root / "made").read_text() == ".."
+
+
+def test_what_fails_keeps_no_stamp_and_the_rest_goes_on(root):
+    records = {"broken": Record(("-c", "raise SystemExit(3)"), "-"), "sums": Record(("-c", SCRIPT), "-")}
+    assert make(root, records) == ["broken"]
+    assert list(stamps(root)) == ["sums"]
+    assert states(root, records) == ["stale", "fresh"]
+
+
+def test_records_rest_on_files_that_are_there():
+    assert all(any(ROOT.glob(pattern)) for record in RECORDS.values() for pattern in record.sources)
+    assert len({digest(ROOT, record) for record in RECORDS.values()}) == len(RECORDS)
+    assert all((ROOT / record.read_by).exists() for record in RECORDS.values())

@@ -7,13 +7,15 @@ Symbols: d vector from receiver to sample (m), c = max(0, n . d), s = max(0, -m 
 """
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import receivers
-from refgi.rays import far_offset
+from refgi.rays import Tracer, far_offset
+from refgi.rsm.buffers.gbuffer import GBuffer
+from refgi.scene.model import Geometry
 from refgi.sssil.crown.form_factor import disc_texels, form_factor, form_of
 from refgi.sssil.crown.gather import level_factor
 from refgi.sssil.crown.pattern import (
@@ -31,9 +33,6 @@ from refgi.sssil.settings import HssilSettings, SamplingSettings
 from refgi.stages import report_progress, stage, tally
 from refgi.types import Array
 
-if TYPE_CHECKING:
-    from refgi.frame import Frame
-
 BATCH = 1 << 18  # pairs held at a time
 
 
@@ -45,6 +44,14 @@ class Surfels(NamedTuple):
     area: Array  # (n,) m^2
     facing: Array  # (3, n): normals of the triangles
     origin: Array  # (3, n) float32: where rays start and end, world space, m
+
+
+class Traced(NamedTuple):
+    """What a view's shadow rays start from and meet."""
+
+    buffer: GBuffer  # the surfaces that its pixels show
+    geometry: Geometry
+    tracer: Tracer
 
 
 class SampleOffsets(NamedTuple):
@@ -61,21 +68,21 @@ class SampleOffsets(NamedTuple):
 
 @stage("sssil.rays")
 def ray_gather(
-    level: Level, index: int, settings: HssilSettings, frame: "Frame", senders: Level | None = None, *,
+    level: Level, index: int, settings: HssilSettings, traced: Traced, senders: Level | None = None, *,
     batch: int = BATCH,
 ) -> Array:
     """Sum the light of the samples around each texel of a level that no surface occludes.
 
     level: Receivers, and senders unless those are given.
     index: 0 for the first level, whose inner disc is sampled as well.
-    frame: The scene whose view the level is.
+    traced: Of the view whose level it is.
     senders: The same level with other surface points, as senders.
     batch: Pairs in memory at a time; changes no bit of the result.
     -> (3, h, w): Irradiance, W/m^2, in the dtype of the level. Excludes albedo/pi.
     """
     senders = level if senders is None else senders
-    surfels, samples = surfels_of(level, frame), _samples(level, index, settings.sampling)
-    sending = surfels if senders is level else surfels_of(senders, frame)
+    surfels, samples = surfels_of(level, traced), _samples(level, index, settings.sampling)
+    sending = surfels if senders is level else surfels_of(senders, traced)
     radiance = senders.radiance.reshape(3, -1)
     total, count = np.zeros(radiance.shape), samples.weight.shape[2]
     tally("pairs", lambda: total.shape[1] * count)
@@ -89,18 +96,18 @@ def ray_gather(
         size = (last - first) * count
         _write_rays(surfels, sending, samples, level.shape, first, last, form, share, rays[0], rays[1], reach,
                     transfer, sender)
-        frame.tracer.fill_occluded(rays[0][:size], rays[1][:size], reach[:size], blocked[:size])
+        traced.tracer.fill_occluded(rays[0][:size], rays[1][:size], reach[:size], blocked[:size])
         add_unoccluded(radiance, first, last, count, blocked, transfer, sender, total)
         report_progress(last / total.shape[1])
     return (total * level_factor(index, settings)).reshape(level.radiance.shape).astype(level.radiance.dtype)
 
 
-def surfels_of(level: Level, frame: "Frame") -> Surfels:
+def surfels_of(level: Level, traced: Traced) -> Surfels:
     """Return texels with the triangles that they lie on; rays end where the texel's own pixel shows its surface."""
     covered = np.flatnonzero(level.pixel.reshape(-1) >= 0)
     pixel = level.pixel.reshape(-1)[covered]
-    position, normal, triangle = frame.gbuffer.at(pixel, "position", "normal", "triangle_id")
-    starts = receivers(frame.scene.geometry, position, normal, triangle, frame.tracer.grain)
+    position, normal, triangle = traced.buffer.at(pixel, "position", "normal", "triangle_id")
+    starts = receivers(traced.geometry, position, normal, triangle, traced.tracer.grain)
     facing, origin = np.zeros((3, level.pixel.size)), np.zeros((3, level.pixel.size), np.float32)
     facing[:, covered], origin[:, covered] = starts.facing, starts.origin
     position, normal = (plane.reshape(3, -1).astype(np.float64) for plane in (level.position, level.normal))

@@ -57,7 +57,7 @@ def test_the_camera_placed_first_faces_the_side_that_the_picture_misses(evidence
 def test_eyes_are_in_free_space(name):
     """Property: each sees a place that the picture shows as well, from the side that the picture shows."""
     frame = small(load_scene(name))
-    points = visible_points(frame)
+    points = visible_points(frame.gbuffer)
     offset = frame.tracer.offsets(points.position)[:, None]
     cameras = place_cameras(frame, 4)
     assert len(cameras) > 1
@@ -124,7 +124,7 @@ def test_every_direction_has_a_view(up, ahead):
     """Property: right, down and forward are a right-handed frame, also for a view along the upward direction."""
     frame = Frame(hidden_side().with_camera(eye=(0.0, 0.3, 5.0), target=(0.1, 0.0, 0.0), up=up), width=8, height=6)
     ahead = np.array([ahead]) / np.linalg.norm(ahead)
-    axes = _wide_views(frame, np.zeros((1, 3)), ahead).axes[0]
+    axes = _wide_views(frame.gbuffer.projection, frame.scene.camera.up, np.zeros((1, 3)), ahead).axes[0]
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(axes[2], ahead[0], atol=1e-12)
     assert np.linalg.det(axes) > 0

@@ -49,13 +49,7 @@ BAND = 4  # rows that a thread takes at once
 GROUP = 256  # samples that are summed before they are added to the total
 
 
-def _steps(*arguments: Any, **named: Any) -> Array:
-    from refgi.sssil.crown.steps import gather_steps
-
-    return gather_steps(*arguments, **named)
-
-
-@stage("sssil.gather", steps=_steps)
+@stage("sssil.gather", steps="refgi.sssil.crown.steps.gather_steps")
 def gather(level: Level, index: int, settings: HssilSettings, senders: Level | None = None) -> Array:
     """Sum the light of the samples around each texel of a level (Eq. 1).
 

@@ -128,13 +128,7 @@ def with_frames(irradiance: Array, frames: Array | None) -> Array:
     return irradiance if frames is None else np.concatenate([irradiance, frames[None]])
 
 
-def _steps(*arguments: Any, **named: Any) -> dict[str, Array]:
-    from refgi.sssil.temporal.steps import temporal_steps
-
-    return temporal_steps(*arguments, **named)
-
-
-@stage("sssil.temporal", kept=False, steps=_steps)
+@stage("sssil.temporal", kept=False, steps="refgi.sssil.temporal.steps.temporal_steps")
 def temporal_filter(
     irradiance: Array, frame: "Frame", geometry: Geometry, history: History, settings: TemporalSettings
 ) -> Filtered:

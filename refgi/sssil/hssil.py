@@ -181,15 +181,15 @@ def glossy_level(
     radiance = np.asarray(senders.radiance.reshape(3, -1), np.float64)
     total, step = np.zeros((3, len(points.pixel))), max(1, BATCH // max(count, 1))
     rays = None if traced is None else _Rays(traced, points, senders)
-    form, share = form_of(settings.senders.form_factor), settings.senders.disc_share
+    form = form_of(settings.senders)
     transfer, sender = np.empty(step * count), np.empty(step * count, np.int64)
     blocked = np.zeros(step * count, np.bool_)
     for first in range(0, total.shape[1], step):
         last = min(first + step, total.shape[1])
         if slices is None:
-            draw_samples(to, first, last, senders, draws, form, share, transfer, sender)
+            draw_samples(to, first, last, senders, draws, form, transfer, sender)
         else:
-            march_samples(to, first, last, senders, slices, form, share, transfer, sender)
+            march_samples(to, first, last, senders, slices, form, transfer, sender)
         if rays is not None:
             rays.trace(first, last, count, transfer, sender, blocked)
         add_unoccluded(radiance, first, last, count, blocked, transfer, sender, total)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
-from refgi.jit import threads
 from refgi.rays import Tracer
 from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import load_scene
@@ -81,14 +80,6 @@ def test_each_camera_adds_to_those_before_it_and_the_first_are_the_same():
     one, three = place_cameras(frame, 1), place_cameras(frame, 3)
     assert three[:1] == one
     assert len(set(three)) == 3
-
-
-def test_cameras_are_the_same_for_any_number_of_threads():
-    chosen = []
-    for count in (1, 2):
-        with threads(count):
-            chosen.append(place_cameras(small(load_scene("cornell_box")), 3))
-    assert chosen[0] == chosen[1]
 
 
 def nothing_missed():

@@ -2,12 +2,10 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
 
 from refgi.frame import Frame
-from refgi.jit import threads
 from refgi.literal import hssil_crown as literal
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
@@ -105,16 +103,6 @@ def test_single_precision_rounds_and_no_more():
     found = gather(level, 0, settings)
     assert found.dtype == np.float32
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING[np.float32] * expected.max())
-
-
-@pytest.mark.parametrize("pattern", ["interleaved", "row", "pixel"])
-def test_same_bits_for_any_number_of_threads(pattern):
-    """Property: one thread and all of them."""
-    level, settings = random_level((70, 33), np.float32), replaced(SETTINGS, {"pattern": pattern})
-    found = gather(level, 0, settings)
-    with threads(1):
-        np.testing.assert_array_equal(gather(level, 0, settings), found)
-    assert numba.get_num_threads() >= 1
 
 
 @pytest.mark.feature("HSS-10")

@@ -121,11 +121,14 @@ def test_every_direction_has_a_view(up, ahead):
     assert np.linalg.det(axes) > 0
 
 
-@pytest.mark.parametrize("size", [(1, 1), (1, 50), (50, 1)])
+@pytest.mark.parametrize("size", [(1, 1), (1, 50), (50, 1), (24, 16)])
 def test_pictures_of_any_shape(size):
-    for camera in place_cameras(small(hidden_side(), width=size[0], height=size[1]), 2):
+    frame = small(hidden_side(), width=size[0], height=size[1])
+    half, longer = math.tan(frame.scene.camera.vfov / 2), max(1.0, size[0] / size[1])
+    wider = max(half, math.tan(math.radians(44)) / longer)  # the longer side sees 88 degrees at least
+    for camera in place_cameras(frame, 2):
         assert (camera.width, camera.height) == size
-        assert 0 < camera.vfov < math.pi / 2
+        assert math.tan(camera.vfov / 2) == pytest.approx(wider)
 
 
 def test_candidates_lie_in_every_direction_alike():

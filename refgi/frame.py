@@ -238,13 +238,7 @@ def sum_of_lamps(parts: list[Array]) -> Array:
     return np.asarray(sum(parts[1:], start=parts[0]))
 
 
-def _compose_steps(direct: Array, indirect: Array | None, buffer: "GBuffer", materials: MaterialTable) -> Array:
-    from refgi.rsm.buffers.leaving import leaving_steps
-
-    return leaving_steps(direct, indirect, buffer, materials)
-
-
-@stage("frame.compose", steps=_compose_steps)
+@stage("frame.compose", steps="refgi.rsm.buffers.leaving.leaving_steps")
 def compose(direct: Array, indirect: Array | None, buffer: "GBuffer", materials: MaterialTable) -> Array:
     """Turn irradiance into what the camera receives.
 

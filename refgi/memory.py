@@ -10,6 +10,18 @@ def available_bytes() -> int | None:
     return min(found) if found else None
 
 
+def physical_memory() -> float:
+    """Return the memory that this process may have at most, in bytes; infinity where the platform does not say."""
+    try:
+        import resource
+
+        present = float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+        allowed = resource.getrlimit(resource.RLIMIT_AS)[0]
+    except (AttributeError, ImportError, OSError, ValueError):
+        return float("inf")
+    return present if allowed == resource.RLIM_INFINITY else min(present, float(allowed))
+
+
 def _machine_bytes() -> int | None:
     try:
         for line in Path("/proc/meminfo").read_text().splitlines():

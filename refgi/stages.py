@@ -28,6 +28,7 @@ returns. What several stages of a module take stands once in the module's docstr
 
 import dataclasses
 import functools
+import importlib
 import inspect
 import time
 import weakref
@@ -136,14 +137,15 @@ _log: ContextVar[Log | None] = ContextVar("refgi_stage_log", default=None)
 
 
 def stage(
-    name: str, *, kept: bool = True, steps: Callable[..., Any] | Literal["inside"] | None = None, each: str = ""
+    name: str, *, kept: bool = True, steps: Callable[..., Any] | str | None = None, each: str = ""
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Name a pure function as one step of a method; the decorated function behaves as before.
 
     `name` is package.verb_or_noun and no other stage's; `kept`: whether a `Memory` keeps its results (not worth it
     where inputs are made anew in every call); `each`: what it runs once for, such as a lamp: test vectors number its
-    runs even where there is one. `steps`: "inside", where the stages that run inside are its steps, or a function that
-    makes the same of the same arguments one step after the other, each a stage, where this one makes several at once.
+    runs even where there is one. `steps`: "inside", where the stages that run inside are its steps, or a function, or
+    its module and name, that makes the same of the same arguments one step after the other, each a stage, where this
+    one makes several at once.
     That runs inside `observe(record=True, steps=True)` alone and returns what the steps made, by the output's fields.
     """
 
@@ -155,7 +157,7 @@ def stage(
                 return function(*args, **kwargs)
             return _observed(log, name, function, args, kwargs, log.memory if kept else None, steps)
 
-        call.stage_name, call.each = name, each  # type: ignore[attr-defined]
+        call.stage_name, call.each, call.steps = name, each, steps  # type: ignore[attr-defined]
         known = STAGES.setdefault(name, call)
         if (known.__module__, known.__qualname__) != (function.__module__, function.__qualname__):
             raise ValueError(f"stage {name!r}: {function.__qualname__} of {function.__module__} has the name of "
@@ -260,7 +262,7 @@ def report_progress(fraction: float) -> None:
 
 def _observed(
     log: Log, name: str, function: Callable[..., R], args: tuple[Any, ...], kwargs: dict[str, Any],
-    memory: Memory | None, steps: Callable[..., Any] | Literal["inside"] | None,
+    memory: Memory | None, steps: Callable[..., Any] | str | None,
 ) -> R:
     inputs = (*args, *(item for pair in sorted(kwargs.items()) for item in pair))
     if memory is not None:
@@ -292,12 +294,12 @@ def _observed(
                                   output=recorded(output), arguments=arguments, value=output)
         if log.steps and steps == "inside":
             run = dataclasses.replace(run, steps=run.output)
-        elif log.steps and callable(steps):
+        elif log.steps and steps is not None:
             del log.runs[position:]  # what ran inside; the steps say it finer
             log._depth += 1
             others, log.memory = log.memory, None  # what ran inside is not there for them to reuse
             try:
-                made = steps(*args, **kwargs)
+                made = (_named(steps) if isinstance(steps, str) else steps)(*args, **kwargs)
                 log._steps[id(output)] = output, made
                 run = dataclasses.replace(run, steps=recorded(made))
             finally:
@@ -307,6 +309,12 @@ def _observed(
     if memory is not None:
         memory.keep(name, inputs, output)
     return output
+
+
+def _named(steps: str) -> Callable[..., Any]:
+    module, _, name = steps.rpartition(".")
+    function: Callable[..., Any] = getattr(importlib.import_module(module), name)
+    return function
 
 
 def _bytes_made(value: Any, known: dict[int, weakref.ref[Any]]) -> int:

@@ -47,6 +47,18 @@ def known():
     return {name: stage for name, stage in stages.STAGES.items() if stage.__module__.startswith("refgi.")}
 
 
+def test_steps_take_what_their_stage_takes(known):
+    """Steps are named in words and imported when someone records them: a name that is wrong would be found there."""
+    named = [stage for stage in known.values() if isinstance(stage.steps, str) and stage.steps != "inside"]
+    assert len(named) > 20
+    for stage in named:
+        takes, given = (inspect.signature(one).parameters.values() for one in (
+            pkgutil.resolve_name(stage.steps), inspect.unwrap(stage)))
+        by_both = list(zip(takes, given, strict=False))
+        assert len(by_both) == len(given), stage.steps
+        assert all((a.name, a.kind, a.default) == (b.name, b.kind, b.default) for a, b in by_both), stage.steps
+
+
 def functions(tree):
     return [node for node in tree.body if isinstance(node, ast.FunctionDef)]
 

@@ -22,7 +22,8 @@ from refgi.literal.pairs import pair
 from refgi.pairs.pair_sum import clamped_term, geometry_term
 from refgi.pairs.sphere_sum import cone_term
 from refgi.rays.watertight import far_offset, ray_offset
-from refgi.sssil.crown.form_factor import length_scale, term
+from refgi.sssil.crown.form_factor import Facing, term
+from refgi.sssil.crown.layout import length_scale
 from refgi.sssil.pyramid.view import pixel_surface
 from refgi.sssil.visibility.slices import PLANES, direction, heights, pack
 from refgi.stress.promises import Row
@@ -54,8 +55,8 @@ def _offsets(x: Any, y: Any, z: Any, grain: Any) -> Any:
 @kernel
 def _terms(x: Array, discs: Array, out: Array) -> None:
     for i in range(x.shape[1]):
-        out[0, i] = term(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i], x[6, i], x[7, i], x[8, i], x[9, i],
-                         x[10, i], x[11, i], x[12, i], discs[i])
+        out[0, i] = term(Facing(x[0, i], x[1, i], x[2, i], x[3, i], x[4, i], x[5, i]),
+                         Facing(x[6, i], x[7, i], x[8, i], x[9, i], x[10, i], x[11, i]), x[12, i], discs[i])
 
 
 @kernel

@@ -15,7 +15,7 @@ from refgi.method import Extent
 from refgi.methods import find_method
 from refgi.scene import Camera, DirectionalLight, Light, PointLight, Scene, SpotLight, load_scene
 from refgi.scene.files import did_you_mean
-from refgi.scene.mesh import BYTES_OF_ALPHA, BYTES_OF_COLOUR
+from refgi.scene.texture.image import BYTES_OF_ALPHA, BYTES_OF_COLOUR
 
 KEYS = {
     "spot": ("position", "direction", "target", "inner_deg", "outer_deg", "falloff", "intensity"),

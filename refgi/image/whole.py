@@ -232,9 +232,8 @@ def _exr(path: Path) -> bool:
 
 
 def _png(path: Path) -> bool:
-    from refgi.image.png import read_png_attributes
-
-    return read_png_attributes(path) is not None
+    with path.open("rb") as file:
+        return f"tEXt{MARK}\0".encode() in file.read(START_OF_PAGE)
 
 
 def _json(path: Path) -> bool:

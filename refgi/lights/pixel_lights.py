@@ -12,7 +12,7 @@ no light from one map to another.
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
@@ -28,8 +28,20 @@ from refgi.sampling import PIXEL_LIGHTS, draws, grid, halton
 from refgi.stages import stage
 from refgi.types import Array
 
-if TYPE_CHECKING:
-    from refgi.lights.steps import MapPlanes
+
+class MapPlanes(NamedTuple):
+    """What lights read of a map."""
+
+    position: Array  # (3, H, W) m
+    normal: Array  # (3, H, W) unit vectors
+    flux: Array  # (3, H, W) W
+    lobe_flux: Array | None  # (3, H, W) W
+    lobe_axis: Array | None  # (3, H, W) unit vectors
+    lobe_exponent: Array | None  # (H, W)
+
+    def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
+        """Return channels at some texels (n,)."""
+        return tuple(values_at(getattr(self, name), texel) for name in names)
 
 
 class Drawn(NamedTuple):
@@ -42,13 +54,7 @@ class Drawn(NamedTuple):
     half: Array | None = None  # (n,) bool, whether it is of the second half of the draw; None: no draw
 
 
-def _draw_steps(rsms: Sequence[Rsm], **options: Any) -> dict[str, Array]:
-    from refgi.lights.steps import draw_steps
-
-    return draw_steps(rsms, **options)
-
-
-@stage("lights.draw", steps=_draw_steps)
+@stage("lights.draw", steps="refgi.lights.steps.draw_steps")
 def draw_texels(
     rsms: Sequence[Rsm],
     *,
@@ -108,13 +114,7 @@ def draw_texels(
     return drawn
 
 
-def _light_steps(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> dict[str, Array | None]:
-    from refgi.lights.steps import light_steps
-
-    return light_steps(rsms, drawn)
-
-
-@stage("lights.choose", steps=_light_steps)
+@stage("lights.choose", steps="refgi.lights.steps.light_steps")
 def lights_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> PixelLights:
     """Return drawn texels as pixel lights.
 
@@ -128,7 +128,7 @@ def lights_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> PixelLights:
     return gathered_lights(rsms, drawn)
 
 
-def gathered_lights(rsms: "Sequence[Rsm | MapPlanes]", drawn: Sequence[Drawn]) -> PixelLights:
+def gathered_lights(rsms: Sequence[Rsm | MapPlanes], drawn: Sequence[Drawn]) -> PixelLights:
     """Return drawn texels as pixel lights, those with flux: `lights_of` unobserved, or of plain arrays."""
     parts = []
     for index in _drawn_from(drawn):
@@ -162,13 +162,7 @@ def choose_pixel_lights(rsms: Sequence[Rsm], **options: Any) -> PixelLights:
     return lights_of(rsms, draw_texels(rsms, **options))
 
 
-def _area_steps(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> Array:
-    from refgi.lights.steps import area_steps
-
-    return area_steps(rsms, drawn)
-
-
-@stage("lights.areas", steps=_area_steps)
+@stage("lights.areas", steps="refgi.lights.steps.area_steps")
 def footprints_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> Array:
     """Return the surface area that each pixel light of `lights_of` stands for.
 
@@ -236,7 +230,7 @@ def _warped(rsm: Rsm, points: Array, importance: Array, warp: Warp) -> tuple[Arr
     return texel_of(warped[:, 1], height) * width + texel_of(warped[:, 0], width), weight
 
 
-def _weighted_lights(rsm: "Rsm | MapPlanes", texel: Array, weight: Array, half: Array | None) -> PixelLights:
+def _weighted_lights(rsm: Rsm | MapPlanes, texel: Array, weight: Array, half: Array | None) -> PixelLights:
     """Return the texels as lights with T/N, or T/N w, times their flux."""
     (flux,) = rsm.at(texel, "flux")
     scale = weight.astype(flux.dtype)
@@ -245,7 +239,7 @@ def _weighted_lights(rsm: "Rsm | MapPlanes", texel: Array, weight: Array, half: 
 
 
 def _filtered_lights(
-    rsm: "Rsm | MapPlanes", texel: Array, cell: Array, gain: float, half: Array | None
+    rsm: Rsm | MapPlanes, texel: Array, cell: Array, gain: float, half: Array | None
 ) -> PixelLights:
     by = rsm.flux.dtype.type(gain)
     flux = cell_sums(rsm.flux, cell, len(texel)) * by
@@ -258,7 +252,7 @@ def _filtered_lights(
     return _lights(rsm, texel, flux + np.where(glossy, 0, lobe), np.where(glossy, lobe, 0), half)
 
 
-def _lights(rsm: "Rsm | MapPlanes", texel: Array, flux: Array, lobe: Array | None, half: Array | None) -> PixelLights:
+def _lights(rsm: Rsm | MapPlanes, texel: Array, flux: Array, lobe: Array | None, half: Array | None) -> PixelLights:
     """Gather the chosen texels, leaving out those without flux."""
     has_flux = flux.any(axis=0) if lobe is None else flux.any(axis=0) | lobe.any(axis=0)
     chosen = texel[has_flux]

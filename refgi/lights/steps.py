@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from refgi.lights.footprints import areas_of, cell_sums, cells_of_grid, cells_of_nearest
 from refgi.lights.importance import importance as importance_of
-from refgi.lights.pixel_lights import Drawn, gathered_lights
+from refgi.lights.pixel_lights import Drawn, MapPlanes, gathered_lights
 from refgi.lights.shares import Pattern, map_shares
 from refgi.lights.warp import Warp, _clamped_to_texel, texel_of, warp_stacked
 from refgi.rsm.buffers.gbuffer import values_at
@@ -23,21 +23,6 @@ Lobes = Sequence[Array | None] | None
 
 NAMES = ("position", "normal", "flux", "lobe_flux", "lobe_axis", "lobe_exponent", "texel", "map_index")
 BELOW_1 = 1.0 - 2.0**-24  # the largest float32 below 1
-
-
-class MapPlanes(NamedTuple):
-    """What lights read of a map."""
-
-    position: Array  # (3, H, W) m
-    normal: Array  # (3, H, W) unit vectors
-    flux: Array  # (3, H, W) W
-    lobe_flux: Array | None  # (3, H, W) W
-    lobe_axis: Array | None  # (3, H, W) unit vectors
-    lobe_exponent: Array | None  # (H, W)
-
-    def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
-        """Return channels at some texels (n,)."""
-        return tuple(values_at(getattr(self, name), texel) for name in names)
 
 
 @stage("lights.halton_points", kept=False, each="lamp")

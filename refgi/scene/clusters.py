@@ -5,15 +5,12 @@ draws them reads each cluster's vertices from one place, projects them once and 
 """
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from refgi.jit import kernel, prange
 from refgi.types import Array
-
-if TYPE_CHECKING:
-    from refgi.scene.model import Geometry
 
 CLUSTER = 64  # triangles
 TABLE = 256  # places where a cluster's vertex is looked for; a power of two
@@ -33,20 +30,19 @@ class Clusters(NamedTuple):
     product: Array  # (c,) float64: greatest |e1| |e2| of a cluster's triangles, m^2
 
 
-def clusters(geometry: "Geometry") -> Clusters:
-    """Sort the triangles that have no holes along a Z-order curve, and cut it into pieces.
+def clusters(vertices: Array, faces: Array, bounds: tuple[Array, Array], holed: Array | None) -> Clusters:
+    """Sort triangles but those numbered as `holed` along a Z-order curve, and cut it into pieces.
 
     Which triangles share a cluster changes no picture.
     """
-    vertices, faces = geometry.vertices, geometry.faces
     number = len(faces)
     bits = min(max(math.ceil(math.log2(max(number, 1)) / 2 - 2), 1), MOST_BITS)  # some triangles share a cell
-    low, high = geometry.bounds
+    low, high = bounds
     side = float((high - low).max())
     places = np.empty(number, np.int64)
     _place_on_curve(vertices, faces, low, (1 << bits) / side if side > 0 else 0.0, bits, places)
-    if geometry.cut is not None:
-        places = np.delete(places, geometry.cut.face)
+    if holed is not None:
+        places = np.delete(places, holed)
     places.sort()
     number = len(places)
     face, corner = np.empty(number, np.int32), np.empty((number, 3), np.uint8)

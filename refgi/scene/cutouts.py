@@ -6,7 +6,7 @@ materials say where these are; `Scene` keeps its geometry in step with them.
 
 import weakref
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,10 +17,17 @@ from refgi.scene.texture.lookup import NO_MASKS, AlphaTable
 from refgi.scene.texture.table import WRAPS, Texture
 from refgi.types import Array
 
-if TYPE_CHECKING:
-    from refgi.scene.model import Geometry
-
 Key = tuple[tuple[Texture | None, float, float] | None, ...]  # of each material: what decides about holes
+
+
+class CutFaces(NamedTuple):
+    """The triangles that may have holes, for kernels: c of them."""
+
+    face: Array  # (c,) int32: which triangles, in mesh order
+    of_face: Array  # (m,) int32: which of them each triangle is, -1 for one without holes
+    uv: Array  # (c, 6) float64: u and v at the first corner, the second, the third
+    mask: Array  # (c,) int64: row of the table
+    table: AlphaTable
 
 
 class CutOuts:
@@ -44,21 +51,26 @@ class CutOuts:
             np.array(rows, np.int64).reshape(-1, 6),
             np.array([limits for _, *limits in distinct], np.float64).reshape(-1, 2))
 
+    def faces(self, material_of_face: Array, needed: int, uv: Array | None) -> CutFaces | None:
+        """Return those of m triangles that may have holes, None where none has; `needed`: materials that they name."""
+        expect(needed <= len(self.of_material), "geometry: cut_outs", f"those of {needed} materials",
+               len(self.of_material))
+        mask = self.of_material[material_of_face].astype(np.int64)
+        face = np.flatnonzero(mask >= 0).astype(np.int32)
+        if not len(face):
+            return None
+        textured = self.table.mask[mask[face], 1].any()
+        expect(uv is not None or not textured, "geometry: uv", "texture coordinates for its cut-outs", None)
+        uv = np.zeros((len(face), 6)) if uv is None else uv[face].reshape(-1, 6)
+        of_face = np.full(len(mask), -1, np.int32)
+        of_face[face] = np.arange(len(face))
+        return CutFaces(face, of_face, np.ascontiguousarray(uv, np.float64), mask[face], self.table)
+
     def __eq__(self, other: object) -> bool:
         return self is other or (isinstance(other, CutOuts) and self.key == other.key)
 
     def __hash__(self) -> int:
         return hash(self.key)
-
-
-class CutFaces(NamedTuple):
-    """The triangles that may have holes, for kernels: c of them."""
-
-    face: Array  # (c,) int32: which triangles, in mesh order
-    of_face: Array  # (m,) int32: which of them each triangle is, -1 for one without holes
-    uv: Array  # (c, 6) float64: u and v at the first corner, the second, the third
-    mask: Array  # (c,) int64: row of the table
-    table: AlphaTable
 
 
 NO_CUT = CutFaces(np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 6)), np.zeros(0, np.int64), NO_MASKS)
@@ -76,25 +88,6 @@ def cut_outs(materials: Sequence[Material]) -> CutOuts | None:
     if found is None:
         found = _in_use[key] = CutOuts(key)
     return found
-
-
-def cut_faces(geometry: "Geometry") -> CutFaces | None:
-    """Return the triangles of a geometry that may have holes, None where there are none."""
-    if geometry.cut_outs is None:
-        return None
-    of_material = geometry.cut_outs.of_material
-    expect(geometry.materials_needed <= len(of_material), "geometry: cut_outs",
-           f"those of {geometry.materials_needed} materials", len(of_material))
-    mask = of_material[geometry.material_of_face].astype(np.int64)
-    face = np.flatnonzero(mask >= 0).astype(np.int32)
-    if not len(face):
-        return None
-    textured = geometry.cut_outs.table.mask[mask[face], 1].any()
-    expect(geometry.uv is not None or not textured, "geometry: uv", "texture coordinates for its cut-outs", None)
-    uv = np.zeros((len(face), 6)) if geometry.uv is None else geometry.uv[face].reshape(-1, 6)
-    of_face = np.full(len(mask), -1, np.int32)
-    of_face[face] = np.arange(len(face))
-    return CutFaces(face, of_face, np.ascontiguousarray(uv, np.float64), mask[face], geometry.cut_outs.table)
 
 
 def _holes(material: Material) -> tuple[Texture | None, float, float] | None:

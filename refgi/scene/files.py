@@ -1,4 +1,4 @@
-"""File access of the readers, what the caller chooses of it, and `Contents`, the common result of all formats."""
+"""File access of the readers, and what the caller chooses of it."""
 
 import codecs
 import contextlib
@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
 from refgi.errors import InputError, RefgiWarning, expect, first_faults, nearest, shortened
-from refgi.scene.mesh import physical_memory
-from refgi.scene.model import Camera, Light, Mesh
+from refgi.memory import physical_memory
 from refgi.scene.source import record_file
 
 LightUnit = Literal["cd", "lm", "W/sr"]
@@ -77,15 +76,6 @@ def tolerate(text: str) -> None:
 
 MOST_PARTS = 1000  # of a key in TOML
 LONGEST_WORD, MOST_CANDIDATES = 200, 1000  # comparing words takes the square of their length, for each candidate
-
-
-class Contents(NamedTuple):
-    """What one mesh file holds, in its own world space, and the materials that it uses and does not define."""
-
-    meshes: tuple[Mesh, ...]
-    cameras: tuple[Camera, ...] = ()
-    lights: tuple[Light, ...] = ()
-    undefined: tuple[str, ...] = ()
 
 
 def read_bytes(path: Path) -> bytes:

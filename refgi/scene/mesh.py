@@ -6,14 +6,15 @@ fits before memory is allocated.
 """
 
 import dataclasses
-import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from refgi.errors import expect
+from refgi.memory import physical_memory
 from refgi.scene.material import UNPAINTED, Material
+from refgi.scene.texture.image import BYTES_OF_TEXEL
 from refgi.scene.values import LARGEST
 from refgi.types import Array
 
@@ -24,9 +25,6 @@ SHORTEST, LONGEST = 1e-100, 1e100  # of a normal: its square neither vanishes no
 # A vertex is 24 bytes, a face 12 and its material 4; joining the meshes holds them twice for a moment.
 BYTES_OF_VERTEX, BYTES_OF_FACE = 2 * 24, 2 * (12 + 4)
 BYTES_OF_COORDINATES = 2 * 48  # of a face's texture coordinates
-# Of an image's texel: float32 with mip levels and what these are made from; codes and float32 of alpha, if asked for.
-BYTES_OF_COLOUR, BYTES_OF_ALPHA = 28, 12
-BYTES_OF_TEXEL = BYTES_OF_COLOUR + BYTES_OF_ALPHA
 MOST_VERTICES = 2**31 - 1  # corner indices are int32
 
 
@@ -210,15 +208,3 @@ def expect_memory(vertices: int, faces: int, where: str, *, texels: int = 0, tex
         images = f" and {texels} texels" if texels else ""
         expect(False, where, f"a scene that fits in {present / 2**30:.1f} GiB of memory",
                f"{vertices} vertices and {faces} faces{images} ({needed / 2**30:.1f} GiB)")
-
-
-def physical_memory() -> float:
-    """Return the memory that this process may have at most, in bytes; infinity where the platform does not say."""
-    try:
-        import resource
-
-        present = float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-        allowed = resource.getrlimit(resource.RLIMIT_AS)[0]
-    except (AttributeError, ImportError, OSError, ValueError):
-        return float("inf")
-    return present if allowed == resource.RLIM_INFINITY else min(present, float(allowed))

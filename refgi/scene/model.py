@@ -10,13 +10,13 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from refgi.errors import expect
 from refgi.scene.clusters import Clusters, clusters
-from refgi.scene.cutouts import CutFaces, CutOuts, cut_faces, cut_outs
+from refgi.scene.cutouts import CutFaces, CutOuts, cut_outs
 from refgi.scene.light import (
     DIRECTIONAL,
     POINT,
@@ -53,6 +53,7 @@ __all__ = [
     "SPOT",
     "Array",
     "Camera",
+    "Contents",
     "DirectionalLight",
     "Geometry",
     "Light",
@@ -111,7 +112,9 @@ class Geometry:
     @cached_property
     def cut(self) -> CutFaces | None:
         """The triangles that may have holes, None where there are none."""
-        return cut_faces(self)
+        if self.cut_outs is None:
+            return None
+        return self.cut_outs.faces(self.material_of_face, self.materials_needed, self.uv)
 
     @cached_property
     def without_cut(self) -> Array:
@@ -125,7 +128,7 @@ class Geometry:
     @cached_property
     def clusters(self) -> Clusters:
         """The triangles without holes, sorted by place; kept, as sorting takes about as long as drawing."""
-        return clusters(self)
+        return clusters(self.vertices, self.faces, self.bounds, None if self.cut is None else self.cut.face)
 
     def selected(self, chosen: Array) -> "Geometry":
         """Return some of the faces, with the same vertices; `chosen` (m,) bool."""
@@ -216,6 +219,15 @@ class Scene:
     def face_count(self) -> int:
         """Number of triangles."""
         return len(self.geometry.faces)
+
+
+class Contents(NamedTuple):
+    """What one mesh file holds, in its own world space, and the materials that it uses and does not define."""
+
+    meshes: tuple[Mesh, ...]
+    cameras: tuple[Camera, ...] = ()
+    lights: tuple[Light, ...] = ()
+    undefined: tuple[str, ...] = ()
 
 
 def merge(meshes: Sequence[Mesh], *, smooth: bool = False) -> tuple[Geometry, tuple[Material, ...]]:

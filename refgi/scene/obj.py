@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect, first_faults, shortened
-from refgi.scene.files import Contents, is_strict, is_there
+from refgi.scene.files import is_strict, is_there
 from refgi.scene.material import UNPAINTED, WHITE, factors
 from refgi.scene.mesh import expect_all_sound, expect_coordinates
-from refgi.scene.model import Material, Mesh
+from refgi.scene.model import Contents, Material, Mesh
 from refgi.scene.mtl import Maps, lines_of, numbers_of, read_library
 from refgi.scene.polygons import triangles_of
 from refgi.scene.texture.image import expect_all_fit

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from refgi.errors import RefgiWarning, expect
-from refgi.scene.files import Contents, is_there, tolerate
+from refgi.scene.files import is_there, tolerate
 from refgi.scene.material import UNPAINTED, WHITE, factors, from_codes
-from refgi.scene.model import Material, Mesh
+from refgi.scene.model import Contents, Material, Mesh
 from refgi.scene.plydata import Column, Ply, read_entries
 from refgi.scene.polygons import triangles_of
 from refgi.scene.texture.image import image_file

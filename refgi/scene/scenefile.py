@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from refgi.errors import MOST_FAULTS, InputError, expect, first_faults, shortened
-from refgi.scene.files import Contents, expect_utf8, is_there, read_bytes, wants_lamps, warn_of_undefined
+from refgi.scene.files import expect_utf8, is_there, read_bytes, wants_lamps, warn_of_undefined
 from refgi.scene.gltf import read_gltf
 from refgi.scene.mesh import expect_memory
-from refgi.scene.model import Camera, Light, Material, Mesh, Scene, merge
+from refgi.scene.model import Camera, Contents, Light, Material, Mesh, Scene, merge
 from refgi.scene.motion import transformed_all
 from refgi.scene.obj import read_obj
 from refgi.scene.placed import lamps_where_asked

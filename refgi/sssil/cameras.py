@@ -17,6 +17,8 @@ from refgi.frame import Frame
 from refgi.lights import choose_pixel_lights
 from refgi.rays import STEPS, Tracer
 from refgi.rsm import reflective_shadow_map
+from refgi.rsm.buffers.gbuffer import GBuffer
+from refgi.rsm.raster.projection import Projection
 from refgi.sampling import halton
 from refgi.scene.model import Camera
 from refgi.scene.values import Vector
@@ -52,14 +54,13 @@ def equal_flux_points(frame: Frame, count: int = LIT_POINTS) -> tuple[Points, fl
     return Points(*(plane.T[chosen].astype(np.float64) for plane in (lights.position, lights.normal))), total / count
 
 
-def visible_points(frame: Frame, count: int = RECEIVERS) -> Points:
+def visible_points(buffer: GBuffer, count: int = RECEIVERS) -> Points:
     """Return surface points evenly spread over the picture, of about `count` pixels, without background."""
-    height, width = frame.height, frame.width
+    height, width = buffer.projection.shape
     rows = min(height, max(1, round(math.sqrt(count * height / width))))
     columns = min(width, max(1, round(count / rows)))
     row, column = (((np.arange(n) + 0.5) * size / n).astype(np.int64) for n, size in ((rows, height), (columns, width)))
-    position, normal, covered = frame.gbuffer.at((row[:, None] * width + column).ravel(), "position", "normal",
-                                                 "covered")  # fmt: skip
+    position, normal, covered = buffer.at((row[:, None] * width + column).ravel(), "position", "normal", "covered")
     return Points(position.T[covered].astype(np.float64), normal.T[covered].astype(np.float64))
 
 
@@ -154,20 +155,20 @@ def place_cameras(frame: Frame, count: int) -> tuple[Camera, ...]:
     placed for light that would pass through walls. Eyes lie on free lines from the middle of a free segment between a
     visible surface and a sender: never inside a wall. Nothing is random.
     """
-    tracer, diagonal = frame.tracer, frame.visible_extent.diagonal
-    receivers, (senders, flux) = visible_points(frame), equal_flux_points(frame)
+    tracer, diagonal, own = frame.tracer, frame.visible_extent.diagonal, frame.gbuffer.projection
+    receivers, (senders, flux) = visible_points(frame.gbuffer), equal_flux_points(frame)
     passing = transport(tracer, receivers, senders, flux, NEAREST * diagonal)
-    shown = sampling_quality(tracer, _own_view(frame), senders, COARSEST * diagonal) > 0
+    shown = sampling_quality(tracer, _own_view(own), senders, COARSEST * diagonal) > 0
     missed, least = passing * ~shown, LEAST_GAIN * float(passing.sum())
     if not float(missed.sum()) > least:
         skip("sssil.cameras", "the picture shows all surfaces that light it")
         return ()
     eyes, ahead = _candidate_views(tracer, receivers, senders, missed, diagonal)
-    views = _wide_views(frame, eyes, ahead)
+    views = _wide_views(own, frame.scene.camera.up, eyes, ahead)
     gathered = _irradiance_from_shown(passing, sampling_quality(tracer, views, senders, COARSEST * diagonal))
     gathered *= sampling_quality(tracer, views, receivers, COARSEST * diagonal)
     winners = _greedy(gathered, _irradiance_from_shown(passing, shown)[0], least, count)
-    return tuple(_camera(frame, views, winner) for winner in winners)
+    return tuple(_camera(views, winner, own) for winner in winners)
 
 
 def _irradiance_from_shown(passing: Array, shown: Array) -> Array:
@@ -175,14 +176,13 @@ def _irradiance_from_shown(passing: Array, shown: Array) -> Array:
     return np.asarray(np.einsum("cj,ij->ci", shown, passing))
 
 
-def _own_view(frame: Frame) -> Views:
-    own = frame.gbuffer.projection
+def _own_view(own: Projection) -> Views:
     return Views(own.origin, own.frame, own.half, 2 * own.half[1] / own.height)
 
 
-def _wide_views(frame: Frame, eyes: Array, ahead: Array) -> Views:
-    """Return views with the frame's field of view, or a wider one of the same shape."""
-    own, upward = frame.gbuffer.projection, _unit(np.asarray(frame.scene.camera.up))
+def _wide_views(own: Projection, up: Vector, eyes: Array, ahead: Array) -> Views:
+    """Return views with a camera's field of view, or a wider one of the same shape."""
+    upward = _unit(np.asarray(up))
     half = own.half * max(1.0, WIDEST / own.half.max())
     steep = np.abs(ahead @ upward) > STEEP
     right = _unit(np.cross(ahead, np.where(steep[:, None], np.eye(3)[np.argmin(np.abs(upward))], upward)))
@@ -228,10 +228,10 @@ def _greedy(gathered: Array, best: Array, least: float, count: int) -> list[int]
     return winners
 
 
-def _camera(frame: Frame, views: Views, index: int) -> Camera:
+def _camera(views: Views, index: int, own: Projection) -> Camera:
     eye, (_, down, ahead) = views.eye[index], views.axes[index]
-    return Camera(eye.tolist(), (eye + ahead).tolist(), (-down).tolist(), 2 * math.atan(views.half[1]), frame.width,
-                  frame.height)  # fmt: skip
+    return Camera(eye.tolist(), (eye + ahead).tolist(), (-down).tolist(), 2 * math.atan(views.half[1]), own.width,
+                  own.height)  # fmt: skip
 
 
 def _unit(vectors: Array) -> Array:

@@ -5,13 +5,14 @@ picture. Receivers are the glossy pixels, at full resolution on every level (`cr
 receiver for each texel: on level k that is 4^k times as many sums, for glossy pixels alone.
 """
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from refgi.diagnostics import is_due
 from refgi.pairs.shadow_rays import receivers
 from refgi.rsm.buffers.leaving import GlossyPoints, glossy_points, spread_over_picture
+from refgi.rsm.raster.projection import Projection
 from refgi.settings import replaced
 from refgi.sssil.blur import blur
 from refgi.sssil.cameras import join_cameras
@@ -23,11 +24,11 @@ from refgi.sssil.crown.pattern import every_texel, level_key, sample_weight
 from refgi.sssil.crown.reach import chosen_radius, warn_short_reach
 from refgi.sssil.pyramid.levels import pyramid, sender_pyramid
 from refgi.sssil.pyramid.view import Level
-from refgi.sssil.settings import Bitmask, HssilSettings, Rays
+from refgi.sssil.settings import Bitmask, HssilSettings
 from refgi.sssil.upsampling.upsample import Guide, upsample
 from refgi.sssil.visibility.bitmask import bitmask_gather
 from refgi.sssil.visibility.glossy import fill_glossy_rays, march_samples, slice_samples
-from refgi.sssil.visibility.rays import add_unoccluded, ray_gather, surfels_of
+from refgi.sssil.visibility.rays import Traced, add_unoccluded, ray_gather, surfels_of
 from refgi.stages import report_progress, skip, stage, tally
 from refgi.types import Array
 
@@ -58,17 +59,37 @@ def hssil(frame: "Frame", settings: HssilSettings) -> Array:
     return join_cameras(frame, irradiance, settings.cameras, lambda other: one_view(other, settings))
 
 
-def one_view(frame: "Frame", settings: HssilSettings) -> Array:
-    """Return the indirect irradiance (3, h, w), W/m^2, of what a camera sees by what this camera alone sees."""
+class Seen(NamedTuple):
+    """What a camera sees, the first level first, and what light between its texels is gathered with."""
+
+    levels: list[Level]
+    senders: list[Level]  # the same as senders
+    settings: HssilSettings  # with a radius of crowns
+    projection: Projection
+    diagonal: float  # of the box of visible surfaces, m; 0 where no bitmask asks for it
+    traced: Traced | None  # where rays are traced
+
+
+def seen_by(frame: "Frame", settings: HssilSettings) -> Seen:
+    """Return what a frame's camera sees."""
     levels = pyramid(frame, settings)  # Sec. 4, hierarchical maps
     senders = sender_pyramid(frame, levels, settings)
+    settings = replaced(settings, {"sampling.radius": chosen_radius(levels[0].shape, settings.sampling)})
+    diagonal = frame.visible_extent.diagonal if isinstance(settings.visibility, Bitmask) else 0.0
+    traced = Traced(frame.gbuffer, frame.scene.geometry, frame.tracer) if settings.traces_rays else None
+    return Seen(levels, senders, settings, frame.gbuffer.projection, diagonal, traced)
+
+
+def one_view(frame: "Frame", settings: HssilSettings) -> Array:
+    """Return the indirect irradiance (3, h, w), W/m^2, of what a camera sees by what this camera alone sees."""
+    seen = seen_by(frame, settings)
+    levels, settings = seen.levels, seen.settings
     if is_due("sssil.reach"):
         warn_short_reach(levels[0].shape, settings.sampling)
-    settings = replaced(settings, {"sampling.radius": chosen_radius(levels[0].shape, settings.sampling)})
-    warn_of_few_samples(levels, senders, settings)
-    irradiance = gather_level(frame, levels[-1], len(levels) - 1, settings, senders[-1])
+    warn_of_few_samples(levels, seen.senders, settings)
+    irradiance = gather_level(seen, len(levels) - 1)
     for index in reversed(range(len(levels) - 1)):  # Sec. 3.2: starting from the smallest
-        added = gather_level(frame, levels[index], index, settings, senders[index])
+        added = gather_level(seen, index)
         irradiance = upsample(irradiance, guide_of(levels[index + 1]), guide_of(levels[index]), settings, added)
     if levels[0].number == 0:
         skip("sssil.upsample", "light was gathered at full resolution")
@@ -77,18 +98,18 @@ def one_view(frame: "Frame", settings: HssilSettings) -> Array:
     return upsample(irradiance, guide_of(levels[0]), Guide(depth, normal), settings)
 
 
-def gather_level(frame: "Frame", level: Level, index: int, settings: HssilSettings, senders: Level) -> Array:
+def gather_level(seen: Seen, index: int) -> Array:
     """Return the irradiance of the texels of one level from samples of it, blurred where these differ by receiver.
 
-    (3, h, w), W/m^2. `index` is 0 for the first level, whose inner disc is sampled as well; `senders` the level as
-    senders.
+    (3, h, w), W/m^2. `index` is 0 for the first level, whose inner disc is sampled as well.
     """
+    level, senders, settings = seen.levels[index], seen.senders[index], seen.settings
     if settings.senders.only_level not in (None, index):
         return np.zeros_like(level.radiance)
     if isinstance(settings.visibility, Bitmask):
-        irradiance = bitmask_gather(level, index, settings, frame.visible_extent.diagonal, senders)
-    elif isinstance(settings.visibility, Rays):
-        irradiance = ray_gather(level, index, settings, frame, senders)
+        irradiance = bitmask_gather(level, index, settings, seen.diagonal, senders)
+    elif seen.traced is not None:
+        irradiance = ray_gather(level, index, settings, seen.traced, senders)
     else:
         irradiance = gather(level, index, settings, senders)
     if settings.blur is None or settings.sampling.pattern in ("fixed", "all"):
@@ -130,45 +151,45 @@ def view_lobes(frame: "Frame", points: GlossyPoints, settings: HssilSettings) ->
 
     The pixels are this camera's; their lobes may belong to another eye.
     """
-    levels = pyramid(frame, settings)
-    senders = sender_pyramid(frame, levels, settings)
-    settings = replaced(settings, {"sampling.radius": chosen_radius(levels[0].shape, settings.sampling)})
-    total = np.zeros(points.position.shape)
-    for index, level in enumerate(senders):
+    seen, total = seen_by(frame, settings), np.zeros(points.position.shape)
+    for index, level in enumerate(seen.senders):
         if settings.senders.only_level in (None, index):
-            total += glossy_level(frame, points, level, index, settings)
+            total += glossy_level(points, level, index, seen.settings, seen.projection, seen.diagonal, seen.traced)
     radiance = (total * points.specular).astype(points.position.dtype)
     return spread_over_picture(points, radiance, (frame.height, frame.width))
 
 
 @stage("sssil.glossy", kept=False)
 def glossy_level(
-    frame: "Frame", points: GlossyPoints, senders: Level, index: int, settings: HssilSettings
+    points: GlossyPoints, senders: Level, index: int, settings: HssilSettings, projection: Projection, diagonal: float,
+    traced: Traced | None,
 ) -> Array:
     """Sum what lobes reflect of the samples of one level.
 
-    frame: The scene whose view the level is.
     index: 0 for the first level, whose inner disc is sampled as well.
+    projection: Of the view whose level it is.
+    diagonal: Of the scene, m, for a bitmask.
+    traced: Of the same view, for rays.
     -> (3, n) float64: Radiance over the lobes' reflectance, W/m^2/sr.
     """
-    to = glossy_receivers(points, frame.gbuffer.projection)
+    to = glossy_receivers(points, projection)
     draws, slices = _draws(senders, index, settings), None
     if isinstance(settings.visibility, Bitmask):
-        slices = slice_samples(to, senders, index, settings, frame.visible_extent.diagonal)
+        slices = slice_samples(to, senders, index, settings, diagonal)
     count = len(draws.weight) if slices is None else slices.per_receiver
     tally("pairs", lambda: len(points.pixel) * count)
     radiance = np.asarray(senders.radiance.reshape(3, -1), np.float64)
     total, step = np.zeros((3, len(points.pixel))), max(1, BATCH // max(count, 1))
-    rays = _Rays(frame, points, senders) if isinstance(settings.visibility, Rays) else None
-    form, share = form_of(settings.senders.form_factor), settings.senders.disc_share
+    rays = None if traced is None else _Rays(traced, points, senders)
+    form = form_of(settings.senders)
     transfer, sender = np.empty(step * count), np.empty(step * count, np.int64)
     blocked = np.zeros(step * count, np.bool_)
     for first in range(0, total.shape[1], step):
         last = min(first + step, total.shape[1])
         if slices is None:
-            draw_samples(to, first, last, senders, draws, form, share, transfer, sender)
+            draw_samples(to, first, last, senders, draws, form, transfer, sender)
         else:
-            march_samples(to, first, last, senders, slices, form, share, transfer, sender)
+            march_samples(to, first, last, senders, slices, form, transfer, sender)
         if rays is not None:
             rays.trace(first, last, count, transfer, sender, blocked)
         add_unoccluded(radiance, first, last, count, blocked, transfer, sender, total)
@@ -193,11 +214,11 @@ def _draws(level: Level, index: int, settings: HssilSettings) -> Draws:
 class _Rays:
     """Shadow rays from glossy pixels to texels."""
 
-    def __init__(self, frame: "Frame", points: GlossyPoints, senders: Level) -> None:
-        triangle_id = frame.gbuffer.triangle_id.reshape(-1)[points.pixel]
-        self._tracer = frame.tracer
-        self._to = receivers(frame.scene.geometry, points.position, points.normal, triangle_id, frame.tracer.grain)
-        self._from = surfels_of(senders, frame)
+    def __init__(self, traced: Traced, points: GlossyPoints, senders: Level) -> None:
+        triangle_id = traced.buffer.triangle_id.reshape(-1)[points.pixel]
+        self._tracer = traced.tracer
+        self._to = receivers(traced.geometry, points.position, points.normal, triangle_id, traced.tracer.grain)
+        self._from = surfels_of(senders, traced)
 
     def trace(self, first: int, last: int, count: int, transfer: Array, sender: Array, blocked: Array) -> None:
         """Fill which pairs of receivers `first` to `last` are blocked; pairs that transfer nothing are not traced."""

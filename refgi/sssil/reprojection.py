@@ -72,48 +72,48 @@ def fetched(
     expect(len(values) in (3, 4) and values.shape[1:] == source.depth.shape == projection.shape, "values",
            f"(3 or 4, h, w) with {projection.shape}", values.shape)
     dtype = position.dtype
-    eye, frame, scale = pixel_transform(source, dtype, origin)
     mean, weight = plane((len(values), *covered.shape), dtype), plane(covered.shape, dtype)
     limits = np.array([depth_tolerance, normal_cosine, SNAP], dtype)
-    _reproject(values, source.depth, source.normal, eye, frame, scale, limits, fetch == "nearest", position, normal,
-               covered, mean, weight)
+    shift = (0.0, 0.0, 0.0) if origin is None else np.subtract(source.origin, origin)
+    _reproject(values, source.depth, source.normal, pixel_transform(projection, dtype, shift), limits,
+               fetch == "nearest", position, normal, covered, mean, weight)
     return mean, weight
 
 
-def pixel_transform(
-    source: SourceView, dtype: npt.DTypeLike, origin: Vector | None = None
-) -> tuple[Array, Array, Array]:
-    """Return what takes points to the texels of a view: eye (3,), m; frame (3, 3); scale (4,).
+class PixelTransform(NamedTuple):
+    """What takes points to the texels of a view."""
 
-    The frame's rows are unit vectors right, down and ahead; the scale is texels for each tangent, and the middle of the
-    picture, across and down. `origin` is that of the points, m; that of `source` where absent.
-    """
-    projection = source.projection
-    shift = np.zeros(3) if origin is None else np.subtract(source.origin, origin)
+    eye: Array  # (3,) m
+    axes: Array  # (3, 3) unit vectors right, down and ahead
+    scale: Array  # (4,) texels for each tangent, across and down, and the middle of the picture
+
+
+def pixel_transform(
+    projection: Projection, dtype: npt.DTypeLike, shift: Vector | Array = (0.0, 0.0, 0.0)
+) -> PixelTransform:
+    """Return what takes points to the texels of a view whose origin lies at `shift`, m, from theirs."""
     size = np.array([projection.width, projection.height])
     scale = np.concatenate([size / (2 * projection.half), (size - 1) / 2])
-    return (projection.origin[0] + shift).astype(dtype), projection.frame[0].astype(dtype), scale.astype(dtype)
+    return PixelTransform(*(part.astype(dtype) for part in (projection.origin[0] + shift, projection.frame[0], scale)))
 
 
 @kernel(parallel=True)
 def _reproject(
-    values: Array, depth: Array, source_normal: Array, eye: Array, frame: Array, scale: Array, limits: Array,
-    nearest: bool, position: Array, normal: Array, covered: Array, mean: Array, weight: Array,
+    values: Array, depth: Array, source_normal: Array, to: PixelTransform, limits: Array, nearest: bool,
+    position: Array, normal: Array, covered: Array, mean: Array, weight: Array,
 ) -> None:
     for row in prange(covered.shape[0]):
-        _project_row(row, eye, frame, scale, position, covered, mean)
-        _fetch_row(row, values, depth, source_normal, frame, scale, limits, nearest, normal, mean, weight)
+        _project_row(row, to, position, covered, mean)
+        _fetch_row(row, values, depth, source_normal, to, limits, nearest, normal, mean, weight)
 
 
 @kernel
-def _project_row(
-    row: int, eye: Array, frame: Array, scale: Array, position: Array, covered: Array, projected: Array
-) -> None:
+def _project_row(row: int, to: PixelTransform, position: Array, covered: Array, projected: Array) -> None:
     """Find column, row (a texel's centre at whole numbers) and depth of a row of points; depth -1 where none is."""
-    real = position.dtype.type
-    rx, ry, rz = frame[0, 0] * scale[0], frame[0, 1] * scale[0], frame[0, 2] * scale[0]
-    ux, uy, uz = frame[1, 0] * scale[1], frame[1, 1] * scale[1], frame[1, 2] * scale[1]
-    fx, fy, fz = frame[2, 0], frame[2, 1], frame[2, 2]
+    real, eye, axes, scale = position.dtype.type, to.eye, to.axes, to.scale
+    rx, ry, rz = axes[0, 0] * scale[0], axes[0, 1] * scale[0], axes[0, 2] * scale[0]
+    ux, uy, uz = axes[1, 0] * scale[1], axes[1, 1] * scale[1], axes[1, 2] * scale[1]
+    fx, fy, fz = axes[2, 0], axes[2, 1], axes[2, 2]
     for column in range(covered.shape[1]):
         dx = position[0, row, column] - eye[0]
         dy = position[1, row, column] - eye[1]
@@ -127,8 +127,8 @@ def _project_row(
 
 @kernel
 def _fetch_row(
-    row: int, values: Array, depth: Array, source_normal: Array, frame: Array, scale: Array, limits: Array,
-    nearest: bool, normal: Array, mean: Array, weight: Array,
+    row: int, values: Array, depth: Array, source_normal: Array, to: PixelTransform, limits: Array, nearest: bool,
+    normal: Array, mean: Array, weight: Array,
 ) -> None:
     """Average the texels around each place of `mean` that show the same surface; the average replaces the place."""
     real = values.dtype.type
@@ -136,7 +136,7 @@ def _fetch_row(
     height, width = depth.shape
     right_end, bottom_end = real(width) - half, real(height) - half
     least_cosine, snap = limits[1], limits[2]
-    view = _rays(frame, scale)
+    view = _rays(to.axes, to.scale)
     for column in range(weight.shape[1]):
         x, y, z = mean[0, row, column], mean[1, row, column], mean[2, row, column]
         red, green, blue, fourth, total = zero, zero, zero, zero, zero
@@ -179,11 +179,11 @@ def _fetch_row(
 
 
 @kernel
-def _rays(frame: Array, scale: Array) -> Any:
+def _rays(axes: Array, scale: Array) -> Any:
     """Return a step to the right, one down, the ray through the middle, and the middle's place."""
     across, down = scale.dtype.type(1) / scale[0], scale.dtype.type(1) / scale[1]
-    return (frame[0, 0] * across, frame[0, 1] * across, frame[0, 2] * across, frame[1, 0] * down, frame[1, 1] * down,
-            frame[1, 2] * down, frame[2, 0], frame[2, 1], frame[2, 2], scale[2], scale[3])
+    return (axes[0, 0] * across, axes[0, 1] * across, axes[0, 2] * across, axes[1, 0] * down, axes[1, 1] * down,
+            axes[1, 2] * down, axes[2, 0], axes[2, 1], axes[2, 2], scale[2], scale[3])
 
 
 @kernel

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from refgi.jit import threads
 from refgi.literal import upsampling as literal
 from refgi.sssil.blur import TALL, WIDE, blur
 from refgi.sssil.pyramid.view import Level
@@ -106,11 +105,3 @@ def test_a_leaning_plane_is_one_surface():
     light = np.random.default_rng(1).random((3, 20, 30))
     np.testing.assert_allclose(blur(light, level, GeometryBlur()), blur(light, plain((20, 30)), GeometryBlur()),
                                rtol=1e-14)
-
-
-def test_same_bits_for_any_number_of_threads():
-    """Property: one thread and all of them."""
-    level, light = steps((150, 300), np.float32)
-    found = blur(light, level, GeometryBlur())
-    with threads(1):
-        np.testing.assert_array_equal(blur(light, level, GeometryBlur()), found)

@@ -175,13 +175,14 @@ def test_samples_on_the_receiver_count_for_nothing(form):
 
 @pytest.mark.feature("REF-19")
 def test_threads_change_no_bit(evidence):
-    kinds = ({}, {"pattern": "pixel"}, {"visibility": "bitmask"}, {"visibility": "rays"}, {"downsample": "average"},
-             {"cameras": 1})
+    kinds = ({}, {"pattern": "row"}, {"pattern": "pixel"}, {"visibility": "bitmask"}, {"visibility": "rays"},
+             {"visibility": "bitmask", "pattern": "pixel"}, {"visibility": "bitmask", "pattern": "row"},
+             {"downsample": "average"}, {"downsample": "closest_average", "upsampling": "bilinear"}, {"cameras": 1})
     for how in kinds:
         pictures = []
         for count in (1, 2):
             with threads(count):
-                pictures.append(light_of(ball(), **how))
+                pictures.append(light_of(ball(360, 64), **how))  # several strips, blocks and bands
         np.testing.assert_array_equal(*pictures)
     evidence(f"hssil in {len(kinds)} settings, one thread and two: the same bits")
 

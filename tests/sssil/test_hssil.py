@@ -1,11 +1,10 @@
 """The method as a whole: what it is made of, what each setting does, what it leaves out."""
 
-import dataclasses
 
 import numpy as np
 import pytest
 
-from refgi.errors import InputError, RefgiWarning
+from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.method import Extent
 from refgi.methods import find_method, render
@@ -38,51 +37,6 @@ def test_it_is_in_the_table_of_methods(ball):
     assert (function, settings) == (hssil, HssilSettings)
     picture = render(ball.scene, "hssil", SMALL, width=49, height=35, rsm_resolution=64)
     np.testing.assert_array_equal(picture.irradiance, hssil(ball, SMALL))
-
-
-@pytest.mark.parametrize("how", [
-    {}, {"start": "full"}, {"start": "quarter"}, {"pattern": "pixel"}, {"pattern": "fixed"}, {"pattern": "all"},
-    {"downsample": "average"}, {"downsample": "closest_average"}, {"form_factor": "point"}, {"upsampling": "bilinear"},
-    {"upsampling": "nearest"}, {"visibility": "bitmask"}, {"visibility": "rays"}, {"cameras": 1}, {"seed": 7},
-    {"inner_samples": 0}, {"radius": 40.0},
-], ids=str)
-def test_every_setting_changes_the_picture_and_leaves_it_sound(ball, how):
-    light = hssil(ball, changed(**how))
-    assert light.shape == (3, 35, 49)
-    assert light.dtype == np.float32
-    assert np.isfinite(light).all()
-    assert light.min() >= 0
-    assert light.max() > 0
-    assert not light[:, ~ball.gbuffer.covered].any()
-    if how:
-        assert (light != hssil(ball, SMALL)).any()
-
-
-@pytest.mark.feature("REF-20")
-@pytest.mark.parametrize(("switch", "vfov", "factor"), [
-    ("hss_disc_pi", 40.0, 1 / np.pi), ("hss_tan_f", 60.0, 9.0), ("hss_tan_f", 30.0, 4.64)])
-def test_printed_forms_differ_by_the_factor_of_the_table(switch, vfov, factor, evidence):
-    """Eq. 3 is linear in the area of a sample; the factor of the table is that of a square picture."""
-    scene = load_scene("cornell_box").with_camera(vfov=np.radians(vfov))
-    square = Frame(scene, width=32, height=32, dtype=np.float64, rsm_resolution=64)
-    form = "point" if switch == "hss_tan_f" else "disc"
-    plain, printed = (hssil(square, changed(form_factor=form, as_published=names)) for names in ((), (switch,)))
-    found = printed.sum() / plain.sum()
-    assert found == pytest.approx(factor, rel=2e-3)  # the table has three digits
-    np.testing.assert_allclose(printed, plain * found, rtol=1e-12)
-    evidence(f"{switch} at {vfov:g} deg: {found:.4f}")
-
-
-@pytest.mark.feature("REF-20")
-def test_the_printed_level_factor_is_that_of_each_level(evidence):
-    at = frame(dtype=np.float64)
-    found = []
-    for level in range(SMALL.sampling.levels):
-        alone = changed(only_level=level)
-        printed = hssil(at, replaced(alone, {"as_published": {"hss_level_factor"}}))
-        found.append(printed.sum() / hssil(at, alone).sum())
-    np.testing.assert_allclose(found, [1, 4, 16], rtol=1e-12)
-    evidence(f"hss_level_factor: {', '.join(f'{factor:.4f}' for factor in found)}")
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -130,19 +84,6 @@ def test_rsm_and_rays_are_needed_for_direct_light_alone(ball):
     hssil(at, SMALL)
     assert "rsms" not in vars(at)
     assert "tracer" not in vars(at)
-
-
-@pytest.mark.parametrize("vfov", [90.0, 120.0])
-def test_printed_tangents_are_refused_where_they_have_no_meaning(vfov):
-    scene = load_scene("cornell_box").with_camera(vfov=np.radians(vfov))
-    with pytest.raises(InputError, match="hss_tan_f"):
-        hssil(Frame(scene, width=16, height=16, rsm_resolution=32), changed(as_published={"hss_tan_f"}))
-
-
-def test_a_scene_without_light_is_dark():
-    dark = load_scene("cornell_box")
-    dark = dark.with_lights(dataclasses.replace(dark.lights[0], intensity=(0.0, 0.0, 0.0)))
-    assert not hssil(Frame(dark, width=17, height=9, rsm_resolution=32), SMALL).any()
 
 
 def test_memory_is_counted():

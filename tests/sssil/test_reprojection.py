@@ -7,7 +7,6 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.frame import Frame
-from refgi.jit import threads
 from refgi.literal import temporal as literal
 from refgi.rsm.raster.projection import camera_projection, cube_projection
 from refgi.scene import Camera, load_scene
@@ -164,17 +163,6 @@ def test_the_origins_of_two_views_may_differ(views):
                       buffer.position - np.reshape([-8, 0, 4], (3, 1, 1)), buffer.normal, buffer.covered,
                       origin=(0.0, 0.0, 0.0), **TESTS)[0]
     assert np.allclose(plain, moved, atol=1e-9)
-
-
-def test_the_same_bits_on_any_number_of_threads(views):
-    there, here = views[0]
-    values = np.random.default_rng(6).random((3, 30, 40), dtype=np.float32)
-    results = []
-    for count in (1, 2):
-        with threads(count):
-            results.append(reprojected(values, source_of(there), here))
-    for one, two in zip(*results, strict=True):
-        assert np.array_equal(one, two)
 
 
 def test_one_pixel():

@@ -7,6 +7,12 @@ GLASS = ("glass_ball",)
 LAMPS = ("cornell_box", "stage", "two_lamps")
 DIFFUSE = ("cornell_box", "cornell_sphere")
 
+OPENNESS: list[Row] = [
+    vary("ambient_occlusion", "openness"),
+    vary("ambient_occlusion.radius", 0.3, ambient_occlusion="openness"),
+    vary("ambient_occlusion.rays", 8, ambient_occlusion="openness"),
+]
+
 PAIRS: list[Row] = [
     vary("clamp", "distance", clamp_value=0.2),
     vary("clamp", "geometry", clamp_value=2.0),

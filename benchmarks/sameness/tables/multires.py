@@ -3,13 +3,13 @@
 import math
 
 from benchmarks.sameness.rows import Table, vary
-from benchmarks.sameness.tables.lights import LIGHTS, PAIRS
+from benchmarks.sameness.tables.lights import LIGHTS, OPENNESS, PAIRS
 
 CURVED = ("cornell_sphere", "stage")
 SUBSPLATS = "both ways find the same subsplats"
 
 TABLE = Table({"lights": 96, "coarsest": 6}, [
-    *PAIRS, *LIGHTS,
+    *PAIRS, *LIGHTS, *OPENNESS,
     vary("clamp", "none"),
     vary("clamp", "disc", same="a disc is the default of auto"),
     vary("as_published", "ams_disc", "ams_rho_in_splat", "ams_filter_all", on=("cornell_box", "stage", "two_lamps")),

@@ -1,13 +1,13 @@
 """What is varied of `sii`."""
 
 from benchmarks.sameness.rows import Table, vary
-from benchmarks.sameness.tables.lights import LIGHTS, PAIRS
+from benchmarks.sameness.tables.lights import LIGHTS, OPENNESS, PAIRS
 
 BOUNDS = "a bound changes no bit of the picture"
 CUT = {"i_low": 0.05}
 
 TABLE = Table({"lights": 96, "clamp": "none"}, [
-    *PAIRS, *LIGHTS,
+    *PAIRS, *LIGHTS, *OPENNESS,
     vary("clamp", "none", same="what the cases start from"),
     vary("clamp", "disc"),
     vary("clamp", "auto"),

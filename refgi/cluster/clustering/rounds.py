@@ -50,11 +50,9 @@ def angle(dot: Any, apart: Any) -> Any:
 
 @kernel
 def linear(
-    x: Any, y: Any, z: Any, nx: Any, ny: Any, nz: Any, cx: Any, cy: Any, cz: Any, ax: Any, ay: Any, az: Any,
-    per_metre: Any, per_radian: Any,
+    dx: Any, dy: Any, dz: Any, nx: Any, ny: Any, nz: Any, ax: Any, ay: Any, az: Any, per_metre: Any, per_radian: Any
 ) -> Any:
-    """Return w_x |x - c| + w_a angle(n, n_c) of a light (x, y, z; n) and an area light (c; a); m, unit normals."""
-    dx, dy, dz = x - cx, y - cy, z - cz
+    """Return w_x |d| + w_a angle(n, a) of a light d from an area light, m, with unit normals n and a."""
     dot = nx * ax + ny * ay + nz * az
     side = math.copysign(1.0, dot)
     ex, ey, ez = nx - side * ax, ny - side * ay, nz - side * az
@@ -77,7 +75,7 @@ def fill_linear(lights: Any, count: int, other: Any, k: int, per_metre: float, p
             out[i] = per_metre * math.sqrt(dx * dx + dy * dy + dz * dz)
         return
     for i in range(count):
-        out[i] = linear(x[i], y[i], z[i], nx[i], ny[i], nz[i], cx, cy, cz, ax, ay, az, per_metre, per_radian)
+        out[i] = linear(x[i] - cx, y[i] - cy, z[i] - cz, nx[i], ny[i], nz[i], ax, ay, az, per_metre, per_radian)
 
 
 @kernel

@@ -17,7 +17,7 @@ from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.buffers.surfaces import row_view
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection, image_of_view, texel_coordinates
-from refgi.scene.light import Lamp, lamp_of, light_of
+from refgi.scene.light import Lamp, light_of
 from refgi.scene.model import Light, LightTable, light_table
 from refgi.stages import stage
 from refgi.types import Array
@@ -43,17 +43,7 @@ class SurfacePoints(NamedTuple):
     covered: Array  # (h, w) bool
 
 
-def _shadow_steps(
-    position: Array, normal: Array, covered: Array, rsm: Rsm, bias: float | None = None, interpolated: bool = False
-) -> Array:
-    from refgi.rsm.buffers.steps import shadow_map
-
-    depth, map_position = rsm.resolve("depth", "position")
-    return shadow_map(position, normal, covered, rsm.projection, depth, map_position, lamp_of(rsm.light), bias,
-                      interpolated)
-
-
-@stage("rsm.shadow_map_visibility", steps=_shadow_steps)
+@stage("rsm.shadow_map_visibility", steps="refgi.rsm.buffers.steps.shadow_steps")
 def shadow_map_visibility(
     position: Array, normal: Array, covered: Array, rsm: Rsm, bias: float | None = None, interpolated: bool = False
 ) -> Array:

@@ -45,13 +45,7 @@ class Extent(NamedTuple):
         return self if self.diagonal > 0 else Extent(*geometry.bounds)
 
 
-def _visible_steps(buffer: GBuffer) -> Extent:
-    from refgi.rsm.buffers.extent_steps import visible_extent
-
-    return Extent(*visible_extent(*buffer.resolve("position", "covered")))
-
-
-@stage("frame.visible_extent", steps=_visible_steps)
+@stage("frame.visible_extent", steps="refgi.rsm.buffers.extent_steps.visible_steps")
 def visible_extent(buffer: GBuffer) -> Extent:
     """Return the bounding box of the visible surfaces.
 
@@ -67,14 +61,7 @@ def bounds_of(position: Array, covered: Array) -> Extent:
     return Extent(rows[:3].min(axis=1), rows[3:].max(axis=1))
 
 
-def _illuminated_steps(rsms: Sequence[Rsm]) -> Extent:
-    from refgi.rsm.buffers.extent_steps import illuminated_extent
-
-    return Extent(*illuminated_extent(*(tuple(getattr(rsm, name) for rsm in rsms) for name in (
-        "position", "flux", "lobe_flux"))))
-
-
-@stage("frame.illuminated_extent", steps=_illuminated_steps)
+@stage("frame.illuminated_extent", steps="refgi.rsm.buffers.extent_steps.illuminated_steps")
 def illuminated_extent(rsms: Sequence[Rsm]) -> Extent:
     """Return the bounding box of surfaces that reflect direct light, from a grid of each map's texels.
 

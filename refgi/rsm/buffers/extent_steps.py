@@ -1,9 +1,12 @@
 """Boxes of a scene's extent from planes of its views."""
 
+from collections.abc import Sequence
 
 import numpy as np
 
-from refgi.rsm.buffers.extent import SAMPLES, bounds_of, texel_grid
+from refgi.rsm.buffers.extent import SAMPLES, Extent, bounds_of, texel_grid
+from refgi.rsm.buffers.gbuffer import GBuffer
+from refgi.rsm.buffers.reflective import Rsm
 from refgi.stages import stage
 from refgi.types import Array
 
@@ -40,3 +43,14 @@ def illuminated_extent(
         low, high = np.minimum(low, shown.min(axis=1, initial=np.inf)), np.maximum(
             high, shown.max(axis=1, initial=-np.inf))
     return low, high
+
+
+def visible_steps(buffer: GBuffer) -> Extent:
+    """Return the box of what a camera sees, made by steps."""
+    return Extent(*visible_extent(*buffer.resolve("position", "covered")))
+
+
+def illuminated_steps(rsms: Sequence[Rsm]) -> Extent:
+    """Return the box of what reflects direct light, made by steps."""
+    return Extent(*illuminated_extent(*(tuple(getattr(rsm, name) for rsm in rsms) for name in (
+        "position", "flux", "lobe_flux"))))

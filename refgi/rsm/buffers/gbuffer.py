@@ -195,16 +195,7 @@ def values_at(channel: Array, texel: Array) -> Array:
     return channel.reshape(*channel.shape[:-2], -1)[..., texel]
 
 
-def _gbuffer_steps(
-    geometry: Geometry, materials: MaterialTable, camera: Camera, width: int | None = None, height: int | None = None,
-    dtype: npt.DTypeLike = np.float32,
-) -> dict[str, Array]:
-    from refgi.rsm.buffers.steps import view_steps
-
-    return view_steps(geometry, materials, camera_projection(camera, width, height), dtype)
-
-
-@stage("rsm.gbuffer", steps=_gbuffer_steps)
+@stage("rsm.gbuffer", steps="refgi.rsm.buffers.steps.gbuffer_steps")
 def gbuffer(
     geometry: Geometry,
     materials: MaterialTable,

@@ -82,13 +82,13 @@ def radiance_of(irradiance: Array, extra: Array | None, albedo: Array, emission:
     return radiance if emission is None else radiance + emission
 
 
-def leaving_steps(irradiance: Array, extra: Array | None, buffer: GBuffer, materials: MaterialTable) -> Array:
+def leaving_steps(direct: Array, indirect: Array | None, buffer: GBuffer, materials: MaterialTable) -> Array:
     """Return what the camera receives, made by steps."""
     emission = None
     if materials.emission.any():
         emission = buffer.emission if materials.emissive is not None else emission_of(
             buffer.triangle_id, buffer._geometry.material_of_face, materials.emission)
-    return radiance_of(irradiance, extra, buffer.albedo, emission)
+    return radiance_of(direct, indirect, buffer.albedo, emission)
 
 
 @kernel(parallel=True)

@@ -199,16 +199,7 @@ class Rsm:
         return project(self.projection, position)
 
 
-def _map_steps(
-    geometry: Geometry, materials: MaterialTable, light: Light, resolution: int, dtype: npt.DTypeLike = np.float32,
-    projection: MapShape = "auto",
-) -> dict[str, Array | None]:
-    from refgi.rsm.buffers.steps import map_steps
-
-    return map_steps(geometry, materials, light, resolution, dtype, projection)
-
-
-@stage("rsm.reflective_shadow_map", steps=_map_steps)
+@stage("rsm.reflective_shadow_map", steps="refgi.rsm.buffers.steps.map_steps")
 def reflective_shadow_map(
     geometry: Geometry,
     materials: MaterialTable,

@@ -9,11 +9,11 @@ from refgi.rsm.buffers.direct import ShadowMap, SurfacePoints, looked_up
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.light_projection import MapShape, light_projection
 from refgi.rsm.buffers.reflective import Rsm
-from refgi.rsm.raster.projection import Projection
+from refgi.rsm.raster.projection import Projection, camera_projection
 from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
 from refgi.scene.light import Lamp, lamp_of, light_of
 from refgi.scene.material import MaterialTable
-from refgi.scene.model import Geometry, Light
+from refgi.scene.model import Camera, Geometry, Light
 from refgi.stages import stage
 from refgi.types import Array
 
@@ -92,13 +92,23 @@ def _view(
     return GBuffer(geometry, materials, projection, seen, dtype)
 
 
-def view_steps(
-    geometry: Geometry, materials: MaterialTable, projection: Projection, dtype: npt.DTypeLike
+def gbuffer_steps(
+    geometry: Geometry, materials: MaterialTable, camera: Camera, width: int | None = None, height: int | None = None,
+    dtype: npt.DTypeLike = np.float32,
 ) -> dict[str, Array]:
-    """Return the channels of the camera's view, made by steps."""
+    """Return the channels of a camera's view, made by steps."""
+    projection = camera_projection(camera, width, height)
     triangle_id = visible_triangles(geometry, projection)
-    made = surface(geometry, materials, projection, triangle_id, np.dtype(dtype))
-    return _channels(triangle_id, *made)
+    return _channels(triangle_id, *surface(geometry, materials, projection, triangle_id, np.dtype(dtype)))
+
+
+def shadow_steps(
+    position: Array, normal: Array, covered: Array, rsm: Rsm, bias: float | None = None, interpolated: bool = False
+) -> Array:
+    """Return which receivers a light reaches, made by steps."""
+    depth, map_position = rsm.resolve("depth", "position")
+    return shadow_map(position, normal, covered, rsm.projection, depth, map_position, lamp_of(rsm.light), bias,
+                      interpolated)
 
 
 def _channels(*made: Array) -> dict[str, Array]:
@@ -106,8 +116,8 @@ def _channels(*made: Array) -> dict[str, Array]:
 
 
 def map_steps(
-    geometry: Geometry, materials: MaterialTable, light: Light, resolution: int, dtype: npt.DTypeLike,
-    projection: MapShape,
+    geometry: Geometry, materials: MaterialTable, light: Light, resolution: int, dtype: npt.DTypeLike = np.float32,
+    projection: MapShape = "auto",
 ) -> dict[str, Array | None]:
     """Return the channels of a lamp's map, made by steps."""
     maps = light_projection(light, geometry, resolution, projection)

@@ -134,12 +134,7 @@ def fill_places(surface: Painted, projection: Projection, face: int, run: tuple[
     `run`: its row, first column and one past the last. `at`: which of the pixels of `Looks` the first one is.
     """
     row, first, last = run
-    vertices, uv = surface.vertices, surface.uv
-    i, j, k = surface.faces[face, 0], surface.faces[face, 1], surface.faces[face, 2]
-    px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-    plane = plane_of(px, py, pz, vertices[j, 0] - px, vertices[j, 1] - py, vertices[j, 2] - pz, vertices[k, 0] - px,
-                     vertices[k, 1] - py, vertices[k, 2] - pz, uv[face, 0, 0], uv[face, 0, 1],
-                     uv[face, 1, 0], uv[face, 1, 1], uv[face, 2, 0], uv[face, 2, 1])
+    plane = plane_of(surface, face)
     kind, (view, y) = projection.kind, row_view(projection, row)
     step_x, step_y = projection.half[0] * (2.0 / projection.width), projection.half[1] * (2.0 / projection.height)
     if kind == PARABOLOID:
@@ -173,9 +168,15 @@ def put(pixel: Array, k: int, u: float, v: float, ux: float, vx: float, uy: floa
 
 
 @kernel
-def plane_of(px: float, py: float, pz: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float,
-             u0: float, v0: float, u1: float, v1: float, u2: float, v2: float) -> Any:
+def plane_of(surface: Painted, face: int) -> Any:
     """Return corner v_0, normal N, u and v at v_0, and their gradients on the plane, of a triangle with edges a, b."""
+    vertices, uv = surface.vertices, surface.uv
+    i, j, k = surface.faces[face, 0], surface.faces[face, 1], surface.faces[face, 2]
+    px, py, pz = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+    ax, ay, az = vertices[j, 0] - px, vertices[j, 1] - py, vertices[j, 2] - pz
+    bx, by, bz = vertices[k, 0] - px, vertices[k, 1] - py, vertices[k, 2] - pz
+    u0, v0, u1, v1, u2, v2 = (uv[face, 0, 0], uv[face, 0, 1], uv[face, 1, 0], uv[face, 1, 1], uv[face, 2, 0],
+                              uv[face, 2, 1])
     nx, ny, nz = cross(ax, ay, az, bx, by, bz)
     scale = 1.0 / (nx * nx + ny * ny + nz * nz)
     # q . (e_2 x N) / N^2 and q . (N x e_1) / N^2 are the barycentric coordinates of v_1 and v_2 at v_0 + q

@@ -91,8 +91,8 @@ def draw_clusters(
             gather_small(corner, first, few, place, boxes, small, setup)
             set_up(setup, few, projection.width)
             evaluate_small(few, setup, found)
-            many = merge_small(face, first, few, many, boxes, small, large, placed.least_det[c], setup, found, top,
-                               stride, keys)
+            lent = Local(place, boxes, small, large, setup, found)
+            many = merge_small(face, first, few, many, lent, placed.least_det[c], top, stride, keys)
         if many > 0:
             gather_places(corner, first, many, place, large, setup)
             set_up(setup, many, projection.width)
@@ -234,10 +234,10 @@ def evaluate_small(count: int, setup: Array, found: Array) -> None:
 
 @kernel
 def merge_small(
-    face: Array, first: int, few: int, many: int, boxes: Array, small: Array, large: Array, least_det: float,
-    setup: Array, found: Array, top: int, stride: int, keys: Array,
+    face: Array, first: int, few: int, many: int, local: Local, least_det: float, top: int, stride: int, keys: Array
 ) -> int:
     """Keep the greater keys; append triangles that are unsound to those drawn row by row, and return their number."""
+    _, boxes, small, large, setup, found = local
     for q in range(few):
         b = small[q]
         det = abs(setup[DET + q])

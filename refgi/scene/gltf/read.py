@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect
-from refgi.scene.files import Contents
 from refgi.scene.gltf.accessors import accessor
 from refgi.scene.gltf.container import DRACO, Document, packed, unread
 from refgi.scene.gltf.deform import Deformer, Pose, pose_of
@@ -22,7 +21,7 @@ from refgi.scene.gltf.nodes import EXTENSION as LIGHTS
 from refgi.scene.gltf.nodes import instances, node_camera, node_light, scene_nodes
 from refgi.scene.material import factors
 from refgi.scene.mesh import as_float64, expect_memory
-from refgi.scene.model import Camera, Light, Material, Mesh
+from refgi.scene.model import Camera, Contents, Light, Material, Mesh
 from refgi.scene.motion import IDENTITY, invertible, transformed_all
 from refgi.types import Array
 

@@ -19,12 +19,16 @@ from typing import Any
 import numpy as np
 
 from refgi.errors import InputError, expect
-from refgi.memory import available_bytes
+from refgi.memory import available_bytes, physical_memory
+from refgi.scene.files import read_bytes
 from refgi.types import Array
 
 MOST_TEXELS = 1 << 27  # of one image: 16384 x 8192
 FORMATS = ("PNG", "JPEG", "BMP")
 CODES = {"uint8": 256, "uint16": 65536}
+# Of a texel: float32 with mip levels and what these are made from; codes and float32 of alpha, if asked for.
+BYTES_OF_COLOUR, BYTES_OF_ALPHA = 28, 12
+BYTES_OF_TEXEL = BYTES_OF_COLOUR + BYTES_OF_ALPHA
 
 _decoded: "weakref.WeakValueDictionary[str, Image]" = weakref.WeakValueDictionary()  # by digest of the file
 
@@ -122,8 +126,6 @@ def image_file(path: Path) -> Image:
     Result: the very object of an earlier call where the file's content is the same and that is still in use. Raises
     `InputError` naming it if it is missing, cut short, no image or too large.
     """
-    from refgi.scene.files import read_bytes  # which knows the model, and that materials
-
     return decoded(read_bytes(path), str(path))
 
 
@@ -188,8 +190,6 @@ def _expect_size(size: tuple[int, int], where: str) -> None:
 
 
 def _expect_memory(texels: int, where: str, expected: str, got: str) -> None:
-    from refgi.scene.mesh import BYTES_OF_TEXEL, physical_memory
-
     left = available_bytes()
     present = min(physical_memory(), float("inf") if left is None else left)
     expect(texels * BYTES_OF_TEXEL <= present, where, f"{expected} in {present / 2**30:.1f} GiB of memory",

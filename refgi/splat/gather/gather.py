@@ -121,13 +121,7 @@ def gather_counted(frame: "Frame", settings: GatherSettings) -> Gathered:
     return Gathered(*light, covered)
 
 
-def _coarse_steps(*arguments: Any) -> tuple[Array, int]:
-    from refgi.splat.gather.steps import coarse_steps
-
-    return coarse_steps(*arguments)
-
-
-@stage("gather.coarse", steps=_coarse_steps)
+@stage("gather.coarse", steps="refgi.splat.gather.steps.coarse_steps")
 def gather_coarsely(
     receivers: Receivers, shown: Array, rsms: "Sequence[Rsm]", disc: DiscSettings, coarsely: Interpolation,
     extent: "Extent",
@@ -152,13 +146,7 @@ def gather_coarsely(
     return total, int(np.count_nonzero(shown & first) + np.count_nonzero(rest.covered & ~first))
 
 
-def _steps(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSettings) -> Array:
-    from refgi.splat.gather.steps import gather_steps
-
-    return gather_steps(receivers, rsms, disc)
-
-
-@stage("gather.irradiance", steps=_steps)
+@stage("gather.irradiance", steps="refgi.splat.gather.steps.gather_steps")
 def gather_irradiance(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSettings) -> Array:
     """Sum the irradiance of the texels in each receiver's disc.
 

@@ -14,31 +14,9 @@ import numpy as np
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
 from refgi.skips import left_out
-from refgi.sssil.crown.form_factor import (
-    BLOCK,
-    DISC,
-    PLANES,
-    ROWS,
-    TEXEL,
-    WIDE,
-    Emitters,
-    add_two,
-    close_group,
-    dark_ends,
-    disc_texels,
-    form_of,
-    pack,
-)
-from refgi.sssil.crown.pattern import (
-    level_key,
-    pixel_key,
-    row_key,
-    sample_points,
-    sample_weight,
-    shared_offsets,
-    shift_of,
-    shifted,
-)
+from refgi.sssil.crown.form_factor import DISC, TEXEL, SampleForm, disc_texels, form_of
+from refgi.sssil.crown.layout import BLOCK, PLANES, ROWS, WIDE, Emitters, add_two, close_group, dark_ends, pack
+from refgi.sssil.crown.pattern import PixelSamples, pixel_key, pixel_samples, row_key, shared_offsets, shift_of, shifted
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import HssilSettings
@@ -49,13 +27,7 @@ BAND = 4  # rows that a thread takes at once
 GROUP = 256  # samples that are summed before they are added to the total
 
 
-def _steps(*arguments: Any, **named: Any) -> Array:
-    from refgi.sssil.crown.steps import gather_steps
-
-    return gather_steps(*arguments, **named)
-
-
-@stage("sssil.gather", steps=_steps)
+@stage("sssil.gather", steps="refgi.sssil.crown.steps.gather_steps")
 def gather(level: Level, index: int, settings: HssilSettings, senders: Level | None = None) -> Array:
     """Sum the light of the samples around each texel of a level (Eq. 1).
 
@@ -67,37 +39,33 @@ def gather(level: Level, index: int, settings: HssilSettings, senders: Level | N
     rows, columns = level.shape
     sampling, senders = settings.sampling, level if senders is None else senders
     radius = chosen_radius((rows << index, columns << index), sampling)
-    factor, share = math.pi * level_factor(index, settings), settings.senders.disc_share
+    factor, form = math.pi * level_factor(index, settings), form_of(settings.senders)
     if sampling.pattern == "pixel":
-        inner, crown = sampling.counts(index)
-        points, weight = sample_points(inner, crown), sample_weight(radius, inner, crown)
-        key = level_key(sampling.seed, level.number)
-        tally("pairs", lambda: rows * columns * (inner + crown))
+        own = pixel_samples(sampling, index, level.number, radius)
+        tally("pairs", lambda: rows * columns * own.weight.size)
         emitters = pack(senders, 1, math.ceil(2 * radius), WIDE)
         result = plane(level.radiance.shape, level.radiance.dtype)
-        _gather_per_pixel(emitters, level.position, level.normal, points, inner, radius, sampling.density == "uniform",
-                          key, weight, form_of(settings.senders.form_factor), share,
-                          level.position.dtype.type(factor), result)
+        _gather_per_pixel(emitters, level.position, level.normal, own, form, level.position.dtype.type(factor), result)
         return result
     offsets, weight = _reaching(*shared_offsets(sampling, index, level.number, rows, radius, columns), rows, columns)
     tally("pairs", lambda: rows * columns * offsets.shape[2])
-    return sum_of_samples(level, senders, offsets, weight, math.ceil(2 * radius), settings.senders.form_factor, share,
-                          factor, paired=sampling.pattern in ("fixed", "all"))
+    return sum_of_samples(level, senders, offsets, weight, math.ceil(2 * radius), form, factor,
+                          paired=sampling.pattern in ("fixed", "all"))
 
 
 def sum_of_samples(
-    level: Level, senders: Level, offsets: Array, weight: Array, farthest: int, form: str, share: float, factor: float,
-    *, paired: bool = False,
+    level: Level, senders: Level, offsets: Array, weight: Array, farthest: int, form: SampleForm, factor: float, *,
+    paired: bool = False,
 ) -> Array:
     """Return `factor` / pi times the irradiance of a level's texels by samples that texels of a tile have each.
 
     `offsets` (m, P, n, 2) and `weight` are as `shared_offsets` returns them, P a power of two, and reach `farthest`
-    texels; `form` and `share`: form factor and the share of its disc. `paired`: mirror images follow each other.
+    texels. `paired`: mirror images follow each other.
     """
     result = plane(level.radiance.shape, level.radiance.dtype)
     emitters = pack(senders, offsets.shape[1], farthest, WIDE)
     trims = left_out("sssil.senders", lambda: dark_ends(emitters))
-    _gather_shared(emitters, level.position, level.normal, offsets, weight, paired, trims, form_of(form), share,
+    _gather_shared(emitters, level.position, level.normal, offsets, weight, paired, trims, form,
                    level.position.dtype.type(factor), result)
     return result
 
@@ -126,10 +94,9 @@ def level_factor(index: int, settings: HssilSettings) -> float:
 @kernel(parallel=True)
 def _gather_shared(
     emitters: Emitters, position: Array, normal: Array, offsets: Array, weight: Array, paired: bool, trims: bool,
-    form: int, share: float, factor: Any, result: Array,
+    form: SampleForm, factor: Any, result: Array,
 ) -> None:
-    rows = normal.shape[1]
-    packed, emit_from, emit_to = emitters.packed, emitters.emit_from, emitters.emit_to
+    rows, packed = normal.shape[1], emitters.packed
     scale = packed.dtype.type(emitters.scale)
     phases, strip, line, pad = emitters.phases, emitters.strip, emitters.line, emitters.pad
     strips, bands = (line - 2 * pad) // strip, (rows + BAND - 1) // BAND
@@ -142,8 +109,8 @@ def _gather_shared(
             for phase in range(phases):
                 _load(tile, strip, position, normal, scale, row, phase + phases * left, phases)
                 stands_for = weight[shared % weight.shape[0], phase % weight.shape[1]]
-                count = _list_emitting(offsets[shared, phase], stands_for, paired, trims, form, share, emit_from,
-                                       emit_to, row, phase, pad + left, strip, line, starts, weights)
+                count = _list_emitting(emitters, offsets[shared, phase], stands_for, paired, trims, form, row, phase,
+                                       left, starts, weights)
                 for j in range(0, count, 2):
                     low = min(starts[1, j], starts[1, j + 1]) // BLOCK * BLOCK
                     lanes = (max(starts[2, j], starts[2, j + 1]) - low + BLOCK - 1) // BLOCK * BLOCK
@@ -182,15 +149,16 @@ def _load(
 
 @kernel
 def _list_emitting(
-    offsets: Array, weight: Array, paired: bool, trims: bool, form: int, share: float, emit_from: Array,
-    emit_to: Array, row: int, phase: int, first: int, lanes: int, line: int, starts: Array, weights: Array,
+    emitters: Emitters, offsets: Array, weight: Array, paired: bool, trims: bool, form: SampleForm, row: int,
+    phase: int, left: int, starts: Array, weights: Array,
 ) -> int:
     """List the places of a strip's samples that emit, and the lanes for which they do; all lanes unless it `trims`.
 
-    In pairs where samples are paired; one without radiance stands in for a missing partner. `weights` gets the texels
-    that samples stand for, and those of their discs.
+    In pairs where samples are paired; one without radiance stands in for a missing partner. `left`: the strip's first
+    lane. `weights` gets the texels that samples stand for, and those of their discs.
     """
-    rows, phases = emit_to.shape[0] - 1, emit_to.shape[1]
+    emit_from, emit_to, lanes, line = emitters.emit_from, emitters.emit_to, emitters.strip, emitters.line
+    rows, phases, first = emit_to.shape[0] - 1, emit_to.shape[1], emitters.pad + left
     black = rows * PLANES * phases * line
     start, low, high = starts[0], starts[1], starts[2]
     power = 0
@@ -201,7 +169,7 @@ def _list_emitting(
         a, column = row + np.int64(offsets[j, 1]), phase + np.int64(offsets[j, 0])
         of, lane = column & (phases - 1), first + (column >> power)
         start[count], low[count], high[count] = black, lanes, 0
-        weights[0, count], weights[1, count] = weight[j], disc_texels(weight[j], form, share)
+        weights[0, count], weights[1, count] = weight[j], disc_texels(weight[j], form)
         inside = 0 <= a < rows and lane >= 0 and lane + lanes <= line
         if inside and not (offsets[j, 0] == 0 and offsets[j, 1] == 0):
             start[count] = (a * PLANES * phases + of) * line + lane
@@ -232,10 +200,10 @@ def _store(tile: Array, lanes: int, factor: Any, row: int, column: int, phases: 
 
 @kernel(parallel=True)
 def _gather_per_pixel(
-    emitters: Emitters, position: Array, normal: Array, points: Array, inner: int, radius: float, uniform: bool,
-    key: Any, weight: Array, form: int, share: float, factor: Any, result: Array,
+    emitters: Emitters, position: Array, normal: Array, own: PixelSamples, form: SampleForm, factor: Any,
+    result: Array,
 ) -> None:
-    rows = normal.shape[1]
+    rows, weight = normal.shape[1], own.weight
     packed, line, pad, strip = emitters.packed, emitters.line, emitters.pad, emitters.strip
     scale = packed.dtype.type(emitters.scale)
     strips, bands = (line - 2 * pad) // strip, (rows + BAND - 1) // BAND
@@ -247,13 +215,11 @@ def _gather_per_pixel(
             first = row * PLANES * line + pad + left
             _load(tile, strip, position, normal, scale, row, left, 1)
             for i in range(strip):
-                shifts[0, i], shifts[1, i], shifts[2, i] = shift_of(pixel_key(row_key(key, row), left + i), 0)
+                shifts[0, i], shifts[1, i], shifts[2, i] = shift_of(pixel_key(row_key(own.key, row), left + i), 0)
             for j in range(0, weight.size, 2):
                 k = min(j + 1, weight.size - 1)
-                one = _expand(packed, line, first, row, rows, points, weight[j], j, inner, radius, uniform, form, share,
-                              shifts, strip, lines, 0)
-                two = _expand(packed, line, first, row, rows, points, weight[k], k, inner, radius, uniform, form, share,
-                              shifts, strip, lines, PLANES * WIDE)
+                one = _expand(emitters, first, row, own, j, form, shifts, lines, 0)
+                two = _expand(emitters, first, row, own, k, form, shifts, lines, PLANES * WIDE)
                 second = real(weight[k] if k > j else 0.0)
                 add_two(tile, 0, strip, lines, WIDE, 0, real(weight[j]), one, PLANES * WIDE, second, two)
                 if (j + 2) % GROUP == 0:
@@ -264,21 +230,23 @@ def _gather_per_pixel(
 
 @kernel
 def _expand(
-    packed: Array, line: int, first: int, row: int, rows: int, points: Array, weight: float, j: int, inner: int,
-    radius: float, uniform: bool, form: int, share: float, shifts: Array, lanes: int, lines: Array, to: int,
+    emitters: Emitters, first: int, row: int, own: PixelSamples, j: int, form: SampleForm, shifts: Array, lines: Array,
+    to: int,
 ) -> Any:
     """Copy the texels of one sample of each receiver of a strip into a line, with their relative weight.
 
     Areas are those of the sample's disc over the texels returned; what the sample stands for besides is radiance.
     """
-    real, within = packed.dtype.type, 0.0 if j < inner else 1.0
-    for i in range(np.uint64(lanes)):
-        ox, oy, relative = shifted(points, j, within, radius, uniform, shifts[0, i], shifts[1, i], shifts[2, i])
+    packed, line, rows, weight = emitters.packed, emitters.line, emitters.emit_to.shape[0] - 1, own.weight[j]
+    real, within = packed.dtype.type, 0.0 if j < own.inner else 1.0
+    for i in range(np.uint64(emitters.strip)):
+        ox, oy, relative = shifted(own.points, j, within, own.radius, own.uniform, shifts[0, i], shifts[1, i],
+                                   shifts[2, i])
         stands_for = weight * relative
         # for the disc of all this is 1, to the bit
-        covered = disc_texels(stands_for, form, share) / stands_for if form == DISC and stands_for > 0.0 else 1.0
+        covered = disc_texels(stands_for, form) / stands_for if form.kind == DISC and stands_for > 0.0 else 1.0
         area, radiance = relative * covered, 1.0 / covered
-        if form == TEXEL:
+        if form.kind == TEXEL:
             area, radiance = 1.0, relative
         lane = first % line + np.int64(i) + ox
         inside = 0 <= row + oy < rows and 0 <= lane < line and not (ox == 0 and oy == 0)
@@ -286,4 +254,4 @@ def _expand(
         for c in range(PLANES):
             by = 1.0 if c < 3 else (area if c < 6 else radiance)
             lines[np.uint64(to + c * WIDE) + i] = packed[texel + np.uint64(c * line)] * real(by)
-    return real(weight if form == DISC else (1.0 if form == TEXEL else 0.0))
+    return real(weight if form.kind == DISC else (1.0 if form.kind == TEXEL else 0.0))

@@ -24,7 +24,7 @@ from refgi.radiometry import receiver_lobe
 from refgi.rsm.buffers.leaving import GlossyPoints
 from refgi.rsm.raster.projection import Projection
 from refgi.sampling import FIRST_STEP, SECOND_STEP, hash_bits
-from refgi.sssil.crown.form_factor import disc_texels, form_factor
+from refgi.sssil.crown.form_factor import SampleForm, disc_texels, form_factor
 from refgi.sssil.crown.pattern import TO_UNIT, distance, pixel_key, relative_weight, row_key
 from refgi.sssil.pyramid.view import Level
 from refgi.types import Array
@@ -92,22 +92,22 @@ def warped(v: float, cosine: float, sine: float, spread: float) -> Any:
 
 @kernel(parallel=True)
 def draw_samples(
-    to: GlossyReceivers, first: int, last: int, level: Level, draws: Draws, form: int, share: float, transfer: Array,
+    to: GlossyReceivers, first: int, last: int, level: Level, draws: Draws, form: SampleForm, transfer: Array,
     sender: Array,
 ) -> None:
     """Fill the samples of receivers `first` to `last` on a level of senders.
 
-    `form` and `share` are the form factor's. `sender` (pairs,) gets texels, row * columns + column; `transfer` (pairs,)
+    `sender` (pairs,) gets texels, row * columns + column; `transfer` (pairs,)
     f_s times pi times the form factor: what of the sender's radiance the lobe reflects, 1; 0 where nothing.
     """
     count = len(draws.weight)
     for i in prange(last - first):
-        _draw(to, first + np.int64(i), level, draws, form, share, np.int64(i) * count, transfer, sender)
+        _draw(to, first + np.int64(i), level, draws, form, np.int64(i) * count, transfer, sender)
 
 
 @kernel
 def _draw(
-    to: GlossyReceivers, i: Any, level: Level, draws: Draws, form: int, share: float, pair: Any, transfer: Array,
+    to: GlossyReceivers, i: Any, level: Level, draws: Draws, form: SampleForm, pair: Any, transfer: Array,
     sender: Array,
 ) -> None:
     rows, columns = level.area.shape
@@ -130,7 +130,7 @@ def _draw(
         transfer[pair + j], sender[pair + j] = 0.0, 0
         if 0 <= a < rows and 0 <= b < columns and not (ox == 0 and oy == 0):
             sender[pair + j] = a * columns + b
-            transfer[pair + j] = glossy_transfer(to, i, level, a, b, stands_for, disc_texels(stands_for, form, share))
+            transfer[pair + j] = glossy_transfer(to, i, level, a, b, stands_for, disc_texels(stands_for, form))
 
 
 @kernel

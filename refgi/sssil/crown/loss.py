@@ -15,7 +15,7 @@ from refgi.jit import kernel, prange
 from refgi.pairs.estimates import lost_share, sample_pixels, warn_of_loss
 from refgi.pairs.irradiance import Receivers
 from refgi.settings import replaced
-from refgi.sssil.crown.form_factor import disc_texels, form_of, term
+from refgi.sssil.crown.form_factor import Facing, SampleForm, disc_texels, form_of, term
 from refgi.sssil.crown.gather import level_factor
 from refgi.sssil.crown.pattern import shared_offsets
 from refgi.sssil.crown.reach import chosen_radius
@@ -41,34 +41,34 @@ def sample_loss(levels: Sequence[Level], senders: Sequence[Level], settings: Hss
     """
     own = settings.sampling
     own = replaced(own, {"pattern": "interleaved"}) if own.pattern == "pixel" else own
-    form, share = form_of(settings.senders.form_factor), settings.senders.disc_share
+    form = form_of(settings.senders)
     sums = np.zeros(2)
     for index, (level, sending) in enumerate(zip(levels, senders, strict=True)):
         if settings.senders.only_level not in (None, index):
             continue
         place = sample_pixels(Receivers(level.position, level.normal, np.isfinite(level.depth)), SAMPLED).place
-        found = [_mean(place, level, sending, index, one, form, share)
+        found = [_mean(place, level, sending, index, one, form)
                  for one in (own, replaced(own, {"samples": ENOUGH, "pattern": "interleaved"}))]
         sums += np.array(found) * level_factor(index, settings)
     return lost_share(float(sums[1]), float(sums[0]))
 
 
 def _mean(
-    place: Array, level: Level, senders: Level, index: int, sampling: SamplingSettings, form: int, share: float
+    place: Array, level: Level, senders: Level, index: int, sampling: SamplingSettings, form: SampleForm
 ) -> float:
     rows, columns = level.shape
     radius = chosen_radius((rows << index, columns << index), sampling)
     offsets, weight = shared_offsets(sampling, index, level.number, rows, radius, columns)
     sums = np.zeros(len(place))
     _sum_at(place, level.position, level.normal, senders.position, senders.normal, senders.area, senders.radiance,
-            offsets, weight, form, share, sums)
+            offsets, weight, form, sums)
     return float(sums.mean()) if len(sums) else 0.0
 
 
 @kernel(parallel=True)
 def _sum_at(
     place: Array, position: Array, normal: Array, sender: Array, facing: Array, area: Array, radiance: Array,
-    offsets: Array, weight: Array, form: int, share: float, sums: Array,
+    offsets: Array, weight: Array, form: SampleForm, sums: Array,
 ) -> None:
     """Fill the light of the samples of some texels, all channels together, without pi."""
     for i in prange(len(place)):
@@ -83,11 +83,11 @@ def _sum_at(
                 by = -float(area[a, b]) / math.pi
                 # Eq. (1)
                 total += light * term(
-                    float(position[0, y, x]), float(position[1, y, x]), float(position[2, y, x]),
-                    float(normal[0, y, x]), float(normal[1, y, x]), float(normal[2, y, x]),
-                    float(sender[0, a, b]), float(sender[1, a, b]), float(sender[2, a, b]),
-                    facing[0, a, b] * by, facing[1, a, b] * by, facing[2, a, b] * by,
-                    at[j], disc_texels(at[j], form, share))
+                    Facing(float(position[0, y, x]), float(position[1, y, x]), float(position[2, y, x]),
+                           float(normal[0, y, x]), float(normal[1, y, x]), float(normal[2, y, x])),
+                    Facing(float(sender[0, a, b]), float(sender[1, a, b]), float(sender[2, a, b]),
+                           facing[0, a, b] * by, facing[1, a, b] * by, facing[2, a, b] * by),
+                    at[j], disc_texels(at[j], form))
         sums[i] = total
 
 

@@ -19,7 +19,7 @@ every receiver.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,6 +49,24 @@ def sample_weight(radius: float, inner: int, crown: int) -> Array:
     """
     disc = math.pi * radius**2
     return np.repeat([disc / max(inner, 1), 3.0 * disc / crown], [inner, crown])
+
+
+class PixelSamples(NamedTuple):
+    """Samples of receivers that have their own."""
+
+    points: Array  # (n, 3) of `sample_points`
+    weight: Array  # (n,) texels that each stands for in the mean
+    inner: int  # how many lie in the inner disc; they come first
+    radius: float  # of the crown, texels
+    uniform: bool  # density
+    key: Any  # uint32, draws the samples of the level
+
+
+def pixel_samples(sampling: SamplingSettings, index: int, number: int, radius: float) -> PixelSamples:
+    """Return the samples of a level's receivers with their own; arguments as in `shared_offsets`."""
+    inner, crown = sampling.counts(index)
+    return PixelSamples(sample_points(inner, crown), sample_weight(radius, inner, crown), inner, radius,
+                        sampling.density == "uniform", level_key(sampling.seed, number))
 
 
 def known_radius(sampling: SamplingSettings, radius: float | None) -> float:
@@ -138,10 +156,10 @@ def shifted(
 
 
 @kernel
-def pixel_offset(points: Array, inner: int, radius: float, uniform: bool, key: Any, j: int) -> Any:
-    """Return offset (ox, oy) and relative weight of sample j of a receiver's own; the first `inner` lie in the disc."""
+def pixel_offset(own: PixelSamples, key: Any, j: int) -> Any:
+    """Return offset (ox, oy) and relative weight of sample j of a receiver's own; `key` is the receiver's."""
     u, cosine, sine = shift_of(key, 0)
-    return shifted(points, j, 0.0 if j < inner else 1.0, radius, uniform, u, cosine, sine)
+    return shifted(own.points, j, 0.0 if j < own.inner else 1.0, own.radius, own.uniform, u, cosine, sine)
 
 
 PHASES = 2  # of the pattern "row": even columns share samples, and odd ones
@@ -213,12 +231,10 @@ def samples_at(
     if sampling.pattern != "pixel":
         offsets, weight = row_offsets(sampling, index, number, row + 1, radius, column)
         return offsets[row % len(offsets)], weight[row % len(weight)]
-    inner, crown = sampling.counts(index)
-    points, radius = sample_points(inner, crown), known_radius(sampling, radius)
-    key = pixel_key(row_key(level_key(sampling.seed, number), row), column)
-    found = np.array([pixel_offset(points, inner, radius, sampling.density == "uniform", key, j)
-                      for j in range(len(points))]).reshape(-1, 3)
-    return found[:, :2].astype(np.int32), found[:, 2] * sample_weight(radius, inner, crown)
+    own = pixel_samples(sampling, index, number, known_radius(sampling, radius))
+    key = pixel_key(row_key(own.key, row), column)
+    found = np.array([pixel_offset(own, key, j) for j in range(len(own.points))]).reshape(-1, 3)
+    return found[:, :2].astype(np.int32), found[:, 2] * own.weight
 
 
 @kernel

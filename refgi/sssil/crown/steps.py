@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from refgi.sssil.crown.form_factor import form_of
 from refgi.sssil.crown.gather import level_factor, sum_of_samples
 from refgi.sssil.crown.pattern import (
     PHASES,
@@ -23,7 +24,7 @@ from refgi.sssil.crown.pattern import (
 from refgi.sssil.crown.pattern import sample_points as points_of
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.view import Level
-from refgi.sssil.settings import Density, HssilSettings
+from refgi.sssil.settings import Density, FormFactor, HssilSettings, SenderSettings
 from refgi.stages import stage
 from refgi.types import Array
 
@@ -111,7 +112,7 @@ def all_texels(low: float, high: float) -> tuple[Array, Array]:
 @stage("sssil.gather_samples", kept=False, each="level")
 def gather_samples(
     position: Array, normal: Array, sender_position: Array, sender_normal: Array, radiance: Array, area: Array,
-    offsets: Array, weight: Array, form_factor: str, share: float, factor: float, inner: int, index: int,  # noqa: ARG001
+    offsets: Array, weight: Array, form_factor: FormFactor, share: float, factor: float, inner: int, index: int,  # noqa: ARG001
 ) -> Array:
     """Sum the light of the samples of each texel of a level (HSS Eq. 1, Eq. 4 with its pi: E-HSS-04).
 
@@ -137,8 +138,8 @@ def gather_samples(
     more = (1 << (offsets.shape[1] - 1).bit_length()) - offsets.shape[1]  # the kernel takes columns by powers of two
     by_column, texels = (np.pad(one, [(0, 0), (0, more if one.shape[1] > 1 else 0), *[(0, 0)] * (one.ndim - 2)])
                          for one in (offsets, weight))
-    return sum_of_samples(to, by, by_column, texels, int(np.abs(offsets).max(initial=0)), form_factor, share,
-                          math.pi * factor)
+    return sum_of_samples(to, by, by_column, texels, int(np.abs(offsets).max(initial=0)),
+                          form_of(SenderSettings(form_factor=form_factor, disc_share=share)), math.pi * factor)
 
 
 def gather_steps(level: Level, index: int, settings: HssilSettings, senders: Level | None = None) -> Array:

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -82,13 +82,7 @@ def level_shape(shape: tuple[int, int], number: int) -> tuple[int, int]:
     return -(-shape[0] >> number), -(-shape[1] >> number)
 
 
-def _steps(*arguments: Any, **named: Any) -> Any:
-    from refgi.sssil.pyramid.steps import levels_steps
-
-    return levels_steps(*arguments, **named)
-
-
-@stage("sssil.pyramid", steps=_steps)
+@stage("sssil.pyramid", steps="refgi.sssil.pyramid.steps.levels_steps")
 def levels(
     depth: Array, normal: Array, albedo: Array, direct: Array, projection: Projection, first: int, count: int,
     downsample: str = "closest", as_published: frozenset[str] = frozenset(),

@@ -16,7 +16,8 @@ import numpy as np
 from refgi.elementary import exp2
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.scene.model import Geometry
+from refgi.scene.model import Geometry, Scene
+from refgi.scene.values import Vector
 from refgi.sssil.reprojection import SourceView, reproject
 from refgi.sssil.settings import TemporalSettings
 from refgi.sssil.temporal.motion import as_solids, fetch_entering, previous_points
@@ -127,13 +128,7 @@ def with_frames(irradiance: Array, frames: Array | None) -> Array:
     return irradiance if frames is None else np.concatenate([irradiance, frames[None]])
 
 
-def _steps(*arguments: Any, **named: Any) -> dict[str, Array]:
-    from refgi.sssil.temporal.steps import temporal_steps
-
-    return temporal_steps(*arguments, **named)
-
-
-@stage("sssil.temporal", kept=False, steps=_steps)
+@stage("sssil.temporal", kept=False, steps="refgi.sssil.temporal.steps.temporal_steps")
 def temporal_filter(
     irradiance: Array, frame: "Frame", geometry: Geometry, history: History, settings: TemporalSettings
 ) -> Filtered:
@@ -161,7 +156,8 @@ def temporal_filter(
         skip("sssil.motion", "the same geometry")
     else:
         expect_same_triangles(geometry, history.geometry)
-        position, normal, speed = previous_points(buffer, frame.scene.geometry, earlier_geometry(frame, history))
+        before = earlier_geometry(frame.scene, frame.origin, history)
+        position, normal, speed = previous_points(buffer, frame.scene.geometry, before)
     earlier = history.light if settings.counts_frames else history.light[:3]
     reprojected, weight = reproject(earlier, history.view, position, normal, buffer.covered,
                                     origin=frame.origin, depth_tolerance=settings.depth_tolerance,
@@ -204,15 +200,15 @@ def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
            "vertex normals in all or in none", "some with and some without")
 
 
-def earlier_geometry(frame: "Frame", history: History) -> Geometry:
-    """Return the triangles of the frame before relative to a frame's origin, solid objects in the pose of this frame.
+def earlier_geometry(scene: Scene, origin: Vector, history: History) -> Geometry:
+    """Return the triangles of the frame before relative to a frame's origin, solid objects in the pose of its scene.
 
     By HSS Sec. 4 "supposing that their pose hasn't changed": the rigid motion that fits an object's vertices best.
     """
-    before, now = history.geometry, frame.scene.geometry
-    if any(frame.origin):
-        before = dataclasses.replace(before, vertices=np.asarray(before.vertices, np.float64) - frame.origin)
-    solids = np.array([one.solid for one in frame.scene.materials])[now.material_of_face]
+    before, now = history.geometry, scene.geometry
+    if any(origin):
+        before = dataclasses.replace(before, vertices=np.asarray(before.vertices, np.float64) - origin)
+    solids = np.array([one.solid for one in scene.materials])[now.material_of_face]
     return before if not solids.any() else as_solids(now, before, solids)
 
 

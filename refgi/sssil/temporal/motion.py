@@ -22,7 +22,7 @@ from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection
 from refgi.scene.model import Geometry
 from refgi.scene.values import Vector
-from refgi.sssil.reprojection import SourceView, pixel_transform
+from refgi.sssil.reprojection import PixelTransform, SourceView, pixel_transform
 from refgi.stages import stage
 from refgi.types import Array
 
@@ -84,19 +84,28 @@ def motion(
     """
     result = PreviousPoints(plane(position.shape, position.dtype), plane(normal.shape, normal.dtype),
                             plane(normal.shape[1:], normal.dtype))
-    moving, size = np.empty(len(faces), np.bool_), np.array([projection.width, projection.height])
-    now, then, up, up_before = (np.zeros((0, 3)) if one is None else np.ascontiguousarray(one, np.float64)
-                                for one in (vertices, before, vertex_normals, normals_before))
-    _find_moving(faces, now, then, up, up_before, moving)
-    _move_back(triangle_id, moving, faces, now, then, up, up_before, projection.origin[0], projection.frame[0],
-               size / (2 * projection.half), position, normal, *result)
+    moving = np.empty(len(faces), np.bool_)
+    corners = Corners(faces, *(np.zeros((0, 3)) if one is None else np.ascontiguousarray(one, np.float64)
+                               for one in (vertices, before, vertex_normals, normals_before)))
+    _find_moving(corners, moving)
+    seen = pixel_transform(projection, np.float64)
+    _move_back(triangle_id, moving, corners, seen, position, normal, result)
     return result
 
 
+class Corners(NamedTuple):
+    """The corners of triangles now and a frame earlier, in float64."""
+
+    faces: Array  # (triangle, 3) vertices
+    vertices: Array  # (vertex, 3) m
+    before: Array  # (vertex, 3) m
+    vertex_normals: Array  # (vertex, 3); (0, 3) of flat triangles
+    normals_before: Array  # the same
+
+
 @kernel(parallel=True)
-def _find_moving(
-    faces: Array, vertices: Array, before: Array, vertex_normals: Array, normals_before: Array, moving: Array
-) -> None:
+def _find_moving(corners: Corners, moving: Array) -> None:
+    faces, vertices, before, vertex_normals, normals_before = corners
     for face in prange(faces.shape[0]):
         same = True
         for corner in range(3):
@@ -110,25 +119,25 @@ def _find_moving(
 
 @kernel(parallel=True)
 def _move_back(
-    triangle_id: Array, moving: Array, faces: Array, vertices: Array, before: Array, vertex_normals: Array,
-    normals_before: Array, eye: Array, frame: Array, scale: Array, position: Array, normal: Array,
-    position_before: Array, normal_before: Array, speed: Array,
+    triangle_id: Array, moving: Array, corners: Corners, seen: PixelTransform, position: Array, normal: Array,
+    result: PreviousPoints,
 ) -> None:
     for row in prange(triangle_id.shape[0]):
         for axis in range(3):
             for column in range(triangle_id.shape[1]):
-                position_before[axis, row, column] = position[axis, row, column]
-                normal_before[axis, row, column] = normal[axis, row, column]
-        _move_row(row, triangle_id, moving, faces, vertices, before, vertex_normals, normals_before, eye, frame, scale,
-                  position_before, normal_before, speed)
+                result.position[axis, row, column] = position[axis, row, column]
+                result.normal[axis, row, column] = normal[axis, row, column]
+        _move_row(row, triangle_id, moving, corners, seen, result)
 
 
 @kernel
 def _move_row(
-    row: int, triangle_id: Array, moving: Array, faces: Array, vertices: Array, before: Array, vertex_normals: Array,
-    normals_before: Array, eye: Array, frame: Array, scale: Array, position: Array, normal: Array, speed: Array,
+    row: int, triangle_id: Array, moving: Array, corners: Corners, seen: PixelTransform, result: PreviousPoints
 ) -> None:
     """Move a row's points on moving triangles and turn their normals, in place."""
+    faces, vertices, before, vertex_normals, normals_before = corners
+    position, normal, speed = result
+    eye = seen.eye
     for column in range(triangle_id.shape[1]):
         speed[row, column] = 0
         face = triangle_id[row, column]
@@ -145,7 +154,7 @@ def _move_row(
         ox, oy, oz = _mean(vertices, i, j, k, a, b, c)
         px, py, pz = _mean(before, i, j, k, a, b, c)
         dx, dy, dz = px - ox, py - oy, pz - oz
-        speed[row, column] = _pixels_between(x - eye[0], y - eye[1], z - eye[2], dx, dy, dz, frame, scale)
+        speed[row, column] = _pixels_between(x - eye[0], y - eye[1], z - eye[2], dx, dy, dz, seen)
         position[0, row, column], position[1, row, column], position[2, row, column] = x + dx, y + dy, z + dz
         side = nx * normal[0, row, column] + ny * normal[1, row, column] + nz * normal[2, row, column]
         length = math.sqrt(mx * mx + my * my + mz * mz)
@@ -193,15 +202,16 @@ def _mean(
 
 @kernel
 def _pixels_between(
-    x: float, y: float, z: float, dx: float, dy: float, dz: float, frame: Array, scale: Array
+    x: float, y: float, z: float, dx: float, dy: float, dz: float, seen: PixelTransform
 ) -> float:
     """Return the distance in pixels between the images of a point, relative to the eye, and of the point moved by d."""
-    right = frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z
-    down = frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z
-    depth = frame[2, 0] * x + frame[2, 1] * y + frame[2, 2] * z
-    more_right = frame[0, 0] * dx + frame[0, 1] * dy + frame[0, 2] * dz
-    more_down = frame[1, 0] * dx + frame[1, 1] * dy + frame[1, 2] * dz
-    deeper = frame[2, 0] * dx + frame[2, 1] * dy + frame[2, 2] * dz
+    axes, scale = seen.axes, seen.scale
+    right = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z
+    down = axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
+    depth = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
+    more_right = axes[0, 0] * dx + axes[0, 1] * dy + axes[0, 2] * dz
+    more_down = axes[1, 0] * dx + axes[1, 1] * dy + axes[1, 2] * dz
+    deeper = axes[2, 0] * dx + axes[2, 1] * dy + axes[2, 2] * dz
     if not (depth > 0.0 and depth + deeper > 0.0):
         return np.inf
     # (a + da) / (z + dz) - a / z without the difference of nearly equal numbers
@@ -223,27 +233,27 @@ def fetch_entering(
     others, and of those where the edge shows no surface.
     """
     share = plane(covered.shape, reprojected.dtype)
-    eye, frame, scale = pixel_transform(source, reprojected.dtype, origin)
-    _fetch_entering(values, source.depth, eye, frame, scale, position, covered, weight,
-                    reprojected.dtype.type(-math.log2(math.e) / speed), reprojected, share)
+    to = pixel_transform(source.projection, reprojected.dtype, np.subtract(source.origin, origin))
+    falloff = reprojected.dtype.type(-math.log2(math.e) / speed)
+    _fetch_entering(values, source.depth, to, position, covered, weight, falloff, reprojected, share)
     return share
 
 
 @kernel(parallel=True)
 def _fetch_entering(
-    values: Array, depth: Array, eye: Array, frame: Array, scale: Array, position: Array, covered: Array, weight: Array,
-    falloff: Any, reprojected: Array, share: Array,
+    values: Array, depth: Array, to: PixelTransform, position: Array, covered: Array, weight: Array, falloff: Any,
+    reprojected: Array, share: Array,
 ) -> None:
     for row in prange(covered.shape[0]):
-        _fetch_row(row, values, depth, eye, frame, scale, position, covered, weight, falloff, reprojected, share)
+        _fetch_row(row, values, depth, to, position, covered, weight, falloff, reprojected, share)
 
 
 @kernel
 def _fetch_row(
-    row: Any, values: Array, depth: Array, eye: Array, frame: Array, scale: Array, position: Array, covered: Array,
-    weight: Array, falloff: Any, reprojected: Array, share: Array,
+    row: Any, values: Array, depth: Array, to: PixelTransform, position: Array, covered: Array, weight: Array,
+    falloff: Any, reprojected: Array, share: Array,
 ) -> None:
-    real = share.dtype.type
+    real, eye, axes, scale = share.dtype.type, to.eye, to.axes, to.scale
     height, width, half = depth.shape[0], depth.shape[1], real(0.5)
     for column in range(share.shape[1]):
         share[row, column] = real(0)
@@ -252,11 +262,11 @@ def _fetch_row(
         dx = position[0, row, column] - eye[0]
         dy = position[1, row, column] - eye[1]
         dz = position[2, row, column] - eye[2]
-        ahead = frame[2, 0] * dx + frame[2, 1] * dy + frame[2, 2] * dz
+        ahead = axes[2, 0] * dx + axes[2, 1] * dy + axes[2, 2] * dz
         if not ahead > real(0):
             continue
-        x = (frame[0, 0] * dx + frame[0, 1] * dy + frame[0, 2] * dz) / ahead * scale[0] + scale[2]
-        y = (frame[1, 0] * dx + frame[1, 1] * dy + frame[1, 2] * dz) / ahead * scale[1] + scale[3]
+        x = (axes[0, 0] * dx + axes[0, 1] * dy + axes[0, 2] * dz) / ahead * scale[0] + scale[2]
+        y = (axes[1, 0] * dx + axes[1, 1] * dy + axes[1, 2] * dz) / ahead * scale[1] + scale[3]
         if -half <= x <= real(width) - half and -half <= y <= real(height) - half:
             continue  # it was hidden, not outside
         j = int(np.rint(min(max(x, real(0)), real(width - 1))))

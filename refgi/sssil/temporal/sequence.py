@@ -10,6 +10,7 @@ from refgi.errors import expect
 from refgi.frame import Frame
 from refgi.scene.model import Scene
 from refgi.settings import flat, replaced
+from refgi.sssil.hssil import hssil, hssil_lobes
 from refgi.sssil.settings import LAST_SEED, HssilSettings, TemporalSettings
 from refgi.sssil.temporal.filter import Filtered, History, first_light, history_of, temporal_filter, with_frames
 from refgi.stages import Memory, reusing, sharing
@@ -73,8 +74,8 @@ class Sequence:
         self.scenes = scenes
         self.settings = HssilSettings() if settings is None else settings
         self.temporal = temporal
-        self.method = method or _hssil()
-        self.lobes = _hssil_lobes if method is None and lobes is None else lobes
+        self.method = method or hssil
+        self.lobes = hssil_lobes if method is None and lobes is None else lobes
         self.memory = memory
         self.frame_options = frame_options
 
@@ -95,8 +96,12 @@ class Sequence:
             del step  # whoever took it may let go of it before the next is made
 
     def _step(self, scene: Scene, number: int, history: History | None) -> tuple[SequenceFrame, History | None]:
-        frame = Frame(scene, **self.frame_options)
-        irradiance, lobes = self._light(frame, seeded(self.settings, number))
+        frame, settings = Frame(scene, **self.frame_options), seeded(self.settings, number)
+        if self.lobes is None or not frame.glossy_receivers:
+            irradiance, lobes = self.method(frame, settings), None
+        else:
+            with sharing():
+                irradiance, lobes = self.method(frame, settings), self.lobes(frame, settings)
         if self.temporal is None:
             return SequenceFrame(frame, irradiance, frame.radiance(irradiance, lobes), 0.0, lobes=lobes), None
         if history is None:
@@ -107,25 +112,6 @@ class Sequence:
         filtered = made.irradiance
         return (SequenceFrame(frame, filtered, frame.radiance(filtered, lobes), made.reused, made.frames, lobes),
                 history_of(frame, scene.geometry, left))
-
-    def _light(self, frame: Frame, settings: Any) -> tuple[Array, Array | None]:
-        """Return irradiance and lobes of a frame by itself."""
-        if self.lobes is None or not frame.glossy_receivers:
-            return self.method(frame, settings), None
-        with sharing():
-            return self.method(frame, settings), self.lobes(frame, settings)
-
-
-def _hssil() -> Method:
-    from refgi.sssil.hssil import hssil
-
-    return hssil
-
-
-def _hssil_lobes(frame: Frame, settings: Any) -> Array | None:
-    from refgi.sssil.hssil import hssil_lobes
-
-    return hssil_lobes(frame, settings)
 
 
 def seeded(settings: Any, number: int) -> Any:

@@ -117,7 +117,8 @@ def temporal_steps(
     position, normal = buffer.resolve("position", "normal")
     view, speed, share = _seen_from(history.view, frame.origin), None, None
     if geometry is not history.geometry:
-        position, normal, speed = previous_points(buffer, frame.scene.geometry, earlier_geometry(frame, history))
+        before = earlier_geometry(frame.scene, frame.origin, history)
+        position, normal, speed = previous_points(buffer, frame.scene.geometry, before)
     old, count = history.light[:3], history.light[3] if settings.counts_frames else None
     light, weight, frames = reprojection(position, normal, ids, view, history.view.depth, history.view.normal, old,
                                          settings.depth_tolerance, settings.normal_cosine, settings.fetch, count)

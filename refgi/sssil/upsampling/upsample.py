@@ -25,32 +25,45 @@ BAND = 8  # rows of texels of a block
 LANES = 32  # pixels that are looked at together for one without any weight: whole texels of any size
 
 
+class Guide(NamedTuple):
+    """Depths and normals that guide joint bilateral upsampling, of a level's texels or the picture's pixels."""
+
+    depth: Array  # (h, w) m along the view direction; inf where there is no surface
+    normal: Array  # (3, h, w) unit vectors
+
+
+class Falloff(NamedTuple):
+    """How the weight of a texel falls off."""
+
+    sharpness: Any  # of `load_receivers`
+    corner: Any  # likewise
+    power: Any  # of `bilateral_weight`
+
+
 @kernel(parallel=True)
 def fill_bilateral(
-    light: Array, coarse_depth: Array, coarse_normal: Array, depth: Array, normal: Array, factor: int, sharpness: Any,
-    corner: Any, power: Any, added: Array, adds: bool, result: Array,
+    light: Array, coarse: Guide, fine: Guide, factor: int, falloff: Falloff, added: Array, adds: bool, result: Array
 ) -> None:
     """Upsample irradiance of texels to pixels of the same surface, and add `added` if `adds`.
 
-    `light` (3, hc, wc), W/m^2; `coarse_depth`, `coarse_normal` of texels and `depth`, `normal` of pixels: m, inf for no
-    surface, and unit vectors. `factor` pixels along a texel's side. `sharpness`, `corner`: of `load_receivers`;
-    `power`: of `bilateral_weight`. `result` (3, h, w) is filled, W/m^2.
+    `light` (3, hc, wc), W/m^2, of texels of `factor` pixels along a side; `result` (3, h, w) is filled, W/m^2.
     """
-    tents = np.empty(TENTS, depth.dtype)
-    write_tents(factor, corner, tents)
-    across = (depth.shape[1] + WIDE - 1) // WIDE
-    bands = (coarse_depth.shape[0] + BAND - 1) // BAND
+    tents = np.empty(TENTS, fine.depth.dtype)
+    write_tents(factor, falloff.corner, tents)
+    across = (fine.depth.shape[1] + WIDE - 1) // WIDE
+    bands = (coarse.depth.shape[0] + BAND - 1) // BAND
     for task in prange(across * bands):
         left, first = np.int64(task) % across * WIDE, np.int64(task) // across * BAND
-        _fill_block(light, coarse_depth, coarse_normal, depth, normal, left, first, factor, tents, sharpness, corner,
-                    power, added, adds, result)
+        _fill_block(light, coarse, fine, left, first, factor, tents, falloff, added, adds, result)
 
 
 @kernel
 def _fill_block(
-    light: Array, coarse_depth: Array, coarse_normal: Array, depth: Array, normal: Array, left: int, first: int,
-    side: int, tents: Array, sharpness: Any, corner: Any, power: Any, added: Array, adds: bool, result: Array,
+    light: Array, coarse: Guide, fine: Guide, left: int, first: int, side: int, tents: Array, falloff: Falloff,
+    added: Array, adds: bool, result: Array,
 ) -> None:
+    depth, normal = fine
+    sharpness, corner, power = falloff
     texels, nearness = np.empty((3, lines.LINES), depth.dtype), np.empty((3, SPAN), depth.dtype)
     pixels, means = np.zeros(receivers.HERE, depth.dtype), np.empty(weights.MEANS, depth.dtype)
     bounds, scratch = np.empty(lines.BOUNDS, depth.dtype), np.empty((2, SPAN), depth.dtype)
@@ -59,7 +72,7 @@ def _fill_block(
     for y in range((first - 2) * side, min((first + BAND) * side, depth.shape[0])):
         row, place = y // side, y % side
         if place == 0:
-            lines.load_texels(light, coarse_depth, coarse_normal, row + 1, left, wide, side, scratch,
+            lines.load_texels(light, coarse.depth, coarse.normal, row + 1, left, wide, side, scratch,
                               texels[(row + 4) % 3])
             if row >= first:
                 lines.load_bounds(light, row, left, wide, side, scratch, bounds)
@@ -202,13 +215,6 @@ def _coverage(depth: Array, row: int, column: int) -> Any:
     return real(1.0) if inside and depth[row, column] < real(np.inf) else real(0.0)
 
 
-class Guide(NamedTuple):
-    """Depths and normals that guide joint bilateral upsampling, of a level's texels or the picture's pixels."""
-
-    depth: Array  # (h, w) m along the view direction; inf where there is no surface
-    normal: Array  # (3, h, w) unit vectors
-
-
 @stage("sssil.upsample", kept=False, each="level")
 def upsample(
     coarse: Array, coarse_guide: Guide, guide: Guide, settings: HssilSettings, added: Array | None = None
@@ -259,8 +265,8 @@ def upsample(
     # the closest of F x F pixels of a slope is at a corner of the texel
     corner = real(0.0 if settings.senders.downsample == "average" else (factor - 1) / (2 * factor))
     power = None if weights.normal_power == QUICK_POWER else real(weights.normal_power)
-    fill_bilateral(values, coarse_depth, coarse_normal, depth, normal, factor, sharpness, corner, power, addend, adds,
-                   result)
+    fill_bilateral(values, Guide(coarse_depth, coarse_normal), Guide(depth, normal), factor,
+                   Falloff(sharpness, corner, power), addend, adds, result)
     return result
 
 

@@ -7,14 +7,15 @@ Symbols: d vector from receiver to sample (m), c = max(0, n . d), s = max(0, -m 
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.sssil.crown.form_factor import disc_texels, form_factor, form_of, length_scale
+from refgi.sssil.crown.form_factor import SampleForm, disc_texels, form_factor, form_of
 from refgi.sssil.crown.gather import level_factor
+from refgi.sssil.crown.layout import length_scale
 from refgi.sssil.crown.pattern import level_key, pixel_key, row_key
 from refgi.sssil.crown.reach import chosen_radius
 from refgi.sssil.pyramid.view import Level
@@ -38,6 +39,16 @@ from refgi.sssil.visibility.slices import (
 )
 from refgi.stages import stage, tally
 from refgi.types import Array
+
+
+class Marched(NamedTuple):
+    """A level to be marched, its lengths scaled; see `_packed`."""
+
+    receiving: Array
+    sending: Array  # senders and occluders
+    thickness: Any  # of surfaces, in the dtype of the level
+    form: SampleForm
+
 
 PART, TOTAL, HIGHEST, SCRATCH = 0, 6, 9, 10  # lines of scratch: two slices' sums, all sums, largest q so far
 
@@ -69,17 +80,16 @@ def bitmask_gather(
     phases = sampling.tile if sampling.pattern == "interleaved" else 1
     packed = _packed(level, scale, phases)
     sending = packed if senders is None or senders is level else _packed(senders, scale, phases)
-    thickness, form = real(bitmask.thickness * diagonal * scale), form_of(settings.senders.form_factor)
-    share = settings.senders.disc_share
+    marched = Marched(packed, sending, real(bitmask.thickness * diagonal * scale), form_of(settings.senders))
     factor = real(level_factor(index, settings))
     result = np.empty_like(level.radiance)
     tally("pairs", lambda: rows * columns * steps.slices * (steps.disc + steps.crown))
     if sampling.pattern == "pixel":
         key = level_key(sampling.seed, level.number)
-        _march_pixels(packed, sending, steps, key, thickness, form, share, factor, result)
+        _march_pixels(marched, steps, key, factor, result)
     else:
         offsets, weight = slice_offsets(sampling, steps, level.number, rows)
-        _march_rows(packed, sending, offsets, weight, thickness, form, share, factor, result)
+        _march_rows(marched, offsets, weight, factor, result)
     return result
 
 
@@ -94,8 +104,8 @@ def _packed(level: Level, scale: float, phases: int) -> Array:
 
 
 @kernel(parallel=True)
-def _march_rows(packed: Array, sending: Array, offsets: Array, weight: Array, thickness: Any, form: int, share: float,
-                factor: Any, result: Array) -> None:
+def _march_rows(marched: Marched, offsets: Array, weight: Array, factor: Any, result: Array) -> None:
+    packed = marched.receiving
     for prow in prange(packed.shape[0]):
         row = np.int64(prow)
         lines, mask = np.zeros((SCRATCH, packed.shape[2]), packed.dtype), np.zeros(packed.shape[2], np.uint32)
@@ -104,17 +114,18 @@ def _march_rows(packed: Array, sending: Array, offsets: Array, weight: Array, th
             mask[:] = np.uint32(0)
             lines[HIGHEST, :] = packed.dtype.type(0.0)
             for phase in range(offsets.shape[1]):
-                _march_phase(packed, sending, row, phase, offsets.shape[1], result.shape[2], offsets[shared, phase, k],
-                             weight[shared, phase, k], thickness, form, share, lines, mask, k % 2)
+                _march_phase(marched, row, phase, offsets.shape[1], result.shape[2], offsets[shared, phase, k],
+                             weight[shared, phase, k], lines, mask, k % 2)
             if k % 2 == 1 or k + 1 == offsets.shape[2]:
                 _join(lines)
         _store(packed, row, offsets.shape[1], lines, factor, result)
 
 
 @kernel
-def _march_phase(packed: Array, sending: Array, row: Any, phase: int, phases: int, columns: int, offsets: Array,
-                 weight: Array, thickness: Any, form: int, share: float, lines: Array, mask: Array, half: int) -> None:
+def _march_phase(marched: Marched, row: Any, phase: int, phases: int, columns: int, offsets: Array, weight: Array,
+                 lines: Array, mask: Array, half: int) -> None:
     """March one slice for the receivers of a row and phase, which are the SIMD lanes."""
+    packed, sending, thickness, form = marched
     rows, lanes = packed.shape[0], packed.shape[2] // phases
     receiver, part, real = packed[row], np.uint64(PART + 3 * half), packed.dtype.type
     receivers = (columns - phase + phases - 1) // phases
@@ -129,7 +140,7 @@ def _march_phase(packed: Array, sending: Array, row: Any, phase: int, phases: in
         sender, first, second = sending[row + oy], np.uint64(phase * lanes + low), np.uint64(of * lanes + low + by)
         if weight[j] > 0.0:
             _add_sample(receiver, first, sender, second, np.uint64(size), real(weight[j]),
-                        real(disc_texels(weight[j], form, share)), thickness, lines, mask, part)
+                        real(disc_texels(weight[j], form)), thickness, lines, mask, part)
         else:
             _add_occluder(receiver, first, sender, second, np.uint64(size), thickness, lines, mask)
 
@@ -195,8 +206,8 @@ def _store(packed: Array, row: Any, phases: int, lines: Array, factor: Any, resu
 
 
 @kernel(parallel=True)
-def _march_pixels(packed: Array, sending: Array, steps: SliceCounts, key: Any, thickness: Any, form: int, share: float,
-                  factor: Any, result: Array) -> None:
+def _march_pixels(marched: Marched, steps: SliceCounts, key: Any, factor: Any, result: Array) -> None:
+    packed = marched.receiving
     for prow in prange(packed.shape[0]):
         row = np.int64(prow)
         count = steps.disc + steps.crown + steps.occluders
@@ -207,14 +218,15 @@ def _march_pixels(packed: Array, sending: Array, steps: SliceCounts, key: Any, t
             turn, shift = turn_of(pixel_key(row_key(key, row), column))
             fill_slices(steps, turn, shift, False, length, offsets, weight)
             for k in range(steps.slices):
-                _march_pixel(packed, sending, row, column, offsets[k], weight[k], thickness, form, share, lines, mask)
+                _march_pixel(marched, row, column, offsets[k], weight[k], lines, mask)
         _join(lines)
         _store(packed, row, 1, lines, factor, result)
 
 
 @kernel
-def _march_pixel(packed: Array, sending: Array, row: Any, column: Any, offsets: Array, weight: Array, thickness: Any,
-                 form: int, share: float, lines: Array, mask: Array) -> None:
+def _march_pixel(marched: Marched, row: Any, column: Any, offsets: Array, weight: Array, lines: Array,
+                 mask: Array) -> None:
+    packed, sending, thickness, form = marched
     rows, columns = packed.shape[0], packed.shape[2]
     receiver, part, one, p = packed[row], np.uint64(PART), np.uint64(1), np.uint64(column)
     real = packed.dtype.type
@@ -224,7 +236,7 @@ def _march_pixel(packed: Array, sending: Array, row: Any, column: Any, offsets: 
         if a < 0 or a >= rows or b < 0 or b >= columns or (a == row and b == column):
             continue
         if weight[j] > 0.0:
-            disc = real(disc_texels(weight[j], form, share))
+            disc = real(disc_texels(weight[j], form))
             _add_sample(receiver, p, sending[a], np.uint64(b), one, real(weight[j]), disc, thickness, lines, mask, part)
         else:
             _add_occluder(receiver, p, sending[a], np.uint64(b), one, thickness, lines, mask)

@@ -11,7 +11,7 @@ import numpy as np
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.rays import far_offset
-from refgi.sssil.crown.form_factor import disc_texels
+from refgi.sssil.crown.form_factor import SampleForm, disc_texels
 from refgi.sssil.crown.glossy import GlossyReceivers, glossy_transfer
 from refgi.sssil.crown.pattern import level_key, pixel_key, row_key
 from refgi.sssil.pyramid.view import Level
@@ -70,7 +70,7 @@ def slice_samples(
 
 @kernel(parallel=True)
 def march_samples(
-    to: GlossyReceivers, first: int, last: int, level: Level, slices: SliceSamples, form: int, share: float,
+    to: GlossyReceivers, first: int, last: int, level: Level, slices: SliceSamples, form: SampleForm,
     transfer: Array, sender: Array,
 ) -> None:
     """Fill transfer, times visibility, and sender of the samples of all slices; arguments as for `draw_samples`."""
@@ -84,13 +84,13 @@ def march_samples(
         fill_slices(steps, turn, shift, False, length, offsets, weight)
         for k in range(steps.slices):
             pair = (np.int64(i) * steps.slices + k) * per_slice
-            _march(to, receiver, level, slices, offsets[k], weight[k], form, share, pair, transfer, sender)
+            _march(to, receiver, level, slices, offsets[k], weight[k], form, pair, transfer, sender)
 
 
 @kernel
 def _march(
-    to: GlossyReceivers, i: Any, level: Level, slices: SliceSamples, offsets: Array, weight: Array, form: int,
-    share: float, pair: Any, transfer: Array, sender: Array,
+    to: GlossyReceivers, i: Any, level: Level, slices: SliceSamples, offsets: Array, weight: Array,
+    form: SampleForm, pair: Any, transfer: Array, sender: Array,
 ) -> None:
     """March one slice of a receiver, nearest samples first."""
     rows, columns = level.area.shape
@@ -105,7 +105,7 @@ def _march(
             if weight[j] > 0.0:
                 sender[pair + j] = a * columns + b
                 transfer[pair + j] = visibility(front, highest, mask) * glossy_transfer(
-                    to, i, level, a, b, weight[j], disc_texels(weight[j], form, share))
+                    to, i, level, a, b, weight[j], disc_texels(weight[j], form))
             highest = max(highest, front)
             mask = np.uint32(mask | sector_mask(back, front))
 

@@ -162,7 +162,7 @@ def test_a_picture_of_which_its_library_complains_is_refused(tmp_path, monkeypat
 def test_memory_is_what_a_limit_leaves(monkeypatch):
     import resource
 
-    from refgi.scene.mesh import physical_memory
+    from refgi.memory import physical_memory
 
     present = physical_memory()
     monkeypatch.setattr(resource, "getrlimit", lambda _: (12345, 12345))

@@ -145,7 +145,7 @@ def test_an_image_that_is_too_large_is_refused_before_it_is_decoded(monkeypatch:
     with pytest.raises(InputError, match=r"a\.png: expected at most 2,999 texels, got '60 x 50'"):
         decoded(content, "a.png")
     monkeypatch.setattr("refgi.scene.texture.image.MOST_TEXELS", 3000)
-    monkeypatch.setattr("refgi.scene.mesh.physical_memory", lambda: 3000.0 * 30)
+    monkeypatch.setattr("refgi.scene.texture.image.physical_memory", lambda: 3000.0 * 30)
     with pytest.raises(InputError, match=r"a\.png: expected an image that fits in 0\.0 GiB of memory"):
         decoded(content, "a.png")
 

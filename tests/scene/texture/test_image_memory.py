@@ -9,8 +9,8 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.scene import load_scene
-from refgi.scene.mesh import BYTES_OF_TEXEL
 from refgi.scene.obj import read_obj
+from refgi.scene.texture.image import BYTES_OF_TEXEL
 from tests.scene.samples import BUFFER, glb_bytes, gltf_tree, write_scene
 
 COUNT, WIDTH, HEIGHT = 3, 50, 40
@@ -82,7 +82,7 @@ def read(path: Path) -> None:
 def test_all_of_them_are_judged_before_one_is_decoded(tmp_path, monkeypatch, made):
     path = made(tmp_path)
     for key, amount in (("refgi.scene.texture.image.available_bytes", NEEDED - 1),
-                        ("refgi.scene.mesh.physical_memory", float(NEEDED - 1))):
+                        ("refgi.scene.texture.image.physical_memory", float(NEEDED - 1))):
         with monkeypatch.context() as patch:
             patch.setattr(key, lambda amount=amount: amount)
             patch.setattr("refgi.scene.texture.image._read", lambda *_: pytest.fail("an image was decoded"))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
-from refgi.jit import threads
 from refgi.scene import load_scene
 from refgi.scene.model import Camera
 from refgi.settings import of
@@ -143,12 +142,3 @@ def test_the_light_given_is_left_as_it_was():
     joined = join_cameras(frame, light, CameraSettings(views=(frame.scene.camera,)), lambda _: light + 1)
     assert not light.any()
     assert (joined == frame.gbuffer.covered).all()
-
-
-def test_bits_do_not_depend_on_the_number_of_threads():
-    pictures = []
-    for count in (1, 2):
-        with threads(count):
-            frame = Frame(load_scene("cornell_box"), width=45, height=34, rsm_resolution=64)
-            pictures.append(hssil(frame, of(HssilSettings, cameras=1, **QUICK)))
-    np.testing.assert_array_equal(*pictures)

@@ -2,17 +2,16 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
 
 from refgi.frame import Frame
-from refgi.jit import threads
 from refgi.literal import hssil_crown as literal
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
-from refgi.sssil.crown.form_factor import DISC
+from refgi.sssil.crown.form_factor import DISC, SampleForm
 from refgi.sssil.crown.gather import _list_emitting, gather
+from refgi.sssil.crown.layout import Emitters
 from refgi.sssil.crown.pattern import samples_at
 from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import PRESETS, HssilSettings
@@ -85,9 +84,10 @@ def test_a_sample_is_summed_for_the_lanes_that_it_emits_for(trims, lanes):
     """Lanes 16 to 31 of one row of 64 emit; a strip of 32 has a sample 8 texels to the right, one 32 to the right."""
     emit_from = np.array([16, 16, 16, 24, 64, 64, 64, 64, 64], np.int32).reshape(1, 1, 9).repeat(2, axis=0)
     emit_to = np.array([0, 0, 0, 24, 32, 32, 32, 32, 32], np.int32).reshape(1, 1, 9).repeat(2, axis=0)
+    emitters = Emitters(np.zeros(0), emit_from, emit_to, phases=1, line=64, pad=0, strip=32, scale=1.0)
     offsets, weight = np.array([[8, 0], [32, 0]], np.int32), np.ones(2)
     starts, weights = np.empty((3, 3), np.int64), np.empty((2, 3))
-    count = _list_emitting(offsets, 8.0 * weight, False, trims, DISC, 0.5, emit_from, emit_to, 0, 0, 0, 32, 64, starts,
+    count = _list_emitting(emitters, offsets, 8.0 * weight, False, trims, SampleForm(DISC, 0.5), 0, 0, 0, starts,
                            weights)
     assert count == 1  # the other one is dark for the whole strip
     assert starts[:, 0].tolist() == [8, *lanes]
@@ -103,16 +103,6 @@ def test_single_precision_rounds_and_no_more():
     found = gather(level, 0, settings)
     assert found.dtype == np.float32
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING[np.float32] * expected.max())
-
-
-@pytest.mark.parametrize("pattern", ["interleaved", "row", "pixel"])
-def test_same_bits_for_any_number_of_threads(pattern):
-    """Property: one thread and all of them."""
-    level, settings = random_level((70, 33), np.float32), replaced(SETTINGS, {"pattern": pattern})
-    found = gather(level, 0, settings)
-    with threads(1):
-        np.testing.assert_array_equal(gather(level, 0, settings), found)
-    assert numba.get_num_threads() >= 1
 
 
 @pytest.mark.feature("HSS-10")

@@ -7,7 +7,6 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.frame import Frame
-from refgi.jit import threads
 from refgi.literal import hssil_levels as literal
 from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import load_scene
@@ -64,13 +63,6 @@ def test_levels_are_those_of_the_literal_text(mode, evidence):
             for level, expected in zip(made(picture, view, first, 3, mode), right, strict=True):
                 assert_equal_to(expected, level, FLOAT64)
     evidence(f"{mode}: pixels chosen equal, the rest to {FLOAT64:g}")
-
-
-def test_areas_of_levels_may_have_the_printed_tangents():
-    picture, view = random_picture(14, 9), camera(14, 9, 50.0)
-    for level, expected in zip(made(picture, view, 1, 2, as_published=frozenset({"hss_tan_f"})),
-                               levels_by_text(picture, view, 1, 2, "closest", "whole"), strict=True):
-        assert_equal_to(expected, level, FLOAT64)
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -168,16 +160,6 @@ def test_a_later_start_has_the_levels_of_an_earlier_one():
         for level, expected in zip(made(picture, view, first, 4 - first), full[first:], strict=True):
             assert same(level, expected)
             assert level.number == expected.number
-
-
-def test_bits_do_not_depend_on_threads():
-    picture, view = random_picture(67, 41), camera(67, 41)
-    for mode in MODES:
-        with threads(1):
-            one = made(picture, view, 1, 3, mode)
-        with threads(None):
-            two = made(picture, view, 1, 3, mode)
-        assert all(map(same, one, two))
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e6])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
-from refgi.jit import threads
 from refgi.scene import PointLight, load_scene
 from refgi.settings import of, replaced
 from refgi.sssil.pyramid.levels import pyramid, sender_pyramid
@@ -85,13 +84,3 @@ def test_dark_texels_are_as_the_closest(frame):
         np.testing.assert_array_equal(level.pixel, near.pixel)
         np.testing.assert_array_equal(level.position, near.position)
         assert not level.radiance.any()
-
-
-def test_threads_change_no_bit(frame):
-    made = []
-    for count in (1, 2):
-        with threads(count):
-            made.append(levels_of(frame)[1])
-    for one, other in zip(*made, strict=True):
-        for a, b in zip(one[1:], other[1:], strict=True):
-            np.testing.assert_array_equal(a, b)

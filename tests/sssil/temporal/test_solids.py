@@ -96,7 +96,7 @@ def test_reprojection_is_off_by_the_limbs_turn(evidence):
     before, scene = figure(), figure(ANGLE, solid=1)
     frame, earlier = Frame(scene, dtype=np.float64), Frame(before, dtype=np.float64)
     history = history_of(earlier, before.geometry, first_light(np.zeros((3, 36, 48)), TemporalSettings()))
-    held = earlier_geometry(frame, history)
+    held = earlier_geometry(frame.scene, frame.origin, history)
     np.testing.assert_allclose(held.vertices, scene.geometry.vertices, atol=ROUNDING)
     solid, exact = (previous_points(frame.gbuffer, scene.geometry, one).position for one in (held, before.geometry))
     limb = frame.gbuffer.triangle_id >= 4

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError
-from refgi.jit import threads
 from refgi.literal import upsampling as literal
 from refgi.settings import of
 from refgi.sssil.settings import HssilSettings
@@ -243,16 +242,6 @@ def test_any_depth_is_finite_and_within_bounds(scale, sigma):
     assert np.all(np.isfinite(got))
     assert got.min() >= 0.5 * (1 - ROUNDING)
     assert got.max() <= 1.5 * (1 + ROUNDING)
-
-
-def test_threads_do_not_matter():
-    below, here = guides(*rubble((90, 40), 15), 2, np.float32)
-    light = np.random.default_rng(6).random((3, *below.depth.shape)).astype(np.float32)
-    results = []
-    for count in (1, 2):
-        with threads(count):
-            results.append(upsample(light, below, here, PLAIN))
-    assert np.array_equal(*results)
 
 
 def test_sizes_that_do_not_fit_are_refused():

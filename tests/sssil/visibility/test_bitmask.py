@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError
-from refgi.jit import threads
 from refgi.settings import of, replaced
 from refgi.sssil.crown.pattern import level_key, pixel_key, row_key
 from refgi.sssil.pyramid.view import Level
@@ -183,17 +182,6 @@ def test_mirror_images_to_the_bit():
         settings = replaced(SETTINGS, {"pattern": "fixed", "slices": slices})
         got = bitmask_gather(level, 0, settings, DIAGONAL)
         np.testing.assert_array_equal(got, got[:, :, ::-1])
-
-
-@pytest.mark.parametrize("pattern", ["interleaved", "row", "pixel"])
-def test_same_bits_for_any_number_of_threads(pattern):
-    level = seen(9, 21, PLATE, np.float32)
-    settings = replaced(SETTINGS, {"pattern": pattern})
-    results = []
-    for count in (1, 2):
-        with threads(count):
-            results.append(bitmask_gather(level, 0, settings, DIAGONAL))
-    np.testing.assert_array_equal(*results)
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (7, 1)])

@@ -13,7 +13,7 @@ from refgi.sssil.crown.pattern import samples_at
 from refgi.sssil.pyramid.levels import pyramid
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.visibility.bitmask import bitmask_gather
-from refgi.sssil.visibility.rays import add_unoccluded, ray_gather
+from refgi.sssil.visibility.rays import Traced, add_unoccluded, ray_gather
 from tests.naive import bitmask as naive
 
 WHITE = Material("white", (0.6, 0.6, 0.6))
@@ -43,6 +43,10 @@ def frame():
     return Frame(scene(blocker=True), width=12, height=9, dtype=np.float64, rsm_resolution=64)
 
 
+def traced(frame):
+    return Traced(frame.gbuffer, frame.scene.geometry, frame.tracer)
+
+
 def around(level, index, settings):
     return lambda row, column: [(int(ox), int(oy), w) for (ox, oy), w in zip(
         *samples_at(settings.sampling, index, level.number, row, column), strict=True)]
@@ -69,7 +73,7 @@ def test_twin(frame, pattern, form, evidence):
     settings = replaced(SETTINGS, {"pattern": pattern, "form_factor": form})
     (level,) = pyramid(frame, settings)
     expected, free = twin(level, settings, frame), twin(level, settings)
-    got = ray_gather(level, 0, settings, frame)
+    got = ray_gather(level, 0, settings, traced(frame))
     error = np.abs(got - expected).max() / expected.max()
     evidence(f"{pattern}: V of all samples as segments cut with every triangle, to {error:.0e} of the largest; "
              f"{1 - expected.sum() / free.sum():.1%} of the light is blocked")
@@ -81,7 +85,7 @@ def test_twin(frame, pattern, form, evidence):
 def test_nothing_between_is_the_unoccluded_sum(evidence):
     frame = Frame(scene(blocker=False), width=12, height=9, dtype=np.float64, rsm_resolution=64)
     (level,) = pyramid(frame, SETTINGS)
-    expected, got = twin(level, SETTINGS), ray_gather(level, 0, SETTINGS, frame)
+    expected, got = twin(level, SETTINGS), ray_gather(level, 0, SETTINGS, traced(frame))
     error = np.abs(got - expected).max() / expected.max()
     evidence(f"nothing between: the sum without visibility to {error:.0e}")
     assert error < ROUNDING
@@ -89,11 +93,11 @@ def test_nothing_between_is_the_unoccluded_sum(evidence):
 
 def test_batches_and_threads_change_no_bit(frame):
     (level,) = pyramid(frame, SETTINGS)
-    expected = ray_gather(level, 0, SETTINGS, frame)
+    expected = ray_gather(level, 0, SETTINGS, traced(frame))
     for batch in (1, 100):
-        np.testing.assert_array_equal(ray_gather(level, 0, SETTINGS, frame, batch=batch), expected)
+        np.testing.assert_array_equal(ray_gather(level, 0, SETTINGS, traced(frame), batch=batch), expected)
     with threads(1):
-        np.testing.assert_array_equal(ray_gather(level, 0, SETTINGS, frame), expected)
+        np.testing.assert_array_equal(ray_gather(level, 0, SETTINGS, traced(frame)), expected)
 
 
 def test_mirror_images_are_added_to_each_other_first():
@@ -113,7 +117,7 @@ def test_background_receives_nothing():
     away = dataclasses.replace(scene(blocker=False), camera=Camera((0.2, 1.1, 3.1), (0.0, 2.0, 0.0), vfov=0.8))
     frame = Frame(away, width=7, height=5, rsm_resolution=64)
     (level,) = pyramid(frame, SETTINGS)
-    got = ray_gather(level, 0, SETTINGS, frame)
+    got = ray_gather(level, 0, SETTINGS, traced(frame))
     assert (level.pixel < 0).any()
     assert got.dtype == np.float32
     assert not got[:, level.pixel < 0].any()
@@ -126,7 +130,7 @@ def test_over_brightness_and_what_the_bitmask_leaves_of_it(evidence):
     settings = of(HssilSettings, radius=6, levels=1, samples=64, start="full", pattern="all")
     frame = Frame(scene(blocker=True), width=48, height=36, rsm_resolution=128)
     (level,) = pyramid(frame, settings)
-    true = ray_gather(level, 0, settings, frame)
+    true = ray_gather(level, 0, settings, traced(frame))
     dense = replaced(settings, {"pattern": "row", "slices": 16, "samples": 512, "thickness": 0.01})
     free, masked = (bitmask_gather(level, 0, replaced(dense, {"thickness": t}), frame.scene.geometry.diagonal)
                     for t in (0.0, dense.visibility.thickness))

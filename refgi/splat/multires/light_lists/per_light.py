@@ -44,13 +44,7 @@ BATCH_BYTES = 1 << 28  # bytes for the lists of a batch of lights, unless one li
 SMALL_PICTURE = 1 << 18  # pixels up to which threads would wait for each other longer than they upsample one light
 
 
-def _steps(*arguments: Any, **named: Any) -> Array:
-    from refgi.splat.multires.light_lists.steps import per_light_steps
-
-    return per_light_steps(*arguments, **named)
-
-
-@stage("multires.per_light", steps=_steps)
+@stage("multires.per_light", steps="refgi.splat.multires.light_lists.steps.per_light_steps")
 def per_light(
     buffer: "GBuffer", lights: "PixelLights", settings: "ByIrradiance", pairs: "PairSettings",
     footprint: Array | None = None, start: Subsplats | None = None, *, filter_all: bool = False,

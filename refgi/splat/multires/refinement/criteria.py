@@ -126,13 +126,7 @@ def _over_columns(least: Array, most: Array, rim: int, low: Array, high: Array) 
             high[j] = max(high[j], max(most[2 * j + k], most[2 * j + 2 * rim + 1 - k]))
 
 
-def _steps(buffer: "GBuffer", criteria: "Criteria", top: int, finest: int = 0) -> tuple[Array, ...]:
-    from refgi.splat.multires.refinement.steps import discontinuity_steps
-
-    return discontinuity_steps(buffer, criteria, top, finest)
-
-
-@stage("multires.criteria", steps=_steps)
+@stage("multires.criteria", steps="refgi.splat.multires.refinement.steps.discontinuity_steps")
 def discontinuities(buffer: "GBuffer", criteria: "Criteria", top: int, finest: int = 0) -> tuple[Array, ...]:
     """Return which cells of each level hold a discontinuity.
 

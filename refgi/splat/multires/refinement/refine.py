@@ -15,7 +15,7 @@ are refined too: true of ranges with thresholds that do not rise with the level 
 of "corner" and "literal".
 """
 
-from typing import Any, NamedTuple, get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
 
@@ -177,13 +177,7 @@ class _Columns(NamedTuple):
     leaf: Array  # (n,) bool, levels 0 to top
 
 
-def _steps(*arguments: Any, **named: Any) -> dict[str, Array]:
-    from refgi.splat.multires.refinement.steps import refine_steps
-
-    return refine_steps(*arguments, **named)
-
-
-@stage("multires.refine", steps=_steps)
+@stage("multires.refine", steps="refgi.splat.multires.refinement.steps.refine_steps")
 def refine(
     discontinuous: tuple[Array, ...], covered: Array, diagonal: Diagonal = "corner",
     traversal: Traversal = "single_pass",

@@ -6,7 +6,7 @@ become many, at the subsplats' share of the rays. With the soft shadows of clust
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,13 +34,7 @@ if TYPE_CHECKING:
     from refgi.rsm import GBuffer
 
 
-def _point_steps(*arguments: Any, **named: Any) -> tuple[Array, Array]:
-    from refgi.splat.multires.subsplats.steps import point_steps
-
-    return point_steps(*arguments, **named)
-
-
-@stage("multires.representative_points", steps=_point_steps)
+@stage("multires.representative_points", steps="refgi.splat.multires.subsplats.steps.point_steps")
 def representative_points(
     buffer: "GBuffer", subsplats: Subsplats, representative: Representative = "pixel"
 ) -> tuple[Array, Array]:
@@ -65,13 +59,7 @@ def points_of(
     return points, normals
 
 
-def _evaluate_steps(*arguments: Any, **named: Any) -> Array:
-    from refgi.splat.multires.subsplats.steps import evaluate_steps
-
-    return evaluate_steps(*arguments, **named)
-
-
-@stage("multires.evaluate", steps=_evaluate_steps)
+@stage("multires.evaluate", steps="refgi.splat.multires.subsplats.steps.evaluate_steps")
 def evaluate(
     points: Array, normals: Array, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None,
     lightcuts: Lightcuts | None = None,
@@ -143,13 +131,7 @@ def _average_cell(
     normals[0, k], normals[1, k], normals[2, k] = p / length, q / length, r / length
 
 
-def _visible_steps(*arguments: Any, **named: Any) -> Array:
-    from refgi.splat.multires.subsplats.shadow_steps import visible_steps
-
-    return visible_steps(*arguments, **named)
-
-
-@stage("multires.evaluate_visible", steps=_visible_steps)
+@stage("multires.evaluate_visible", steps="refgi.splat.multires.subsplats.shadow_steps.visible_steps")
 def evaluate_visible(
     tracer: "Tracer", geometry: Geometry, buffer: "GBuffer", subsplats: Subsplats, lights: "PixelLights"
 ) -> Array:
@@ -187,13 +169,7 @@ def ray_receivers(tracer: "Tracer", geometry: Geometry, buffer: "GBuffer", pixel
                      tracer.grain)
 
 
-def _shadowed_steps(*arguments: Any, **named: Any) -> Array:
-    from refgi.splat.multires.subsplats.shadow_steps import shadowed_steps
-
-    return shadowed_steps(*arguments, **named)
-
-
-@stage("multires.evaluate_shadowed", steps=_shadowed_steps)
+@stage("multires.evaluate_shadowed", steps="refgi.splat.multires.subsplats.shadow_steps.shadowed_steps")
 def evaluate_shadowed(
     frame: "Frame", buffer: "GBuffer", subsplats: Subsplats, lights: "PixelLights", settings: "ValSettings",
     footprint: Array | None = None,

@@ -77,13 +77,7 @@ def _sort(level: Array, row: Array, bases: Array, starts: Array, order: Array) -
         places[key] += 1
 
 
-def _steps(*arguments: Any, **named: Any) -> Array:
-    from refgi.splat.multires.subsplats.steps import upsample_steps
-
-    return upsample_steps(*arguments, **named)
-
-
-@stage("multires.upsample", steps=_steps)
+@stage("multires.upsample", steps="refgi.splat.multires.subsplats.steps.upsample_steps")
 def upsample(
     values: Array, subsplats: Subsplats, covered: Array, mode: Upsampling = "tent", *, filter_all: bool = False,
     corner_rule: bool = True,

@@ -87,3 +87,45 @@ def is_there(name):
             continue
         return all(hasattr(found, attribute) for attribute in rest)
     return False
+
+
+def test_the_page_of_claims_is_that_of_the_records():
+    papers = loaded("papers_page")
+    made = papers.page(tomllib.loads(papers.CLAIMS.read_text(encoding="utf-8")), papers.read(papers.RECORD))
+    assert papers.PAGE.read_text(encoding="utf-8") == made, "run python docs/papers_page.py"
+    rows = [line for line in made.splitlines() if line.startswith("| ") and not line.startswith("| where")]
+    assert all(line.endswith(" |  |") == ("| yes |" in line) for line in rows)  # what is not met says why
+
+
+@pytest.mark.parametrize(("printed", "ours", "met"), [
+    ("4", 5.0, "yes"), ("4", 5.01, "no"), ("4", 3.2, "yes"), ("4", 3.19, "no"), (">70", 70.0, "no"),
+    (">70", 71.0, "yes"), ("<10", 9.0, "yes"), ("<10", 10.0, "no"), ("4", None, "not measured")])
+def test_a_claim_is_met_within_a_quarter_or_on_its_side(printed, ours, met):
+    papers = loaded("papers_page")
+    assert papers.verdict(printed, ours, "slow") == met
+    assert papers.verdict(printed, ours, "fitted: so") == ("fitted" if ours else met)
+
+
+def test_a_claim_reads_the_cell_that_it_names():
+    papers = loaded("papers_page")
+    tables = [{"columns": ["", "ms"], "rows": [["a", 2.0], ["b", 8.0]]}, {"columns": ["", "fps"], "rows": [["a", 3.0]]}]
+    found = {"fig1": {"tables": tables}}
+    assert papers.cells(found, "fig1 :: b :: ms") == 8
+    assert papers.cells(found, "fig1#1 :: a :: fps // fig1 :: b :: ms") == 3 / 8
+    assert papers.cells(found, "fig1 :: a :: ms // fig2 :: a :: ms") is None
+    assert papers.cells(found, "") is None
+    assert papers.cells(found, "fig1 :: c :: ms") is None
+    with pytest.raises(KeyError, match="fig1 :: a :: s"):
+        papers.cells(found, "fig1 :: a :: s")
+
+
+def test_results_of_a_run_replace_figures_in_the_record():
+    papers = loaded("papers_page")
+    old = {"sii": {"fig1": {"tables": []}, "fig2": {"tables": []}}}
+    table = {"title": "t", "columns": ["", "ms"], "rows": [["a", 2.0]], "columns_of_the_paper": []}
+    papers.taken_over(old, {"paper": {"name": "sii"}, "scale": {"name": "quick", "size": 256},
+                            "environment": {"cpu": "x", "threads": 2},
+                            "figures": {"fig1": {"tables": [table]}, "fig3": {"failure": "no"}}})
+    assert list(old["sii"]) == ["fig1", "fig2"]
+    assert papers.cells(old["sii"], "fig1 :: a :: ms") == 2
+    assert papers.runs({"fig1": old["sii"]["fig1"]}) == " Runs: 256² pixels (quick scale) on 2 threads of x."

@@ -21,6 +21,7 @@ RENAMED: dict[str, dict[str, str]] = {
             "maps": "maps.renderer", "extent": "area.extent", "receiver_plane": "visibility.constant_bias"},
     "sii": {"i_low": "reach.cut.share", "irradiance_low": "reach.cut.irradiance", "mesh_faces": "reach.bound.faces",
             "stochastic_range": "reach.stochastic"},
+    "vpl": {"levels": "maps.levels"},
 }
 # single values that are another key's value today
 RENAMED_CASES: dict[tuple[str, str, Any], tuple[str, Any]] = {("gather", "grid", 0): ("interpolation", "none")}

@@ -6,7 +6,7 @@ E(x) = sum_i Phi_i / pi <n_i.w> <n_x.-w> / r^2 V(x, x_i), and the same with a lo
 import dataclasses
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from refgi.method import Approximation, Extent, Method
 from refgi.pairs.estimates import error_of_halves, half_of, sample_pixels, warn_of_sampling, with_seen_light
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.pixel_lights import warn_of_mirrors
-from refgi.pairs.settings import LAST_SEED
 from refgi.pairs.shadow_rays import BATCH, Hidden, receivers, shadowed_sum
 from refgi.rays import Tracer
 from refgi.scene import Geometry
@@ -31,28 +30,13 @@ if TYPE_CHECKING:
 
 FLOAT32 = 4  # bytes
 SAMPLED = 512  # pixels of which the sampling error is estimated
-MOST_LIGHTS = 1 << 24  # every texel of one of 4096 x 4096
-Pattern = Literal["grid", "halton", "all", "random"]
-
-
-@dataclasses.dataclass(frozen=True)
-class VplLights(Settings):
-    """Which texels of shadow maps are pixel lights."""
-
-    PRINCIPAL = "count"
-
-    count: int = setting(768, "pixel lights of all lamps together, shared out by the flux they bring", least=1,
-                         most=MOST_LIGHTS)
-    pattern: Pattern = setting("halton", "where they lie in a map; all: every texel, whatever the count")
-    filtered: bool = setting(False, "flux is averaged over each light's cell (SII Sec. 4)")
-    seed: int = setting(0, "which random numbers", least=0, most=LAST_SEED)
 
 
 @dataclasses.dataclass(frozen=True)
 class VplSettings(Settings):
     """Which pixel lights `vpl` uses, and whether they are shadowed."""
 
-    lights: VplLights = setting(VplLights(), "pixel lights")
+    lights: LightSettings = setting(LightSettings(), "pixel lights")
     visibility: bool = setting(True, "a shadow ray for each pair of light and receiver, or a map for each light")
     maps: Imperfect | None = setting(None, "maps in place of rays; none: rays")
     batch: int = setting(BATCH, "pairs held at a time: memory, never a bit of the result", least=1, most=2**30,
@@ -157,14 +141,11 @@ def vpl_lobes(frame: "Frame", settings: VplSettings) -> Array:
 
 def _lights(frame: "Frame", settings: VplSettings) -> "tuple[PixelLights, ImperfectDepth | None]":
     """Return pixel lights, and their maps in place of rays."""
-    from refgi.lights import choose_pixel_lights
+    from refgi.lights.selection import choose_lights
 
-    chosen = settings.lights
-    lights = choose_pixel_lights(frame.rsms, count=None if chosen.pattern == "all" else chosen.count,
-                                 pattern=chosen.pattern, seed=chosen.seed, filtered=chosen.filtered)
-    maps = None
+    lights, maps = choose_lights(frame, settings.lights), None
     if settings.visibility and settings.maps is not None:
-        maps = imperfect_maps(frame.scene.geometry, lights, settings.maps, chosen.seed)
+        maps = imperfect_maps(frame.scene.geometry, lights, settings.maps, settings.lights.seed)
     return lights, maps
 
 
@@ -173,7 +154,7 @@ def _hidden(maps: ImperfectDepth | None) -> Hidden | None:
 
 
 def _every_texel(settings: VplSettings, _: Mapping[str, Any]) -> VplSettings:
-    return dataclasses.replace(settings, lights=VplLights(pattern="all"))
+    return dataclasses.replace(settings, lights=LightSettings(source=MapLights(pattern="all")))
 
 
 def _by_rays(settings: VplSettings, _: Mapping[str, Any]) -> VplSettings:
@@ -192,10 +173,7 @@ def _map_bytes(settings: VplSettings, extent: Extent) -> int:
     """Return bytes of the maps of all lights."""
     if settings.maps is None or not settings.visibility:
         return 0
-    chosen = settings.lights
-    count = most_lights(LightSettings(count=chosen.count, source=MapLights(pattern=chosen.pattern)), extent.maps,
-                        extent.texels)
-    return FLOAT32 * count * settings.maps.resolution**2
+    return FLOAT32 * most_lights(settings.lights, extent.maps, extent.texels) * settings.maps.resolution**2
 
 
 METHOD = Method("vpl", "the same pixel lights with visibility by rays or imperfect shadow maps", vpl, VplSettings,

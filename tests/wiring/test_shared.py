@@ -10,6 +10,7 @@ from refgi.cluster import ValSettings, val
 from refgi.lights.selection import choose_lights
 from refgi.splat import MultiresSettings, SiiSettings, multires, sii
 from refgi.stages import observe
+from refgi.truth.vpl import VplSettings, vpl
 from tests.wiring.cases import under
 from tests.wiring.features import LIGHTS, featured
 from tests.wiring.light_cases import BASE, LIGHT_CASES
@@ -17,8 +18,9 @@ from tests.wiring.light_cases import BASE, LIGHT_CASES
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 METHODS = {"sii": (sii, SiiSettings, {}), "multires": (multires, MultiresSettings, {}),
-           "val": (val, ValSettings, {"clusters.count": 3, "maps.resolution": 8, "interleaving.block": 1})}
-SUMS = ("pairs.sum", "multires.evaluate", "cluster.irradiance")
+           "val": (val, ValSettings, {"clusters.count": 3, "maps.resolution": 8, "interleaving.block": 1}),
+           "vpl": (vpl, VplSettings, {"visibility": False})}
+SUMS = ("pairs.sum", "multires.evaluate", "cluster.irradiance", "vpl.light")
 CASES = under("lights", LIGHT_CASES)
 
 

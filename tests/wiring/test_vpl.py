@@ -5,10 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from refgi.lights import choose_pixel_lights
+from refgi.lights.selection import choose_lights
+from refgi.lights.settings import LightSettings
 from refgi.truth.vpl import VplSettings, vpl
 from tests.literal.whole.vpl import picture as twin
-from tests.wiring.cases import Case, uncovered
+from tests.wiring.cases import Case, needed, uncovered
 from tests.wiring.features import VPL, featured
 from tests.wiring.fold import fold
 
@@ -20,12 +21,14 @@ FEW_POINTS = {"maps.points": 300, "maps.resolution": 16}  # for the twin's loops
 CASES = {
     "fewer lights": Case({"lights": 31}),
     "on glossy surfaces and a smooth ball": Case({"lights": 90}, scene="smooth"),
-    "a grid": Case({"lights.pattern": "grid"}),
-    "at random": Case({"lights.pattern": "random"}),
-    "at random, a seed": Case({"lights.seed": 4}, {"lights.pattern": "random"}),
-    "every texel": Case({"lights.pattern": "all"}, frame={"rsm_resolution": 5}),
+    "a grid": Case({"lights.source.pattern": "grid"}),
+    "at random": Case({"lights.source.pattern": "random"}),
+    "at random, a seed": Case({"lights.seed": 4}, {"lights.source.pattern": "random"}),
+    "every texel": Case({"lights.source.pattern": "all"}, frame={"rsm_resolution": 5}),
     "a seed": Case({"lights.seed": 3}),
-    "filtered": Case({"lights.filtered": True}),
+    "light paths": Case({"lights.source": "walk"}),
+    "behind glass": Case({"lights.source.refraction": None}, {"lights": 200}, scene="glass"),
+    "filtered": Case({"lights.source.filtered": True}),
     "not shadowed": Case({"visibility": False}),
     "not shadowed, on a smooth ball": Case({"visibility": False}, scene="smooth"),
     "imperfect maps": Case({"maps": "imperfect"}, {"lights": 6}),
@@ -50,7 +53,7 @@ FOLDED = fold(VplSettings, CASES, BASE, fits=known) | {
 
 
 def test_every_field_has_a_case():
-    assert uncovered(VplSettings, CASES, BASE) == set()
+    assert not uncovered(VplSettings, CASES, BASE) - set(needed(LightSettings))  # those: test_lights, test_shared
 
 
 @pytest.fixture(scope="module", params=CASES)
@@ -65,10 +68,8 @@ def made(request):
 def test_the_literal_text(name, evidence):
     case = FOLDED[name]
     frame, settings = case.seen(), case.settings(VplSettings, BASE)
-    chosen = settings.lights
-    lights = choose_pixel_lights(frame.rsms, count=None if chosen.pattern == "all" else chosen.count,
-                                 pattern=chosen.pattern, seed=chosen.seed, filtered=chosen.filtered)
-    expected = twin(frame, lights, settings.visibility, settings.maps, chosen.seed)
+    lights = choose_lights(frame, settings.lights)
+    expected = twin(frame, lights, settings.visibility, settings.maps, settings.lights.seed)
     off = np.abs(vpl(frame, settings) - expected).max() / expected.max()
     evidence(f"{case.parts}: off by {off:.0e} of the brightest pixel")
     assert off < SINGLE

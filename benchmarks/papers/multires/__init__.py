@@ -7,15 +7,27 @@ paper always has it does not state: see `subjects`.
 
 from functools import partial
 
-from benchmarks.papers.multires.error import beside_path_tracing, edges, surface_detail
+from benchmarks.papers.multires.error import (
+    beside_path_tracing,
+    edges,
+    rows_of_criteria,
+    surface_detail,
+    two_pictures,
+)
 from benchmarks.papers.multires.rates import by_lights, by_scene, by_threshold
 from benchmarks.papers.multires.receivers import glossy_receivers
 from benchmarks.papers.multires.speed import flight
 from benchmarks.papers.multires.subjects import BUDDHA, BUNNIES, DRAGON, TEAPOT
-from benchmarks.papers.multires.subsplats import of_each_light, passes, upsampling
+from benchmarks.papers.multires.subsplats import of_each_light, passes, upsampling, upsampling_passes
 from benchmarks.papers.records import Case, Entry
 
+TITLES = {TEAPOT: "Simple Teapot", BUDDHA: "Spinning Buddha", DRAGON: "Dragon & Bunny", BUNNIES: "Flying Bunnies"}
+CURVATURE = {"criteria.curvature": "chord", "criteria.normal": "none"}
+
 FIGURES = (
+    Entry("fig1", "Figure 1", "Direct light, and with indirect light",
+          "The dragon and bunny scene by direct light only, and with indirect light subdivided to 512² at most.",
+          columns=3, make=partial(two_pictures, scene=DRAGON, part=2)),
     Entry("fig5", "Figure 5", "Subsplats, pass by pass",
           "An initial set of 16² subsplats, refined pass by pass at discontinuities of depth and normal; those that a "
           "pass leaves as they are, in grey scale, and the combined result after six passes.", columns=5,
@@ -30,6 +42,9 @@ FIGURES = (
           make=partial(upsampling, scene=DRAGON, ways={
               "nearest": "nearest neighbour", "naive_bilinear": "naive bilinear", "demo": "the authors' demo",
               "tent": "tent (default)", "filter_all": "tent, rendered texels filtered too"})),
+    Entry("fig8", "Figure 8", "Two passes of upsampling",
+          "From 32² to 64² to 128²: missing samples are filled by what is interpolated from the levels before.",
+          make=partial(upsampling_passes, scene=DRAGON, sides=(32, 64, 128))),
     Entry("fig9", "Figure 9", "A fly-through",
           "Frame rates and numbers of subsplats while flying through the dragon scene, with discontinuities found by "
           "depth or its derivative and by normals or curvature, at similar quality.", columns=3,
@@ -48,6 +63,13 @@ FIGURES = (
               Case("low", "threshold 0.25", {"normal_threshold": 0.25}, 8),
               Case("high", "threshold 1.4", {"normal_threshold": 1.4}, 32),
               Case("detail", "threshold 1.4, surface detail", {"normal_threshold": 1.4, "detail": 0.5}, 32)))),
+    Entry("fig12", "Figure 12", "Four scenes by criteria and thresholds",
+          "Direct light only; curvature above 0.1 and 0.3; normals above 0.2 and 1.5; 1.5 with surface detail.",
+          make=partial(rows_of_criteria, scenes=TITLES, ways={
+              "curvature 0.1": CURVATURE | {"criteria.curvature.threshold": 0.1},
+              "curvature 0.3": CURVATURE | {"criteria.curvature.threshold": 0.3},
+              "normals 0.2": {"normal_threshold": 0.2}, "normals 1.5": {"normal_threshold": 1.5},
+              "normals 1.5, detail": {"normal_threshold": 1.5, "detail": 0.5}})),
     Entry("fig13", "Figure 13", "Beside gathering and path tracing",
           "The method and reflective shadow mapping are near indistinguishable; every texel as a light, without a "
           "clamp, is brighter; path tracing differs by visibility, clamp and the solid angles of texels.", columns=5,
@@ -75,7 +97,7 @@ FIGURES = (
     Entry("table2", "Table 2", "Four scenes, four resolutions",
           "Frame rates fall with the resolution of indirect light, and hardly depend on the number of triangles: at "
           "1024² a teapot and 417 thousand triangles run alike.",
-          make=partial(by_scene, parts=(8, 4, 2, 1), titles={
-              TEAPOT: "Simple Teapot", BUDDHA: "Spinning Buddha", DRAGON: "Dragon & Bunny", BUNNIES: "Flying Bunnies"},
+          make=partial(
+              by_scene, parts=(8, 4, 2, 1), titles=TITLES,
               fps={128: (68, 60, 59, 52), 256: (50, 42, 42, 41), 512: (33, 30, 28, 31), 1024: (22, 24, 21, 25)})),
 )

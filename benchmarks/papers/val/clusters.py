@@ -236,7 +236,7 @@ def _judged(bench: Workbench, frame: Frame, settings: ValSettings, chosen: list[
     rows: list[tuple[Cell, ...]] = []
     for m in chosen:
         single = _alone(found, m)
-        off = errors_of(lit_by(frame, single, settings, maps), rays_to(frame, single.lights), covered)
+        off = errors_of(lit_by(frame, single, settings, maps), rays_to(frame, single.lights, settings), covered)
         rows.append((f"area light {m + 1}", int(found.clusters.members[m]), 100 * float(found.areas.delta[m]),
                      100 * float(single.lights.flux.sum() / flux), *off))
     whole = errors_of(lit_by(frame, found, settings, maps), shadowed(bench, frame, settings), covered)

@@ -80,6 +80,6 @@ def by_area_lights(bench: Workbench, scene: str, shown: tuple[int, ...], further
             "Between, clusters of two or three lights still have the series' bias, which does not shrink with them.",
             f"Against path tracing the MAE of the same lights with rays is {vpl_off:.1f} %, of {title} "
             f"{truth[AREA_LIGHTS]:.1f} %: the number of lights decides, not that of area lights. Bright dots where "
-            "walls meet are lights next to a receiver; no distance is clamped here but for the interleaved picture.",
+            "walls meet are lights next to a receiver, clamped by the disc that each stands for as in the reference.",
             f"Interleaved over 8 x 8 pixels and blurred, as the paper's pictures, {title} are another "
             f"{off:.1f} % (MAE) off what they come to without."))

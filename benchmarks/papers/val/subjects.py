@@ -8,8 +8,9 @@ Settings are the paper's: 1024 lights, 30 area lights, maps of 256 x 256 texels 
 Errors are those of the sum of all lights, against a ray to each of the same lights; what interleaving adds is told
 apart. Such rays are many, so figures that judge do so on smaller pictures than those that time.
 
-A light next to a surface is very bright there, and interleaved it is 64 times as bright at one pixel in 64. The paper's
-pictures show no such dots, and it does not say how; interleaved pictures have a least distance of `CLAMP` here.
+A light next to a surface is very bright there. The paper's pictures show no such dots, and it does not say how: the
+default clamp, by the disc that a light stands for, bounds them here, in pictures and in what they are judged against.
+Interleaved such a light is 64 times as bright at one pixel in 64, and pictures have a least distance of `CLAMP`.
 """
 
 import dataclasses
@@ -27,19 +28,18 @@ from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.maps.occluders import ends_of
 from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
 from refgi.cluster.reference import reference_visibility
-from refgi.cluster.settings import Clusters, ValSettings
+from refgi.cluster.settings import Clusters, RaysVpls, ValSettings
 from refgi.cluster.val import val
 from refgi.frame import Frame
 from refgi.lights import PixelLights
-from refgi.lights.selection import choose_lights
+from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import with_clamp
 from refgi.pairs.irradiance import Receivers
-from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, load_scene
 from refgi.scene.builtin.cornell import CAMERA, cornell_box, shell
 from refgi.scene.builtin.metaballs import HALF_SIZE, MIDDLE, Balls, blob, metaballs
 from refgi.scene.model import merge
-from refgi.settings import of
-from refgi.truth.vpl import VplSettings, vpl
+from refgi.settings import of, replaced
 from refgi.types import Array
 
 HORSE, CORNER, BOX, ATRIUM, BLOB, MARCH = "horse", "corner", "plain box", "atrium", "blob", "march"
@@ -192,7 +192,11 @@ def timed_size(bench: Workbench) -> int:
 
 def clustered(frame: Frame, settings: ValSettings, start: Clustering | None = None) -> Clustered:
     """Choose lights and group them; `start` has clusters of another frame to start from."""
-    lights = choose_lights(frame, settings.lights)
+    return grouped(frame, choose_lights(frame, settings.lights), settings, start)
+
+
+def grouped(frame: Frame, lights: PixelLights, settings: ValSettings, start: Clustering | None = None) -> Clustered:
+    """Group given lights."""
     kind = settings.clusters
     assert isinstance(kind, Clusters)
     found = cluster(lights.position, lights.normal, kind.count, distance=kind.distance,
@@ -217,27 +221,28 @@ def maps_of(frame: Frame, found: Clustered, settings: ValSettings) -> ShadowMaps
 
 
 def lit_by(frame: Frame, found: Clustered, settings: ValSettings, maps: ShadowMaps | None = None) -> Array:
-    """Return irradiance (3, h, w) of all of the given lights at every pixel, by given clusters and maps."""
-    maps = maps_of(frame, found, settings) if maps is None else maps
+    """Return irradiance (3, h, w) of all of the given lights at every pixel, by given clusters and maps.
+
+    Lights of a map are clamped as the settings say, others not.
+    """
+    of_map = found.lights.texel is not None
+    settings = with_clamp(settings) if of_map else replaced(settings, {"clamp": "none"})
+    by_rays = isinstance(settings.visibility, RaysVpls)
+    maps = None if by_rays else maps_of(frame, found, settings) if maps is None else maps
     to = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
-    by_reference = reference_visibility(frame, found.lights, found.areas, maps, settings)
     return clustered_irradiance(to, frame.gbuffer.facing, found.lights, found.areas, maps, settings,
-                                visibility_of=by_reference)
+                                footprints(frame, settings.lights, settings.pairs) if of_map else None,
+                                reference_visibility(frame, found.lights, found.areas, maps, settings),
+                                rays=frame.tracer if settings.maps.behind == "raytrace" else None)
 
 
 def shadowed(bench: Workbench, frame: Frame, settings: ValSettings) -> Array:
     """Return the same lights with a shadow ray each: what more and more area lights converge to."""
-    lights = settings.lights.count
-    return bench.once(("shadowed", frame, lights), lambda: vpl(frame, of(VplSettings, lights=lights)))
+    key = settings.lights, settings.pairs
+    return bench.once(("shadowed", frame, key), lambda: rays_to(frame, choose_lights(frame, key[0]), settings))
 
 
-def rays_to(frame: Frame, lights: PixelLights) -> Array:
-    """Return irradiance (3, h, w) in float64 of given lights with a shadow ray each; dark ones cost nothing."""
-    shines = lights.flux.any(axis=0)
-    chosen = lights._replace(position=lights.position[:, shines], normal=lights.normal[:, shines],
-                             flux=lights.flux[:, shines], lobe_flux=None, texel=None, map_index=None)
-    buffer = frame.gbuffer
-    to = receivers(frame.scene.geometry, buffer.position, buffer.normal, buffer.triangle_id, frame.tracer.grain)
-    total = np.zeros((3, frame.height, frame.width))
-    total.reshape(3, -1)[:, to.pixel] = shadowed_sum(frame.tracer, to, chosen)
-    return total
+def rays_to(frame: Frame, lights: PixelLights, settings: ValSettings) -> Array:
+    """Return irradiance (3, h, w) of given lights, clamped as by `lit_by`, with a shadow ray each."""
+    each = replaced(settings, {"visibility": "rays_vpls", "clusters.count": lights.position.shape[1]})
+    return lit_by(frame, grouped(frame, lights, each), each)

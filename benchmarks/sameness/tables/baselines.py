@@ -36,7 +36,7 @@ VPL = Table({"lights": 96}, [
     vary("bias", 0.5, maps="imperfect"),
     vary("seed", 7, maps="imperfect"),
     vary("batch", 5000, maps="imperfect", same=BATCH),
-])
+], {"as_published": "forms of the maps that `sii` has cases of"}, ("lights.source", "lights.openness"))
 
 TRUTH = Table({"samples": 24}, [
     vary("estimator", "hemisphere", "light"),

@@ -125,6 +125,9 @@ def test_a_line_runs_through_both_form_factors_and_path_tracing(figures, evidenc
     assert rows["path tracing, v = 1"]["RMSE"] == 0
     assert rows["Eq. 4, every texel"]["RMSE"] < rows["Eq. 4, 64 samples"]["RMSE"] < rows["Eq. 3, 64 samples"]["RMSE"]
     assert rows["Eq. 4, every texel"]["darker by"] > rows["Eq. 3, every texel"]["darker by"]
+    assert rows["Eq. 4, 64 samples"]["noise"] < rows["Eq. 3, 64 samples"]["noise"]
+    for equation in ("Eq. 3", "Eq. 4"):
+        assert rows[f"{equation}, 1024 samples"]["noise"] < rows[f"{equation}, 64 samples"]["noise"] / 2
     assert figure.plots[0].svg.count("<path") > 6
     evidence("Fig. 5 at 45 x 45, RMSE against path tracing of what is seen, v = 1: " + ", ".join(
         f"{name} {row['RMSE']:.0f} %" for name, row in rows.items() if name.startswith("Eq")))

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from benchmarks.papers.multires.subjects import BUILDERS
+from benchmarks.papers.multires.subjects import BUDDHA, BUILDERS, frame_of
 from tests.benchmarks.papers.conftest import table
 
 pytestmark = pytest.mark.slow  # the whole paper is made
@@ -101,6 +101,40 @@ def test_a_high_threshold_blurs_and_detail_darkens(figures):
     assert low["subsplats"] > high["subsplats"] == detail["subsplats"]
     assert low["RMSE"] < high["RMSE"]
     assert 0 < detail["darker by"] - high["darker by"] < 50
+
+
+def test_direct_light_of_figure_11_has_shadows_by_rays(figures, bench):
+    """Texels of a shadow map would be specks beside the detail that the figure is about."""
+    planes = next(one.planes for one in figures["fig11"].pictures if one.name == "low_seen")
+    seen, light = (np.stack([planes[prefix + channel] for channel in "RGB"]) for prefix in ("", "irradiance."))
+    by_rays, by_map = (frame_of(bench, BUDDHA, **how).radiance(light) for how in ({"shadows": "exact"}, {}))
+    assert np.abs(seen - by_rays).max() < 1e-5 * seen.max()
+    assert np.abs(seen - by_map).max() > 1e-2 * seen.max()
+
+
+def test_lower_thresholds_refine_more(figures):
+    """Figure 12: fewer subsplats with each higher threshold, and detail adds none."""
+    rows = {name: row[:4] for name, *row in figures["fig12"].tables[0].rows}
+    for fine, coarse in (("curvature 0.1", "curvature 0.3"), ("normals 0.2", "normals 1.5")):
+        assert all(a >= b for a, b in zip(rows[fine], rows[coarse], strict=True))
+        assert rows[fine] != rows[coarse]
+    assert rows["normals 1.5, detail"] == rows["normals 1.5"]
+    assert len(figures["fig12"].pictures) == 24
+
+
+def test_each_pass_of_upsampling_comes_nearer(figures):
+    for key, column in (("fig8", -1), ("fig1", 2)):
+        off = [row[column] for row in figures[key].tables[0].rows]
+        assert off == sorted(set(off), reverse=True)
+
+
+def test_the_fitted_threshold_stands_beside_others(figures):
+    rows = table(figures["table1"], 2)
+    assert list(rows) == ["0.02", "0.05", "0.1", "0.2"]
+    counts = [row[1] for row in figures["table1"].tables[0].rows]
+    assert rows["0.05"]["in all"] == pytest.approx(counts[-1] / counts[0])
+    grown = [row["in all"] for row in rows.values()]
+    assert grown == sorted(set(grown), reverse=True)
 
 
 @pytest.mark.feature("AMS-17")

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.papers.sii.lights import _blocks
 from benchmarks.papers.sii.subjects import BOX, reference_length
 from benchmarks.papers.workbench import Workbench, errors_of
 from refgi.frame import Frame
@@ -12,7 +13,7 @@ from refgi.lights.selection import choose_lights
 from refgi.lights.settings import LightSettings
 from refgi.scene import load_scene
 from refgi.settings import of
-from tests.benchmarks.papers.conftest import SMALL
+from tests.benchmarks.papers.conftest import SMALL, table
 
 pytestmark = pytest.mark.slow  # the whole paper is made
 
@@ -95,6 +96,48 @@ def pairs_within(frame, lights, low):
         away = x - p[:, None]
         count += np.count_nonzero(flux.max() / math.pi * (n @ away) >= low * (away**2).sum(axis=0) ** 1.5)
     return count
+
+
+def test_gathering_has_the_right_mean_and_gets_worse_with_fewer_samples(figures):
+    """Within 0.3 of the map most light is missing, however many samples; over the whole map errors are of noise."""
+    mae = {name: row["MAE to every texel"] for name, row in table(figures["fig12"]).items()}
+    assert mae["RSM, 1020 samples"] < mae["RSM, 308 samples"] < mae["RSM, 156 samples"] < 30
+    assert mae["RSM, 1020 samples within 0.3 of the map"] > 60
+
+
+def test_widening_smooths_the_ring(figures):
+    rows = table(figures["fig4"])
+    plain, wide = (row["RMSE to path tracing"] for name, row in rows.items() if name.startswith("metal ring"))
+    assert wide < plain
+
+
+def test_blocks_are_means_of_eight_by_eight():
+    image = np.arange(3 * 16 * 24.0).reshape(3, 16, 24)
+    assert _blocks(image)[1, 1, 2] == image[1, 8:, 16:].mean()
+
+
+def test_ellipses_are_those_of_the_appendix(figures):
+    """E-SII-12 and 13: c of Eq. 8, volumes 1.080, 1.240 and 1.328 times the region's, nothing outside."""
+    rows = table(figures["fig9"])
+    assert [row["centre c"] for row in rows.values()] == pytest.approx([0.438691, 0.578704, 0.604], abs=5e-4)
+    assert [row["volume"] for row in rows.values()] == pytest.approx([1.080, 1.240, 1.328], abs=5e-4)
+    for row in rows.values():
+        assert row["outside by"] < 1e-12
+        assert row["height"] == pytest.approx(row["region's height"], abs=1e-5)  # angles are 2 mrad apart
+    assert len(figures["fig10"].tables[0].rows) == 2
+
+
+def test_the_fitted_reach_stands_beside_others(figures):
+    """The row that was fitted is the figure's own, and longer rays leave more lights as bright as they were."""
+    scaled = table(figures["table3"])["scaled, full resolution"]
+    reach = table(figures["table3"], 1)
+    assert list(reach) == ["0.1", "0.25", "0.5", "1"]
+    assert reach["0.25"]["fragments, share"] == scaled["fragments, share"]
+    assert reach["0.25"]["energy lost, %"] == pytest.approx(scaled["energy lost, %"])
+    lost = [row["energy lost, %"] for row in reach.values()]
+    assert lost == sorted(set(lost), reverse=True)
+    darker = table(figures["fig13"])["scaled, full resolution"]["darker by"]
+    assert darker == pytest.approx(scaled["energy lost, %"])
 
 
 def test_a_larger_cut_loses_more(figures):

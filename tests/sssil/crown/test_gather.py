@@ -233,8 +233,30 @@ def test_error_falls_with_samples_and_the_mean_stays(pattern, evidence):
              f"samples; mean over seeds within {abs(means.mean() / exact.mean() - 1):.1e}")
 
 
-def _of_shares(level, radius):
-    """Sum every texel by the share of it that lies in the crown: what the mean of all patterns must be."""
+@pytest.mark.feature("HSS-06")
+def test_few_samples_are_darker_by_equation_4(evidence):
+    """Statistical: E-HSS-05; a sample's disc is as large as its share of the crown, so light falls with their number.
+
+    Expected is every texel once, its term s c t A / (r^2 + R^2) with R^2 = t ds / pi.
+    """
+    level, radius, darker = groove(0, 64), 8.0, []
+    whole = _of_shares(level, radius).mean()
+    for samples in (16, 64, 256):
+        settings = of(HssilSettings, radius=radius, levels=1, pattern="pixel", density="uniform", disc_share=1.0,
+                      samples=samples)
+        found = np.array([gather(level, 1, replaced(settings, {"seed": seed}))[0].mean() for seed in range(12)])
+        expected = _of_shares(level, radius, 3 * math.pi * radius**2 / samples).mean()
+        assert abs(found.mean() - expected) < 4.0 * found.std(ddof=1) / math.sqrt(12) + 1e-3 * expected
+        darker.append(found.mean() / whole)
+    assert darker[0] < darker[1] < darker[2] < 1
+    evidence("Eq. 4 in a groove with 16, 64, 256 samples: " + ", ".join(f"{one:.3f}" for one in darker) + " of Eq. 3")
+
+
+def _of_shares(level, radius, texels=0.0):
+    """Sum every texel by the share of it that lies in the crown: what the mean of all patterns must be.
+
+    `texels`: how many each sample's disc of Eq. 4 stands for; 0: Eq. 3.
+    """
     reach = math.ceil(2 * radius) + 1
     offsets = [(x, y) for x in range(-reach, reach + 1) for y in range(-reach, reach + 1)]
     share = [share_inside(x, y, radius, 2 * radius) for x, y in offsets]
@@ -249,7 +271,8 @@ def _of_shares(level, radius):
         d = position[:, a, b] - position
         square = np.maximum((d * d).sum(axis=0), 1e-30)
         c, t = np.maximum((normal * d).sum(axis=0), 0), np.maximum(-(normal[:, a, b] * d).sum(axis=0), 0)
-        total += np.where(inside, s * c * t * area[a, b] / square**2, 0) * level.radiance[0, a, b]
+        disc = texels * area[a, b] * t / (np.sqrt(square) * math.pi)  # t is not divided by the distance
+        total += np.where(inside, s * c * t * area[a, b] / (square * (square + disc)), 0) * level.radiance[0, a, b]
     return total
 
 

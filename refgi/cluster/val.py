@@ -188,10 +188,16 @@ def block_side(frame: "Frame", settings: ValSettings) -> int | None:
     Without a clamp every pixel sums all, as no sample would meet the peaks of near pairs; and in small pictures, where
     lists of subsplats cost what they save.
     """
-    few = frame.width * frame.height <= FEW_PIXELS and (
-        settings.visibility is None or isinstance(settings.visibility, BY_MAPS))
-    in_full = settings.interleaving.block is None and (few or settings.pairs.clamp is None)
-    return 1 if in_full else settings.interleaving.block
+    if settings.interleaving.block is not None:
+        return settings.interleaving.block
+    by_maps = settings.visibility is None or isinstance(settings.visibility, BY_MAPS)
+    if settings.pairs.clamp is None:
+        skip("multires.error_driven", "without a clamp every pixel sums all lights")
+    elif by_maps and frame.width * frame.height <= FEW_PIXELS:
+        skip("multires.error_driven", f"up to {FEW_PIXELS:,} pixels each sums all lights")
+    else:
+        return None
+    return 1
 
 
 def receivers_of(frame: "Frame") -> Receivers:

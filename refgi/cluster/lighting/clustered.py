@@ -170,7 +170,7 @@ def _add_by_tiles(
     """Add every area light to receivers, tile by tile."""
     lights, clamp = members.packed.diffuse, members.packed.clamp
     shining = np.flatnonzero(members.start[:, 0] < members.start[:, -1])
-    shadows = shadows_of(maps, areas, shining, settings) if kept is None else ((m, kept[m]) for m in shining)
+    shadows = shadows_of(maps, areas, shining, settings) if kept is None else ((m, kept[m]) for m in map(int, shining))
     for done, (m, shadow) in enumerate(shadows):
         start = members.start[m]
         if shadow is None:

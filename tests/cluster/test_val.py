@@ -9,11 +9,12 @@ import pytest
 from refgi.cluster import PRESETS, ValSettings, extra_bytes, val
 from refgi.cluster.lighting import shadows
 from refgi.cluster.settings import GeometryBlur
-from refgi.cluster.val import cluster_lights
+from refgi.cluster.val import cluster_lights, sum_at_pixels
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
-from refgi.lights.selection import choose_lights
+from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import with_clamp
 from refgi.method import Extent
 from refgi.methods import find_method, render
 from refgi.scene import load_scene
@@ -157,6 +158,24 @@ def test_subsplats_without_an_error_are_every_pixel_to_the_bit(how, kept, monkey
         light = val(box, small(how | {"subsplats.target": 1e-6}))
     assert log.status("multires.error_driven") == ["ran"]
     np.testing.assert_array_equal(light, val(box, small(how | {"interleaving": 1})))
+
+
+def test_a_few_pixels_are_lit_as_in_the_picture(ball):
+    """Oracle: the whole picture; these pixels fill no tile."""
+    settings = with_clamp(small({}))
+    lights, pixel = choose_lights(ball, settings.lights), np.flatnonzero(ball.gbuffer.covered)[::97]
+    at = sum_at_pixels(ball, ball.gbuffer, lights, cluster_lights(ball, lights, settings), settings,
+                       footprints(ball, settings.lights, settings.pairs))
+    np.testing.assert_array_equal(at(pixel), val(ball, settings).reshape(3, -1)[:, pixel])
+
+
+def test_subsplats_and_blocks_are_switched_off_apart():
+    off = {one.name: one.off for one in find_method("val").approximations}
+    default, blocks = ValSettings(), of(ValSettings, interleaving=4)
+    assert off["subsplats"](default, {}) == off["interleaving"](blocks, {}) == of(
+        ValSettings, interleaving=1, blur="none")
+    assert off["subsplats"](blocks, {}) == blocks
+    assert off["interleaving"](default, {}) == default
 
 
 @pytest.mark.usefixtures("any_size")

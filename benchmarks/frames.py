@@ -57,10 +57,14 @@ SUBJECTS = {
         "dragon_bunny", "multires", {}, 1024, 1024, 25, "21, GTX 280", ("sii", {"lights": 256, "pattern": "grid"})),
     "multires, flying bunnies": Subject(
         "flying_bunnies", "multires", {}, 1024, 1024, 25, "25, GTX 280", ("sii", {"lights": 256, "pattern": "grid"})),
+    "val to 5 %, horse": Subject(
+        "cornell_horse", "val", {"lights": 1024}, 800, 800, 19.7, "19.7, 8800 GTX, interleaved, blurred", EVERYWHERE),
     "val at subsplats, horse": Subject(
         "cornell_horse", "multires", VAL, 800, 800, 19.7, "19.7, 8800 GTX, interleaved and blurred", EVERYWHERE),
     "val interleaved, horse": Subject(
         "cornell_horse", "val", {"lights": 1024, "interleaving": 8}, 800, 800, 19.7, "19.7, 8800 GTX", EVERYWHERE),
+    "val to 5 %, sponza": Subject(
+        "sponza", "val", {"lights": 1024}, 800, 800, 13.4, "13.4, 8800 GTX, interleaved and blurred", EVERYWHERE),
     "val at subsplats, sponza": Subject(
         "sponza", "multires", VAL, 800, 800, 13.4, "13.4, 8800 GTX, interleaved and blurred", EVERYWHERE),
     "val interleaved, sponza": Subject(

@@ -10,6 +10,7 @@ import pytest
 from refgi import stages
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.val import cluster_lights
+from refgi.error_target.grid import top_level
 from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
@@ -21,7 +22,6 @@ from refgi.rays import Tracer
 from refgi.settings import from_text, of, replaced
 from refgi.skips import without_skip
 from refgi.splat.multires.lobes import glossy_subsplats
-from refgi.splat.multires.refinement.grid import top_level
 from refgi.splat.sii import SiiSettings
 from refgi.sssil import HssilSettings
 from refgi.sssil.crown.glossy import warped

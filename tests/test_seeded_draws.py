@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from refgi.error_target.error_driven import draw_samples
 from refgi.frame import Frame
 from refgi.lights import choose_pixel_lights
 from refgi.lights.selection import roulette
@@ -18,7 +19,6 @@ from refgi.sampling import halton, sobol_owen
 from refgi.scene import PointLight, load_scene
 from refgi.settings import of
 from refgi.splat.gather.gather_sum import disc_pattern
-from refgi.splat.multires.error_target.error_driven import draw_samples
 from refgi.splat.sii.reach.threshold import light_range
 from refgi.splat.sii.settings import SiiSettings
 from refgi.sssil import HssilSettings

@@ -47,6 +47,7 @@ CASES = {
                        for kind in ("csm", "pcss", "hard"))],
     "cluster.subsets": [(BOX, "val", "lights=64", "clusters=8", "interleaving.block=4")],
     "cluster.facing": [(BOX, "val", "lights=64", "clusters=4")],
+    "cluster.casters": [(SPHERE, "val", "lights=32", "clusters=3", f"visibility={kind}") for kind in ("pcf", "pcss")],
     "cluster.receivers": [(BOX, "val", "lights=32", "clusters=3", "visibility=rays_rectangle")],
     "sssil.levels": [(BOX, "hssil", "sampling.levels=6", "sampling.radius=9")],
     "sssil.senders": [(BOX, "hssil"), (BOX, "hssil", "sampling.pattern=fixed")],
@@ -79,6 +80,7 @@ WORK = {
     "cluster.subsets": {name: lambda tiles, *_: tiles.tiles.shape[1] for name in (
         "cluster.lighting.clustered.add_shadowed", "cluster.lighting.clustered.add_unshadowed")},
     "cluster.facing": {"cluster.lighting.clustered.gather_pixels": None},
+    "cluster.casters": {"cluster.lighting.clustered.add_shadowed": lambda *arguments: -arguments[4].casters.sum()},
     "cluster.receivers": {"cluster.reference.rays.free_share": lambda _, points, *__: points.shape[1]},
     "sssil.levels": {"sssil.hssil.gather_level": None},
     "sssil.senders": {"sssil.crown.gather._gather_shared": lambda *arguments: not arguments[6]},

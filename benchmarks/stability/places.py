@@ -11,12 +11,12 @@ import numpy as np
 from benchmarks.stability.ladder import Ladder
 from benchmarks.stability.numbers import BLOCK
 from benchmarks.stability.promise import Case, Promise
+from refgi.error_target.interpolate import blend_weights, surface_levels
 from refgi.errors import InputError
 from refgi.rsm.raster.projection import PERSPECTIVE, Projection
 from refgi.scene import Camera, Geometry, Material, Mesh, PointLight, Scene, SpotLight
 from refgi.scene.motion import near_origin
 from refgi.scene.repair import repaired
-from refgi.splat.multires.error_target.interpolate import blend_weights, surface_levels
 from refgi.splat.sii.reach.bounds import TANGENT_POINT, tangent_ellipsoid
 from refgi.sssil.reprojection import SourceView, reproject
 from refgi.types import Array

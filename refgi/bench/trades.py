@@ -110,7 +110,8 @@ TRADES: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     "sii": (("pairs below 1 % of the brightest light's irradiance", ("reach.cut=relative", "reach.cut.share=0.01")),
             ("three of four pixels where neighbours resemble each other", ("half_resolution=true",))),
     "multires": (("subsplats that a target of 1 % does not ask for", ("subsplats=error", "subsplats.target=0.01")),),
-    "val": (("63 of 64 lights at each pixel", ("interleaving.block=8",)),
+    "val": (("subsplats that a target of 10 % does not ask for", ("interleaving.block=none", "subsplats.target=0.1")),
+            ("63 of 64 lights at each pixel", ("interleaving.block=8",)),
             ("nothing: walls that nothing lies behind are drawn into maps too", ("maps.occluders_alone=false",))),
 }
 

@@ -84,7 +84,15 @@ def _every_texel(settings: ValSettings, _: Mapping[str, Any]) -> ValSettings:
     return dataclasses.replace(settings, visibility=dataclasses.replace(settings.visibility, prefilter="brute"))
 
 
-def _all_at_each_pixel(settings: ValSettings, _: Mapping[str, Any]) -> ValSettings:
+def _every_pixel(settings: ValSettings, _: Mapping[str, Any]) -> ValSettings:
+    return settings if settings.interleaving.block is not None else _all_at_each_pixel(settings)
+
+
+def _without_blocks(settings: ValSettings, _: Mapping[str, Any]) -> ValSettings:
+    return settings if settings.interleaving.block is None else _all_at_each_pixel(settings)
+
+
+def _all_at_each_pixel(settings: ValSettings) -> ValSettings:
     return dataclasses.replace(settings, interleaving=InterleavingSettings(1), blur=None)
 
 
@@ -102,7 +110,8 @@ APPROXIMATIONS = (
                   _finer_maps),
     Approximation("CSM series", "M terms and their bias for the test of depth", _tests_of_depth),
     Approximation("filter", "levels of a mip map for each texel of the region", _every_texel),
-    Approximation("interleaving", "a pixel sums one light of n x n, and the blur", _all_at_each_pixel))
+    Approximation("subsplats", "cells of many pixels are evaluated at one, to an error", _every_pixel),
+    Approximation("interleaving", "a pixel sums one light of n x n, and the blur", _without_blocks))
 
 
 @stage("cluster.ledger")

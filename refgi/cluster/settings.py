@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import ClassVar, Literal
 
+from refgi.error_target.settings import ErrorTarget
 from refgi.errors import expect
 from refgi.lights.settings import MOST_LIGHTS, LightSettings, clamped_pairs, expect_footprints
 from refgi.pairs.settings import PairSettings
@@ -177,7 +178,7 @@ class InterleavingSettings(Settings):
 
     PRINCIPAL = "block"
 
-    block: int | None = setting(None, "n; 1: all lights; none: all where that is no more than 2^30 pairs, else 8",
+    block: int | None = setting(None, "n; 1: every pixel sums all lights; none: subsplats do, to an error",
                                 least=1, most=MOST_BLOCK, unit="pixels")
     assignment: Assignment = setting("index", "lights of a pixel: every n^2-th, or runs of a cluster", study=True)
 
@@ -205,6 +206,9 @@ class GeometryBlur(Settings):
 class ValSettings(Settings):
     """What `val` can be set to; the defaults are the paper's, those of docs/methods/val where it is silent.
 
+    By default subsplats are lit until `subsplats.target` is met, in place of the paper's blocks of pixels: every pixel
+    of pictures of up to 2^16 of them, unless visibility is by rays, and without a clamp.
+
     `pairs.clamp` "auto" is the form factor of the disc that a light stands for, where lights have footprints.
     """
 
@@ -214,6 +218,7 @@ class ValSettings(Settings):
     area: AreaLightSettings = setting(AreaLightSettings(), "the rectangle of an area light")
     maps: ShadowMapSettings = setting(ShadowMapSettings(), "shadow maps")
     visibility: Visibility | None = setting(Csm(), "soft shadow of an area light; none: no shadows")
+    subsplats: ErrorTarget = setting(ErrorTarget(coarsest=32), "what is evaluated, without interleaving.block")
     interleaving: InterleavingSettings = setting(InterleavingSettings(), "interleaved sampling")
     blur: BoxBlur | GeometryBlur | None = setting(GeometryBlur(), "what joins interleaved pixels")
     as_published: frozenset[str] = setting(frozenset(), "forms to use as printed", study=True)
@@ -264,8 +269,8 @@ class ClusteredShadows(Settings):
 
     def of_lights(self, lights: LightSettings, pairs: PairSettings) -> ValSettings:
         """Return the settings of `val` that sum some lights under these shadows, every light at every receiver."""
-        return ValSettings(lights, pairs, self.clusters, self.area, self.maps, self.shadow, InterleavingSettings(1),
-                           None, self.as_published)
+        return ValSettings(lights, pairs, self.clusters, self.area, self.maps, self.shadow,
+                           interleaving=InterleavingSettings(1), blur=None, as_published=self.as_published)
 
 
 # Sec. 5.1, 6 and 7: d in metres and radians, basis of 8 and 16 bits, blocks of 8 x 8 pixels, angles as printed

@@ -1,6 +1,9 @@
 """Real-time Indirect Illumination with Clustered Visibility (Dong, Grosch, Ritschel, Kautz and Seidel 2009)."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from refgi.cluster.adaptive import MOST_TEXELS, count_for_error, group_lights
 from refgi.cluster.clustering.rectangle import AreaLights
@@ -8,15 +11,19 @@ from refgi.cluster.filters.pyramid import EIGHT
 from refgi.cluster.lighting.blur import blur
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.lighting.glossy import clustered_radiance
+from refgi.cluster.lighting.shadows import MOST_KEPT, Shadows, kept_shadows
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference import reference_visibility
-from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters, Clusters, Csm, ValSettings
+from refgi.cluster.settings import BY_MAPS, WITHOUT_MAPS, AdaptiveClusters, Clusters, Csm, ValSettings
+from refgi.error_target.error_driven import error_driven
+from refgi.error_target.near import shadowed_by_clusters
 from refgi.jit import thread_count
 from refgi.lights.selection import choose_lights, footprints, light_areas
 from refgi.lights.settings import most_lights, with_clamp
 from refgi.method import Extent
 from refgi.pairs.estimates import report_sampling, warn_of_clamp
 from refgi.pairs.irradiance import Receivers
+from refgi.pairs.tiles import taken
 from refgi.rsm import facing_normals
 from refgi.rsm.buffers.leaving import GlossyPoints, spread_over_picture
 from refgi.stages import skip
@@ -25,9 +32,9 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.lights import PixelLights
+    from refgi.rsm import GBuffer
 
-PAIRS_IN_FULL = 1 << 30  # about a quarter of a second on two cores
-PUBLISHED_BLOCK = 8  # pixels
+FEW_PIXELS = 1 << 16
 LISTED_FLOATS = 24  # of a pixel, where receivers are gathered by lists: measured, and a fifth more
 
 
@@ -49,7 +56,10 @@ def val(frame: "Frame", settings: ValSettings) -> Array:
     settings = with_clamp(settings)
     lights = choose_lights(frame, settings.lights)  # Sec. 6, VPL generation
     areas, maps = cluster_lights(frame, lights, settings)
-    block = block_side(frame, lights, settings)
+    block = block_side(frame, settings)
+    if block is None:
+        skip("cluster.blur", "subsplats sum all lights")
+        return light_subsplats(frame, lights, areas, maps, settings)
     light = light_pixels(frame, lights, areas, maps, settings, block)  # Sec. 4 and 6
     if block == 1 or settings.blur is None:
         skip("cluster.blur", "every pixel sums all lights" if block == 1 else "off in the settings")
@@ -105,13 +115,52 @@ def light_pixels(
 
     `block` is the side of the blocks of pixels that share the lights out among themselves.
     """
-    footprint = footprints(frame, settings.lights, settings.pairs)
-    warn_of_clamp(receivers_of(frame), lights, settings.pairs, footprint, "val")
-    report_sampling(frame, receivers_of(frame), lights, settings.pairs, footprint, "val")
+    footprint = reported_footprints(frame, lights, settings)
     return clustered_irradiance(
         receivers_of(frame), frame.gbuffer.facing, lights, areas, maps, settings, footprint=footprint,
         visibility_of=reference_visibility(frame, lights, areas, maps, settings), interleaving=block,
         rays=frame.tracer if settings.maps.behind == "raytrace" else None)
+
+
+def light_subsplats(
+    frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: ShadowMaps | None, settings: ValSettings
+) -> Array:
+    """Light subsplats by pixel lights that are clustered already, until the error is met: (3, h, w), W/m^2."""
+    footprint = reported_footprints(frame, lights, settings)
+    at = sum_at_pixels(frame, frame.gbuffer, lights, (areas, maps), settings, footprint,
+                       kept_shadows(areas, maps, settings))
+    return error_driven(frame.gbuffer, lights, settings.subsplats, settings.pairs, footprint, settings.lights.seed,
+                        shadowed=shadowed_by_clusters(at)).irradiance
+
+
+def reported_footprints(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> Array | None:
+    """Return the surface that each light stands for, (N,) m^2, once clamp and sampling are reported."""
+    footprint = footprints(frame, settings.lights, settings.pairs)
+    warn_of_clamp(receivers_of(frame), lights, settings.pairs, footprint, "val")
+    report_sampling(frame, receivers_of(frame), lights, settings.pairs, footprint, "val")
+    return footprint
+
+
+def sum_at_pixels(
+    frame: "Frame", buffer: "GBuffer", lights: "PixelLights", clustered: tuple[AreaLights, ShadowMaps | None],
+    settings: ValSettings, footprint: Array | None, kept: Shadows | None = None,
+) -> Callable[[Array], Array]:
+    """Return a function from covered pixels (n flat indices) to the irradiance of all lights there, (3, n), W/m^2.
+
+    `buffer` is what sees the pixels, `clustered` of `cluster_lights`, `kept` of `kept_shadows`.
+    """
+    areas, maps = clustered
+    reference = reference_visibility(frame, lights, areas, maps, settings)
+    position, normal, triangle_id = buffer.resolve("position", "normal", "triangle_id")
+
+    def at(pixel: Array) -> Array:
+        points, normals = taken(position, pixel)[:, None], taken(normal, pixel)[:, None]
+        facing = facing_normals(frame.scene.geometry, triangle_id.reshape(-1)[None, pixel], normals)
+        return clustered_irradiance(
+            Receivers(points, normals, np.ones(points.shape[1:], np.bool_)), facing, lights, areas, maps, settings,
+            footprint, reference, rays=frame.tracer if settings.maps.behind == "raytrace" else None, kept=kept)[:, 0]
+
+    return at
 
 
 def cluster_lights(
@@ -133,11 +182,22 @@ def _areas_of_single(frame: "Frame", settings: ValSettings) -> Array | None:
     return None if settings.area.single_light == "point" else light_areas(frame, settings.lights)
 
 
-def block_side(frame: "Frame", lights: "PixelLights", settings: ValSettings) -> int:
-    """Return the side of the blocks of pixels that share the lights out among themselves; 1: each sums all."""
+def block_side(frame: "Frame", settings: ValSettings) -> int | None:
+    """Return the side of the blocks of pixels that share the lights out; 1: each sums all; None: subsplats do.
+
+    Without a clamp every pixel sums all, as no sample would meet the peaks of near pairs; and in small pictures, where
+    lists of subsplats cost what they save.
+    """
     if settings.interleaving.block is not None:
         return settings.interleaving.block
-    return 1 if frame.width * frame.height * lights.flux.shape[1] <= PAIRS_IN_FULL else PUBLISHED_BLOCK
+    by_maps = settings.visibility is None or isinstance(settings.visibility, BY_MAPS)
+    if settings.pairs.clamp is None:
+        skip("multires.error_driven", "without a clamp every pixel sums all lights")
+    elif by_maps and frame.width * frame.height <= FEW_PIXELS:
+        skip("multires.error_driven", f"up to {FEW_PIXELS:,} pixels each sums all lights")
+    else:
+        return None
+    return 1
 
 
 def receivers_of(frame: "Frame") -> Receivers:
@@ -153,7 +213,8 @@ def extra_bytes(settings: ValSettings, extent: Extent) -> int:
     depth = 2 * count * sides * texels * float_bytes  # twice: maps on which there is nothing are dropped by a copy
     filtered = 0
     if isinstance(settings.visibility, Csm):
-        at_once = min(count, thread_count() + 1)  # one of them is read from
+        keeps = settings.interleaving.block is None and count * texels <= MOST_KEPT
+        at_once = count if keeps else min(count, thread_count() + 1)  # one of them is read from
         filtered = at_once * texels * _filtered_bytes(settings.visibility, float_bytes)
     return depth + filtered + size[0] * size[1] * LISTED_FLOATS * float_bytes
 

@@ -1,17 +1,20 @@
 """The method as a whole: its limits, odd pictures and scenes, sameness, bad settings."""
 
 import dataclasses
+import sys
 
 import numpy as np
 import pytest
 
 from refgi.cluster import PRESETS, ValSettings, extra_bytes, val
+from refgi.cluster.lighting import shadows
 from refgi.cluster.settings import GeometryBlur
-from refgi.cluster.val import cluster_lights
+from refgi.cluster.val import cluster_lights, sum_at_pixels
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
-from refgi.lights.selection import choose_lights
+from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import with_clamp
 from refgi.method import Extent
 from refgi.methods import find_method, render
 from refgi.scene import load_scene
@@ -133,6 +136,67 @@ def test_more_area_lights_than_lights_are_hard_shadows_of_each(ball):
     np.testing.assert_array_equal(each, hard)
 
 
+@pytest.fixture
+def any_size(monkeypatch):
+    """Let subsplats light small pictures as well."""
+    monkeypatch.setattr(sys.modules["refgi.cluster.val"], "FEW_PIXELS", 0)
+
+
+EACH_KIND = ({}, {"visibility": "pcss"}, {"visibility": "pcf", "clusters_count": 64}, {"visibility": "none"},
+             {"prefilter": "brute"}, {"visibility": "rays_rectangle"}, {"behind": "dual_paraboloid"})
+
+
+@pytest.mark.usefixtures("any_size")
+@pytest.mark.parametrize("kept", [True, False])
+@pytest.mark.parametrize("how", EACH_KIND, ids=str)
+def test_subsplats_without_an_error_are_every_pixel_to_the_bit(how, kept, monkeypatch):
+    """Oracle: every light at every pixel in one pass; lists read kept shadows, or filter maps anew."""
+    if not kept:
+        monkeypatch.setattr(shadows, "MOST_KEPT", 0)
+    box = frame(width=80, height=60)
+    with observe() as log:
+        light = val(box, small(how | {"subsplats.target": 1e-6}))
+    assert log.status("multires.error_driven") == ["ran"]
+    np.testing.assert_array_equal(light, val(box, small(how | {"interleaving": 1})))
+
+
+def test_a_few_pixels_are_lit_as_in_the_picture(ball):
+    """Oracle: the whole picture; these pixels fill no tile."""
+    settings = with_clamp(small({}))
+    lights, pixel = choose_lights(ball, settings.lights), np.flatnonzero(ball.gbuffer.covered)[::97]
+    at = sum_at_pixels(ball, ball.gbuffer, lights, cluster_lights(ball, lights, settings), settings,
+                       footprints(ball, settings.lights, settings.pairs))
+    np.testing.assert_array_equal(at(pixel), val(ball, settings).reshape(3, -1)[:, pixel])
+
+
+def test_subsplats_and_blocks_are_switched_off_apart():
+    off = {one.name: one.off for one in find_method("val").approximations}
+    default, blocks = ValSettings(), of(ValSettings, interleaving=4)
+    assert off["subsplats"](default, {}) == off["interleaving"](blocks, {}) == of(
+        ValSettings, interleaving=1, blur="none")
+    assert off["subsplats"](blocks, {}) == blocks
+    assert off["interleaving"](default, {}) == default
+
+
+@pytest.mark.usefixtures("any_size")
+def test_threads_change_no_bit_of_subsplats():
+    pictures = []
+    for count in (1, 2):
+        with threads(count):
+            pictures.append(val(frame("cornell_box", 112, 84), small({"subsplats.target": 0.1})))
+    np.testing.assert_array_equal(*pictures)
+
+
+@pytest.mark.parametrize(("width", "how", "status"), [
+    (256, {}, ["skipped"]), (257, {}, ["ran"]), (257, {"clamp": "none"}, ["skipped"]),
+    (257, {"visibility": "none"}, ["ran"]), (257, {"interleaving": 2}, []), (80, {"visibility": "rays_vpls"}, ["ran"])])
+def test_what_is_lit_at_subsplats(width, how, status):
+    """Larger pictures with a clamp, and any by rays, unless every pixel or blocks are asked for."""
+    with observe() as log:
+        val(frame(width=width, height=256 if width > 80 else 60, rsm_resolution=16), small(how | {"lights": 16}))
+    assert log.status("multires.error_driven") == status
+
+
 def test_what_is_not_needed_does_not_run(ball):
     """Full sums are not blurred, visibility by rays draws no maps, an empty convex room neither."""
     with observe() as log:
@@ -153,7 +217,8 @@ IN = {"target_error": {"clusters": "adaptive"}, "cone": {"visibility": "pcss"}, 
     ("terms", 0), ("terms", 65), ("maps_resolution", 0), ("rounds", 0),
     ("distance", "euclid"), ("visibility", "soft"), ("prefilter", "gauss"), ("bias", -0.1), ("bias", float("nan")),
     ("position_weight", -1), ("normal_weight", float("inf")), ("attenuation", -1), ("interleaving_block", 0),
-    ("interleaving_block", 65), ("blur_extent", -1), ("blur_cosine", 2), ("target_error", 0),
+    ("interleaving_block", 65), ("subsplats_target", 0), ("subsplats_coarsest", 0),
+    ("blur_extent", -1), ("blur_cosine", 2), ("target_error", 0),
     ("target_error", float("nan")),
     ("position_weight", "much"), ("bias", "some"), ("cone", None), ("occluders_alone", "no"), ("near_distance", -1),
     ("as_published", {"val_beta"}), ("assignment", "cards"), ("texels", 4), ("texels", 0),
@@ -192,15 +257,20 @@ def test_what_is_ignored_near_a_cluster_follows_the_kind_of_shadow(ball):
 
 
 def test_memory_of_maps_is_counted():
-    """Closed form: depths twice; where they are filtered, basis, basis-z, means and depth of as many as are at once."""
+    """Closed form: depths twice; where they are filtered, basis, basis-z, means and depth of as many as are at once.
+
+    Filters of all are kept for lists of subsplats.
+    """
     def counted(**how):
         with threads(1):  # one map is filtered while another one is read from
-            return extra_bytes(of(ValSettings, lights=64, clusters=6, maps=32, **how), Extent((1, 1)))
+            return extra_bytes(of(ValSettings, **{"lights": 64, "clusters": 6, "maps": 32, "interleaving": 1} | how),
+                               Extent((1, 1)))
 
     hard = counted(visibility="hard")
     assert hard == pytest.approx(2 * 6 * 32**2 * 4, rel=0.01)
     assert counted(visibility="csm", terms=4, prefilter="brute") - hard == 2 * 32**2 * (4 * 4 + 2) * 4
     assert counted(visibility="csm", terms=4) - hard == 2 * 32**2 * (1 + (2 * 8 + 3) // 3) * 4  # levels above alone
+    assert counted(visibility="csm", interleaving=None) - hard == 6 * 32**2 * (1 + (2 * 8 + 3) // 3) * 4
     assert counted(visibility="none") < hard
 
 

@@ -315,7 +315,7 @@ def test_lightcuts_are_part_of_an_error(monkeypatch):
     keys = {"subsplats": "error", "subsplats.target": 0.05, "subsplats.coarsest": 16}
     covered = frame.gbuffer.covered
     full = multires(frame, cut(**{"subsplats.coarsest": 65536}))[:, covered]
-    monkeypatch.setattr(sys.modules["refgi.splat.multires.error_target.error_driven"], "MANY", 1000)
+    monkeypatch.setattr(sys.modules["refgi.error_target.error_driven"], "MANY", 1000)
     auto = Case({}).settings(MultiresSettings, {"lights.count": 3000, **keys})
     with observe() as log:
         picture = multires(frame, auto)[:, covered]

@@ -1,12 +1,16 @@
 """Every setting of `val`: the picture is that of the loops, and heeding the setting shows."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.lights.settings import LightSettings
+from refgi.stages import observe
 from tests.literal.whole import val as clustered
+from tests.literal.whole.multires import coarsest_level
 from tests.literal.whole.pairs import with_clamp
 from tests.wiring.cases import Case, needed, uncovered, under
 from tests.wiring.features import VAL, featured
@@ -39,13 +43,28 @@ CASES = {
     "a blur around corners": few({"blur.cosine": -1.0}, BLOCKS | {"blur.extent": 0.4}),
 }
 
+# pictures of so many pixels that not all are samples of the error
+WIDE = {"width": 112, "height": 84}
+SUBSPLATS = {"interleaving": None, "visibility": "pcf", "clusters.count": 4}
+PROMISES = {
+    "subsplats": Case({"subsplats.target": 0.02}, SUBSPLATS, frame=WIDE),
+    "coarser subsplats": Case({"subsplats.coarsest": 7}, SUBSPLATS, frame=WIDE),
+    "subsplats, another seed": Case({"lights.seed": 2}, SUBSPLATS | {"subsplats.target": 0.02}, frame=WIDE),
+}
+
 FOLDED = fold(ValSettings, CASES, BASE, elsewhere=("pairs.",))
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # what a clamp takes
 
 
 def test_every_field_has_a_case():
-    assert not uncovered(ValSettings, CASES, BASE) - set(needed(LightSettings))  # those: test_lights, test_shared
+    elsewhere = set(needed(LightSettings))  # test_lights, test_shared
+    assert not uncovered(ValSettings, CASES | PROMISES, BASE) - elsewhere
+
+
+@pytest.fixture(autouse=True)
+def subsplats_in_small_pictures(monkeypatch):
+    monkeypatch.setattr(sys.modules["refgi.cluster.val"], "FEW_PIXELS", 0)
 
 
 @pytest.fixture(scope="module", params=CASES)
@@ -64,6 +83,31 @@ def test_the_literal_text(name, evidence):
     off = np.abs(val(frame, settings) - expected).max() / expected.max()
     evidence(f"{case.parts}: off by {off:.0e} of the brightest pixel")
     assert off < tolerance(settings)
+
+
+@pytest.mark.parametrize("name", PROMISES)
+def test_the_promise(name, evidence):
+    """Oracle: the RMSE to the literal text is within the target, and pixels evaluated one by one are that text's."""
+    frame, settings = PROMISES[name].seen(), PROMISES[name].settings(ValSettings, BASE)
+    full, covered = clustered.picture(frame, with_clamp(settings)), frame.gbuffer.covered
+    with observe(record=True) as log:
+        off = val(frame, settings) - full
+    found = next(run.output for run in log.runs if run.name == "multires.error_driven")
+    error = np.sqrt((off[:, covered] ** 2).mean()) / full[:, covered].mean()
+    evidence(f"{name}: {error:.2%} off every light at every pixel, {found.pairs / found.full_pairs:.0%} of the pairs")
+    assert error <= settings.subsplats.target
+    assert len(found.split) - 1 == coarsest_level(covered.shape, settings.subsplats.coarsest)
+    finest = np.kron(found.split[1], np.ones((2, 2), bool))[:84, :112] & covered
+    assert 0 < finest.sum() < covered.sum()
+    assert np.abs(off[:, finest]).max() <= ROUNDING * full.max()
+
+
+@pytest.mark.parametrize("name", PROMISES)
+def test_each_key_of_subsplats_counts(name):
+    frame = PROMISES[name].seen()
+    picture = val(frame, PROMISES[name].settings(ValSettings, BASE))
+    for _, settings in PROMISES[name].without(ValSettings, BASE):
+        assert np.abs(picture - val(frame, settings)).max() > COUNTS * picture.max()
 
 
 def tolerance(settings):

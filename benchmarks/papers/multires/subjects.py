@@ -19,6 +19,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from benchmarks.papers.workbench import Subjects, Workbench, seen_by, whole_frame
+from refgi.error_target.grid import Subsplats
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import Receivers, irradiance
@@ -31,7 +32,6 @@ from refgi.scene.model import Camera, Material, Mesh, SpotLight, merge
 from refgi.scene.repair import mean_face_normals
 from refgi.settings import of, replaced
 from refgi.splat.multires import ByGeometry, ByIrradiance, MultiresSettings, multires, shared_subsplats
-from refgi.splat.multires.refinement.grid import Subsplats
 from refgi.types import Array
 
 TEAPOT, BUDDHA, DRAGON, BUNNIES = "simple", "carved", "serpent", "flock"

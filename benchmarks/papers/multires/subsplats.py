@@ -23,12 +23,12 @@ from benchmarks.papers.multires.subjects import (
 from benchmarks.papers.records import Cell, Figure, Picture, Table
 from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of
 from refgi.compare.pictures import Scale
+from refgi.error_target.grid import Subsplats, level_picture
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.settings import replaced
 from refgi.splat.multires import ByGeometry, ByIrradiance, Criteria, MultiresSettings, multires
 from refgi.splat.multires.light_lists.per_light import per_light_counts
-from refgi.splat.multires.refinement.grid import Subsplats, level_picture
 from refgi.splat.multires.settings import Criterion, Upsampling
 from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample

@@ -27,6 +27,7 @@ from numba.np import arrayobj as untyped_arrayobj
 
 from refgi.cluster.filters.basis import beyond_disc, eight_bits, half_precision, sine_cosine, turned
 from refgi.jit import kernel
+from refgi.rsm.pool import zeros
 from refgi.types import Array
 
 cgutils: Any = untyped_cgutils
@@ -215,8 +216,8 @@ def mips(
     """
     first, total = level_offsets(size)
     shape, width = (count, total + SLACK), -(-2 * terms // EIGHT) * EIGHT
-    return Mip(np.zeros((count, size, size), dtype), np.zeros((*shape, width), dtype), np.zeros((*shape, width), dtype),
-               np.zeros(shape, dtype), first, terms, shift, quantised, beyond_disc(size, mirrored))
+    return Mip(zeros((count, size, size), dtype), zeros((*shape, width), dtype), zeros((*shape, width), dtype),
+               zeros(shape, dtype), first, terms, shift, quantised, beyond_disc(size, mirrored))
 
 
 @kernel

@@ -75,11 +75,12 @@ def add_unshadowed(
     `lights` (9, N + 1) are packed and sorted, the last one black; `start` (subsets + 1,) has the first light of each
     subset, and one past its last. Adds to `irradiance`, (3, n), W/m^2.
     """
-    for task in prange(TASKS):
+    tasks = min(TASKS, receivers.tiles.shape[1])
+    for task in prange(tasks):
         real = receivers.position.dtype
         tile, visible = np.zeros((ROWS, TILE), real), np.ones(TILE, real)
         reach, chosen = np.empty(GROUP, np.bool_), np.empty(GROUP + 1, np.int64)
-        for t in range(np.int64(task), receivers.tiles.shape[1], TASKS):
+        for t in range(np.int64(task), receivers.tiles.shape[1], tasks):
             if _light_tile(receivers, t, lights, clamp, start, tile, reach, chosen):
                 _add(tile, receivers.tiles, t, visible, irradiance)
 
@@ -93,7 +94,8 @@ def add_shadowed(
 
     `shadow` is one of `visibility.shadow`, and `channels` says how many of a filtered map it reads.
     """
-    for task in prange(TASKS):
+    tasks = min(TASKS, receivers.tiles.shape[1])
+    for task in prange(tasks):
         real = receivers.position.dtype
         tile, visible, some = np.zeros((ROWS, TILE), real), np.empty(TILE, real), np.empty(TILE, real)
         reach, chosen = np.empty(GROUP, np.bool_), np.empty(GROUP + 1, np.int64)
@@ -101,7 +103,7 @@ def add_shadowed(
         points, facing = np.empty((3, TILE), real), np.empty((3, TILE), real)
         scratch = Scratch(np.empty(TILE, np.bool_), np.empty((SCRATCH_ROWS, TILE), real),
                           np.empty((channels, TILE), real))
-        for t in range(np.int64(task), receivers.tiles.shape[1], TASKS):
+        for t in range(np.int64(task), receivers.tiles.shape[1], tasks):
             if not _light_tile(receivers, t, lights, clamp, start, tile, reach, chosen):
                 continue
             first, size = receivers.tiles[FIRST, t], receivers.tiles[SIZE, t]

@@ -5,14 +5,12 @@ then V where there is any. Diffuse lights under one map go tile by tile in one k
 visibility that is found in Python (by rays, back projection, from behind), go by lists of receivers, to the same bits.
 """
 
-from collections.abc import Iterator
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
-from refgi.cluster.filters.prefilter import allocate_mips, build_several
 from refgi.cluster.lighting.area_sum import (
     ReceiverTiles,
     add_shadowed,
@@ -31,11 +29,10 @@ from refgi.cluster.lighting.interleave import (
     scatter_pixels,
     subsets,
 )
+from refgi.cluster.lighting.shadows import Shadows, shadows_of
 from refgi.cluster.settings import BY_MAPS, Csm
-from refgi.cluster.visibility.search_region import scale_of, series
-from refgi.cluster.visibility.shadow import filter_channels, shadow_of, visibility
+from refgi.cluster.visibility.shadow import filter_channels, visibility
 from refgi.errors import expect
-from refgi.jit import thread_count
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.pairs.tiles import clear, receiving
 from refgi.skips import left_out
@@ -61,7 +58,7 @@ def _steps(*args: Any, **kwargs: Any) -> Array:
 def clustered_irradiance(
     receivers: Receivers, facing: Array, lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps | None",
     settings: "ValSettings", footprint: Array | None = None, visibility_of: VisibilityFunction | None = None,
-    interleaving: int = 1, rays: "Tracer | None" = None,
+    interleaving: int = 1, rays: "Tracer | None" = None, kept: Shadows | None = None,
 ) -> Array:
     """Sum the irradiance of every pixel light under the visibility of its area light.
 
@@ -74,6 +71,7 @@ def clustered_irradiance(
         parameter `shading` is given the receivers' normals as well where they are not the faces'.
     interleaving: n: each pixel of n x n sums its own lights, n^2 times; 1: all.
     rays: The scene's triangles, for points behind an area light; needed for ``behind == "raytrace"`` alone.
+    kept: The shadows of all area lights, where they are kept for other receivers (`kept_shadows`).
     -> (3, h, w): Irradiance, W/m^2, linear RGB; 0 where there is no surface. Excludes the receiver's albedo/pi.
 
     Raises
@@ -105,7 +103,7 @@ def clustered_irradiance(
     if members.packed.spheres is None and members.packed.lobes is None:
         _cull(tiles, members)
     if by_tiles:
-        _add_by_tiles(tiles, members, areas, maps, settings, sums)
+        _add_by_tiles(tiles, members, areas, maps, settings, kept, sums)
     else:
         visible_from = visibility_by(areas, maps, settings, visibility_of, rays)
         _add_by_lists(tiles, parts, members, visible_from, asks_shading(visible_from, receivers.normal, facing), sums)
@@ -167,48 +165,19 @@ def _with_lights(tiles: ReceiverTiles, start: Array) -> ReceiverTiles:
 
 def _add_by_tiles(
     tiles: ReceiverTiles, members: MemberLights, areas: AreaLights, maps: "ShadowMaps | None", settings: "ValSettings",
-    sums: Array,
+    kept: Shadows | None, sums: Array,
 ) -> None:
     """Add every area light to receivers, tile by tile."""
     lights, clamp = members.packed.diffuse, members.packed.clamp
     shining = np.flatnonzero(members.start[:, 0] < members.start[:, -1])
-    for done, (m, shadow) in enumerate(_shadows(maps, areas, shining, settings)):
+    shadows = shadows_of(maps, areas, shining, settings) if kept is None else ((m, kept[m]) for m in map(int, shining))
+    for done, (m, shadow) in enumerate(shadows):
         start = members.start[m]
         if shadow is None:
             add_unshadowed(_with_lights(tiles, start), lights, clamp, start, sums)
         else:
             add_shadowed(_with_lights(tiles, start), lights, clamp, start, shadow, filter_channels(shadow), sums)
         report_progress((done + 1) / len(shining))
-
-
-def _shadows(
-    maps: "ShadowMaps | None", areas: AreaLights, shining: Array, settings: "ValSettings"
-) -> Iterator[tuple[int, Any]]:
-    """Return some area lights with their shadows; None for those that nothing occludes."""
-    map_of = np.full(len(areas.delta), -1) if maps is None or settings.visibility is None else maps.map_of
-    filtered = (map_of >= 0) & (areas.delta != 0) & isinstance(settings.visibility, Csm)
-    filters = _filters(maps, map_of[shining[filtered[shining]]], settings)
-    for m in shining:
-        if maps is None or map_of[m] < 0:
-            yield m, None
-        else:
-            yield m, shadow_of(maps, areas, m, settings, filters=next(filters) if filtered[m] else None)
-
-
-def _filters(maps: "ShadowMaps | None", chosen: Array, settings: "ValSettings") -> Iterator[Any]:
-    """Filter some maps in their order, one for each thread at a time: all at once would leave the cache."""
-    if maps is None or len(chosen) == 0:
-        return
-    csm, box = settings.visibility, "val_alpha_over_pi" in settings.as_published
-    assert isinstance(csm, Csm)
-    workers, depth = thread_count(), maps.depth
-    scratch = None
-    if csm.prefilter == "mip":
-        scratch = allocate_mips(min(workers, len(chosen)), depth.shape[1], depth.dtype, csm)
-    for first in range(0, len(chosen), workers):  # what was filtered before is no longer in use
-        some = chosen[first : first + workers]
-        scales = [scale_of(maps, k, csm.depth_scale, series(csm)) for k in some]
-        yield from build_several(depth[some], scales, csm, box, scratch)
 
 
 def _add_by_lists(

@@ -15,6 +15,7 @@ from refgi.cluster.lighting.interleave import (
     scatter_pixels,
     subsets,
 )
+from refgi.cluster.lighting.shadows import Shadows
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference.back_projection import back_projection
 from refgi.cluster.settings import Assignment, BackProjection, Csm, Hard, Pcf, Pcss, ValSettings
@@ -124,7 +125,7 @@ def _shadow_maps(maps: Mapping[str, Array]) -> ShadowMaps:
 def irradiance_steps(
     receivers: Receivers, facing: Array, lights: PixelLights, areas: AreaLights, maps: ShadowMaps | None,
     settings: ValSettings, footprint: Array | None = None, visibility_of: VisibilityFunction | None = None,
-    interleaving: int = 1, rays: "Tracer | None" = None,
+    interleaving: int = 1, rays: "Tracer | None" = None, kept: Shadows | None = None,  # noqa: ARG001
 ) -> Array:
     """Return the irradiance of all area lights, made by steps."""
     subset = subset_of_lights(areas.of, interleaving, settings.interleaving.assignment) if interleaving > 1 else None

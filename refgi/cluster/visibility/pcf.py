@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
+from refgi.cluster.visibility.casters import casters_of, least_depth
 from refgi.jit import kernel
 from refgi.types import Array
 
@@ -113,13 +114,15 @@ class PcfShadow(NamedTuple):
     center: Array  # (3,) float64, m
     frame: Array  # (3, 3) float64: rows right, down, forward
     reach: Any  # texels on each side of the receiver's own; 0: the hard test
+    casters: Array  # of `casters_of`; not read by the hard test
 
 
 def pcf_shadow(maps: ShadowMaps, k: int, texels: int, behind: bool = False) -> PcfShadow:
     """Return map k, ahead or behind, with a kernel of texels x texels (odd)."""
     depth, frame = (maps.behind, BACKWARD @ maps.frame[k]) if behind else (maps.depth, maps.frame[k])
     assert depth is not None
-    return PcfShadow(depth[k], maps.center[k], frame, np.int64(texels // 2))
+    casters = casters_of(depth[k]) if texels > 1 else depth[k]
+    return PcfShadow(depth[k], maps.center[k], frame, np.int64(texels // 2), casters)
 
 
 @kernel
@@ -150,6 +153,9 @@ def pcf_tile(
         scale = one / (distance + z)
         column = min(int((x * scale + one) * half * side), n - 1)
         row = min(int((y * scale + one) * half * side), n - 1)
+        if reach > 0 and least_depth(
+                shadow.casters, column - reach, column + reach, row - reach, row + reach) >= distance:
+            continue
         nx, ny, nz = facing[0, i], facing[1, i], facing[2, i]
         # along right, down, forward
         a, b, c = rx * nx + ry * ny + rz * nz, dx * nx + dy * ny + dz * nz, fx * nx + fy * ny + fz * nz

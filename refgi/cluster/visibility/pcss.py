@@ -15,6 +15,7 @@ import numpy as np
 
 from refgi.cluster.filters.basis import DepthScale
 from refgi.cluster.settings import Pcss
+from refgi.cluster.visibility.casters import least_depth
 from refgi.cluster.visibility.pcf import SLACK, cone_tangent, disc, published_square, published_tangent
 from refgi.cluster.visibility.search_region import (
     DEPTH,
@@ -54,6 +55,7 @@ class PcssShadow(NamedTuple):
     sizing: FilterSizing
     test: BlockerTest
     depth: Array  # (n, n) m; inf where the map is empty
+    casters: Array  # of `casters_of`
 
 
 def blocker_test(settings: Pcss, scale: DepthScale) -> BlockerTest:
@@ -99,6 +101,9 @@ def find_blockers(shadow: PcssShadow, facing: Array, size: int, pending: Array, 
     for i in range(size):
         if not pending[i]:
             continue
+        if not _may_be_blocked(shadow.casters, len(shadow.depth), rows[S, i], rows[T, i], rows[RADIUS, i]):
+            pending[i] = False
+            continue
         x, y, z, d, extent = rows[X, i], rows[Y, i], rows[Z, i], rows[D, i], rows[EXTENT, i]
         _, blocked, total = count_blockers(
             shadow.depth, shadow.test, (rows[S, i], rows[T, i], rows[RADIUS, i]), (x, y, z, d),
@@ -113,6 +118,15 @@ def find_blockers(shadow: PcssShadow, facing: Array, size: int, pending: Array, 
         tangent = published_tangent(extent, d, mean) if sizing.alpha else cone_tangent(extent, d, mean)
         where = published_square(x, y, z, d, tangent) if sizing.alpha_over_pi else disc(x, y, z, d, tangent)
         rows[S, i], rows[T, i], rows[RADIUS, i] = where
+
+
+@kernel
+def _may_be_blocked(casters: Array, n: int, cs: Any, ct: Any, radius: Any) -> bool:
+    """Return whether the texels that `count_blockers` looks at may hold anything."""
+    first, last = _texels(cs, radius, n)
+    top, bottom = _texels(ct, radius, n)
+    column, row = _nearest(cs, n), _nearest(ct, n)
+    return bool(least_depth(casters, min(first, column), max(last, column), min(top, row), max(bottom, row)) < np.inf)
 
 
 @kernel

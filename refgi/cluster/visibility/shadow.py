@@ -9,6 +9,7 @@ from refgi.cluster.filters.prefilter import build_filters
 from refgi.cluster.maps.shadow_maps import ShadowMaps
 from refgi.cluster.reference.rays import Ball, free_share, rectangle_points
 from refgi.cluster.settings import BY_MAPS, ConstantBias, Csm, Hard, Pcf, Pcss, ValSettings
+from refgi.cluster.visibility.casters import casters_of
 from refgi.cluster.visibility.csm import CsmShadow, csm_tile
 from refgi.cluster.visibility.pcf import PcfShadow, pcf_shadow, pcf_tile
 from refgi.cluster.visibility.pcss import PcssShadow, blocker_test, pcss_tile
@@ -49,7 +50,8 @@ def shadow_of(
     if isinstance(kind, Pcss):
         bias = kind.constant_bias or ConstantBias()
         scale = scale_of(maps, k, bias.scale, series(Csm(bias=bias.value)), behind)
-        return PcssShadow(light_constants(maps, k, delta, None, behind), sizing, blocker_test(kind, scale), depth[k])
+        return PcssShadow(light_constants(maps, k, delta, None, behind), sizing, blocker_test(kind, scale), depth[k],
+                          casters_of(depth[k]))
     assert isinstance(kind, Csm)
     chain = series(kind)
     scale = scale_of(maps, k, kind.depth_scale, chain, behind)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from refgi.cluster.maps.shadow_maps import ShadowMaps
+from refgi.cluster.visibility.casters import casters_of
 from refgi.cluster.visibility.pcf import pcf_shadow, pcf_tile
 from refgi.cluster.visibility.pcss import BlockerTest, PcssShadow, filter_texels, find_blockers
 from refgi.cluster.visibility.search_region import (
@@ -146,7 +147,8 @@ def pcss_penumbra(
         flags, rows = lane.scratch.pending, lane.scratch.rows
         flags[:] = pending[lane.k].reshape(-1)
         rows[S : RADIUS + 1] = region[lane.k].reshape(3, -1)
-        shadow = PcssShadow(lane.constants, sizing, BlockerTest(True, cone, 1.0, 0.0), depth[lane.k])
+        shadow = PcssShadow(lane.constants, sizing, BlockerTest(True, cone, 1.0, 0.0), depth[lane.k],
+                            casters_of(depth[lane.k]))
         find_blockers(shadow, normals, lane.pixels, flags, rows)
         put_penumbra(lane, shaded, z_avg, final)
     return shaded, z_avg, final
@@ -176,7 +178,8 @@ def pcss(
     for lane in lanes(places, sizing):
         flags, rows = shaded[lane.k].reshape(-1), lane.scratch.rows
         rows[S : RADIUS + 1] = region[lane.k].reshape(3, -1)
-        shadow = PcssShadow(lane.constants, sizing, BlockerTest(True, False, 1.0, 0.0), depth[lane.k])
+        shadow = PcssShadow(lane.constants, sizing, BlockerTest(True, False, 1.0, 0.0), depth[lane.k],
+                            casters_of(depth[lane.k]))
         filter_texels(shadow, normals, lane.pixels, flags, lane.visible, rows)
         made[lane.k].reshape(-1)[flags] = lane.visible[flags]
     return made

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from refgi.cluster.settings import ClusteredShadows
+from refgi.error_target.settings import MOST_CELLS
 from refgi.ledger import Ledger, account
 from refgi.lights.selection import choose_lights
 from refgi.lights.settings import (
@@ -20,7 +21,7 @@ from refgi.method import Approximation
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
 from refgi.splat.multires.multires import light_areas, multires
-from refgi.splat.multires.settings import MOST_CELLS, ByError, ByGeometry, MultiresSettings, Rays
+from refgi.splat.multires.settings import ByError, ByGeometry, MultiresSettings, Rays
 from refgi.stages import stage
 
 if TYPE_CHECKING:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from refgi.cluster.val import cluster_lights, glossy_under
+from refgi.error_target.grid import Subsplats, top_level
 from refgi.lights.selection import choose_lights
 from refgi.pairs.glossy import glossy_radiance, shadowed_radiance
 from refgi.pairs.shadow_rays import receivers
@@ -18,7 +19,6 @@ from refgi.rsm.buffers.leaving import GlossyPoints, glossy_points, spread_over_p
 from refgi.splat.multires.light_lists.per_light import covered_by, per_light_lobes
 from refgi.splat.multires.multires import doubled, halved, light_areas
 from refgi.splat.multires.refinement.criteria import discontinuities
-from refgi.splat.multires.refinement.grid import Subsplats, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.settings import ByError, ByGeometry, ByIrradiance, MultiresSettings
 from refgi.splat.multires.subsplats.upsample import upsample

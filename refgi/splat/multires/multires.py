@@ -5,6 +5,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from refgi.cluster.val import extra_bytes as bytes_of_shadows
+from refgi.error_target.error_driven import MANY, clusters, error_driven
+from refgi.error_target.grid import Subsplats, top_level
+from refgi.error_target.near import PixelSum, shadowed_by_clusters
 from refgi.jit import most_threads
 from refgi.lights.ambient_occlusion import occluded
 from refgi.lights.footprints import demo_footprints
@@ -14,11 +17,8 @@ from refgi.method import Extent
 from refgi.pairs.estimates import report_sampling, thinned, warn_of_clamp
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.lightcuts.tree import tree_bytes
-from refgi.splat.multires.error_target.error_driven import MANY, clusters, error_driven
-from refgi.splat.multires.error_target.near import PixelSum, shadowed_by_clusters, shadowed_by_rays
 from refgi.splat.multires.light_lists.per_light import per_light
 from refgi.splat.multires.refinement.criteria import discontinuities
-from refgi.splat.multires.refinement.grid import Subsplats, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.settings import ByError, ByGeometry, ByIrradiance, MultiresSettings
 from refgi.splat.multires.subsplats.detail import surface_detail
@@ -29,6 +29,7 @@ from refgi.splat.multires.subsplats.evaluate import (
     representative_points,
     shadowed_at,
 )
+from refgi.splat.multires.subsplats.near_rays import shadowed_by_rays
 from refgi.splat.multires.subsplats.upsample import upsample
 from refgi.stages import stage
 from refgi.types import Array
@@ -103,7 +104,7 @@ def _shadowed(
     if settings.shadow_rays is not None:
         return shadowed_by_rays(frame.tracer, frame.scene.geometry, buffer, lights)
     if settings.shadows is not None:
-        return shadowed_by_clusters(shadowed_at(frame, buffer, lights, settings.shadows, footprint))
+        return shadowed_by_clusters(shadowed_at(frame, buffer, lights, settings.shadows, footprint, lists=True))
     return None
 
 

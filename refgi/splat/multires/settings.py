@@ -8,6 +8,7 @@ import math
 from typing import ClassVar, Literal
 
 from refgi.cluster.settings import ClusteredShadows, ValSettings
+from refgi.error_target.settings import LEAST_TARGET, MOST_CELLS, ErrorTarget
 from refgi.errors import expect
 from refgi.lights.settings import OCCLUSION, LightSettings, MapLights, Openness, clamped_pairs, expect_footprints
 from refgi.pairs.settings import AutoClamp, AutoLightcuts, DiscClamp, Lightcuts, PairSettings, SphereClamp
@@ -20,8 +21,6 @@ Representative = Literal["pixel", "mean"]
 Upsampling = Literal["tent", "demo", "nearest", "naive_bilinear"]
 Measure = Literal["relative", "absolute", "demo"]
 
-LEAST_TARGET = 1e-6  # about what rounding to float32 leaves of the full sum
-MOST_CELLS = 65536  # along the longer side
 FINEST = 16  # level
 SEEN = "which lights subsplats see: all, by shadow rays (the pairs of vpl), or by soft shadows of clusters"
 
@@ -169,15 +168,13 @@ class ByIrradiance(Settings):
 
 
 @dataclasses.dataclass(frozen=True)
-class ByError(Settings):
+class ByError(ErrorTarget):
     """Subsplats refined until the picture is as near to the full sum as asked for; beyond the paper."""
 
     NAME = "error"
-    PRINCIPAL = "target"
 
     target: float = setting(0.05, "RMSE to the full sum over its mean; saves pairs, and time from about 1000 lights on "
                                   "or, on most scenes, with shadow rays", least=LEAST_TARGET)
-    coarsest: int = setting(16, "cells of the coarsest level along the longer side", least=1, most=MOST_CELLS)
     visibility: Rays | ClusteredShadows | None = setting(None, SEEN)
 
 

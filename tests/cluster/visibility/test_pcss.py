@@ -7,6 +7,7 @@ import pytest
 
 from refgi.cluster.filters.basis import DepthScale
 from refgi.cluster.settings import ConstantBias, ValSettings
+from refgi.cluster.visibility.casters import casters_of
 from refgi.cluster.visibility.pcss import PcssShadow, blocker_test, compare_texels
 from refgi.cluster.visibility.search_region import (
     DEPTH,
@@ -77,7 +78,8 @@ def test_mean_depth_is_that_of_the_blockers(evidence):
     constants, (_, scratch, _, pending, visible) = light_constants(maps, 0, 0.3), scratch_arrays(25, 1)
     chosen, test = filter_sizing(settings), blocker_test(settings.visibility, METRES)
     count = find_search_regions(constants, chosen, points, 25, np.ones(25, np.bool_), pending, visible, scratch)
-    compare_texels(PcssShadow(constants, chosen, test, depth), normals, 25, pending, visible, scratch)
+    shadow = PcssShadow(constants, chosen, test, depth, casters_of(depth))
+    compare_texels(shadow, normals, 25, pending, visible, scratch)
     v, z_avg = literal_shadow(settings, at_origin(depth, 2.0), 0.3, points, normals)
     found = np.flatnonzero(z_avg)
     assert count == 25
@@ -138,7 +140,8 @@ def test_blockers_near_the_light_escape_the_published_search(evidence):
         find_search_regions(constants, filter_sizing(settings), point, 1, np.ones(1, np.bool_), pending, visible,
                             scratch)
         covers[name] = 0.2 * np.tan(2 * np.arctan(scratch[RADIUS, 0]))
-        pcss = PcssShadow(constants, filter_sizing(settings), blocker_test(settings.visibility, METRES), maps.depth[0])
+        pcss = PcssShadow(constants, filter_sizing(settings), blocker_test(settings.visibility, METRES), maps.depth[0],
+                          casters_of(maps.depth[0]))
         compare_texels(pcss, normal, 1, pending, visible, scratch)
         found[name] = bool(scratch[DEPTH, 0] > 0)
     assert covers["published"] == pytest.approx(0.025, abs=1e-6)

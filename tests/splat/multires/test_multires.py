@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster import ValSettings, extra_bytes
+from refgi.error_target.grid import representatives
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
@@ -19,7 +20,6 @@ from refgi.settings import changed, leaves, of, replaced
 from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
 from refgi.splat.multires import ByError
 from refgi.splat.multires.multires import halved, light_areas
-from refgi.splat.multires.refinement.grid import representatives
 from refgi.splat.multires.settings import PRESETS
 from refgi.stages import observe
 from tests.splat.multires.choices import only

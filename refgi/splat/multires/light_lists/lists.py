@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from refgi.error_target.grid import Subsplats, level_shape, representatives
 from refgi.jit import kernel, prange
 from refgi.pairs.glossy_sum import ReceiverLobes
 from refgi.pairs.pair_sum import SUM, TILE, Clamp
 from refgi.pairs.pixel_lights import Widening
 from refgi.splat.multires.light_lists.one_light import TILE_ROWS, SingleLights, add_light, load_cells, weigh_by_lobes
-from refgi.splat.multires.refinement.grid import Subsplats, level_shape, representatives
 from refgi.types import Array
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from refgi.error_target.grid import Subsplats, top_level
 from refgi.jit import kernel, prange, thread_count, threads
 from refgi.pairs.glossy import glossy_radiance
 from refgi.pairs.glossy_sum import receiver_lobes_of
@@ -28,7 +29,6 @@ from refgi.splat.multires.light_lists.lists import (
     subsplats_of_leaves,
 )
 from refgi.splat.multires.light_lists.one_light import single_lights
-from refgi.splat.multires.refinement.grid import Subsplats, top_level
 from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from refgi.splat.multires.subsplats.upsample import upsample
 from refgi.stages import report_progress, stage, tally

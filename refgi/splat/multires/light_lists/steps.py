@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from refgi.error_target.grid import Subsplats, representatives, top_level
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import PairSettings
 from refgi.splat.multires.light_lists.lists import (
@@ -19,7 +20,6 @@ from refgi.splat.multires.light_lists.lists import (
     keep_split,
 )
 from refgi.splat.multires.light_lists.per_light import threshold_of
-from refgi.splat.multires.refinement.grid import Subsplats, representatives, top_level
 from refgi.splat.multires.refinement.steps import subsplats_of
 from refgi.splat.multires.settings import Representative, Upsampling
 from refgi.splat.multires.subsplats.evaluate import points_of, sum_at

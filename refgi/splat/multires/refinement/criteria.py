@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from refgi.jit import kernel, prange
-from refgi.splat.multires.refinement.derivatives import curvatures, depth_slopes
-from refgi.splat.multires.refinement.grid import (
+from refgi.error_target.grid import (
     COLUMNS,
     ROWS,
     START,
@@ -25,6 +23,8 @@ from refgi.splat.multires.refinement.grid import (
     level_views,
     rows_of,
 )
+from refgi.jit import kernel, prange
+from refgi.splat.multires.refinement.derivatives import curvatures, depth_slopes
 from refgi.stages import stage
 from refgi.types import Array
 

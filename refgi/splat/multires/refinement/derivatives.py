@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from refgi.jit import kernel, prange
-from refgi.splat.multires.refinement.grid import (
+from refgi.error_target.grid import (
     COLUMNS,
     ROWS,
     Mipmap,
@@ -22,6 +21,7 @@ from refgi.splat.multires.refinement.grid import (
     level_views,
     rows_of,
 )
+from refgi.jit import kernel, prange
 from refgi.stages import stage
 from refgi.types import Array
 

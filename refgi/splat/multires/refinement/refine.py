@@ -19,8 +19,7 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 
-from refgi.jit import kernel, prange
-from refgi.splat.multires.refinement.grid import (
+from refgi.error_target.grid import (
     COLUMNS,
     ROWS,
     START,
@@ -30,6 +29,7 @@ from refgi.splat.multires.refinement.grid import (
     level_views,
     representative,
 )
+from refgi.jit import kernel, prange
 from refgi.splat.multires.settings import Diagonal, Traversal
 from refgi.stages import stage
 from refgi.types import Array

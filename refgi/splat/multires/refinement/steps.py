@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from refgi.error_target.grid import START, Subsplats, element_count, layout, level_shape, level_views
 from refgi.splat.multires.refinement.criteria import (
     depth_ranges,
     mark_curvatures,
@@ -13,7 +14,6 @@ from refgi.splat.multires.refinement.criteria import (
     normal_ranges,
 )
 from refgi.splat.multires.refinement.derivatives import curvatures, depth_slopes
-from refgi.splat.multires.refinement.grid import START, Subsplats, element_count, layout, level_shape, level_views
 from refgi.splat.multires.refinement.refine import CellStates, classify_cells, depth_first, pass_by_pass
 from refgi.splat.multires.settings import Chord, DepthRange, DepthSlope, Diagonal, Measure, NormalRange, Traversal
 from refgi.stages import stage

@@ -10,18 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from refgi.cluster.lighting.clustered import clustered_irradiance
-from refgi.cluster.reference import reference_visibility
-from refgi.cluster.val import cluster_lights
+from refgi.cluster.lighting.shadows import kept_shadows
+from refgi.cluster.val import cluster_lights, sum_at_pixels
+from refgi.error_target.grid import Subsplats
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import PAIRS_AT_ONCE, Receivers, add_lights, checked
 from refgi.pairs.pair_sum import TILE
 from refgi.pairs.settings import Lightcuts, PairSettings
 from refgi.pairs.shadow_rays import RayReceivers, receivers, shadowed_sum
 from refgi.pairs.tiles import taken
-from refgi.rsm import facing_normals
 from refgi.scene import Geometry
-from refgi.splat.multires.refinement.grid import Subsplats
 from refgi.splat.multires.settings import Representative
 from refgi.stages import report_progress, stage
 from refgi.types import Array
@@ -189,21 +187,13 @@ def evaluate_shadowed(
 
 
 def shadowed_at(
-    frame: "Frame", buffer: "GBuffer", lights: "PixelLights", settings: "ValSettings", footprint: Array | None = None
+    frame: "Frame", buffer: "GBuffer", lights: "PixelLights", settings: "ValSettings",
+    footprint: Array | None = None, lists: bool = False,
 ) -> Callable[[Array], Array]:
     """Return a function from covered pixels (n flat indices) to what `evaluate_shadowed` gives them, (3, n), W/m^2.
 
-    Lights are clustered, and maps drawn, once.
+    Lights are clustered, and maps drawn, once; for `lists` of pixels, many of them, maps are filtered once as well.
     """
-    areas, maps = cluster_lights(frame, lights, settings)
-    reference = reference_visibility(frame, lights, areas, maps, settings)
-    position, normal, triangle_id = buffer.resolve("position", "normal", "triangle_id")
-
-    def at(pixel: Array) -> Array:
-        points, normals = taken(position, pixel)[:, None], taken(normal, pixel)[:, None]
-        facing = facing_normals(frame.scene.geometry, triangle_id.reshape(-1)[None, pixel], normals)
-        return clustered_irradiance(
-            Receivers(points, normals, np.ones(points.shape[1:], np.bool_)), facing, lights, areas, maps, settings,
-            footprint, reference, rays=frame.tracer if settings.maps.behind == "raytrace" else None)[:, 0]
-
-    return at
+    clustered = cluster_lights(frame, lights, settings)
+    kept = kept_shadows(*clustered, settings) if lists else None
+    return sum_at_pixels(frame, buffer, lights, clustered, settings, footprint, kept)

@@ -11,6 +11,7 @@ import numpy as np
 from refgi.cluster.lighting.clustered import clustered_irradiance
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.val import cluster_lights
+from refgi.error_target.grid import Subsplats
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.shadow_rays import RayReceivers, add_unoccluded, fill_shadow_rays, receivers, senders_of
@@ -18,7 +19,6 @@ from refgi.pairs.tiles import taken
 from refgi.rays import Tracer
 from refgi.rsm import facing_normals
 from refgi.scene import Geometry
-from refgi.splat.multires.refinement.grid import Subsplats
 from refgi.splat.multires.subsplats.steps import arrays_of, points
 from refgi.stages import stage
 from refgi.types import Array

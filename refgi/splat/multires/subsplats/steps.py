@@ -5,9 +5,9 @@
 
 from typing import TYPE_CHECKING, Any
 
+from refgi.error_target.grid import Subsplats
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import PairSettings
-from refgi.splat.multires.refinement.grid import Subsplats
 from refgi.splat.multires.refinement.steps import subsplats_of
 from refgi.splat.multires.settings import Representative, Upsampling
 from refgi.splat.multires.subsplats.evaluate import points_of, sum_at

@@ -9,10 +9,10 @@ from typing import Any, get_args
 
 import numpy as np
 
+from refgi.error_target.grid import Subsplats, level_shape
 from refgi.errors import expect
 from refgi.jit import kernel, prange, threads
 from refgi.rsm.pool import plane
-from refgi.splat.multires.refinement.grid import Subsplats, level_shape
 from refgi.splat.multires.settings import Upsampling
 from refgi.splat.multires.subsplats.tent import demo_pass, tent_pass
 from refgi.stages import stage

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from refgi.error_target.grid import level_shape, top_level
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights import choose_pixel_lights
@@ -15,7 +16,6 @@ from refgi.splat import Receivers, irradiance
 from refgi.splat.multires.light_lists import per_light as module
 from refgi.splat.multires.light_lists.per_light import per_light, per_light_counts
 from refgi.splat.multires.refinement.criteria import discontinuities
-from refgi.splat.multires.refinement.grid import level_shape, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.settings import Criteria
 from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points

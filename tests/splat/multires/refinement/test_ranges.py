@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from refgi.error_target.grid import level_shape, top_level
 from refgi.jit import threads
 from refgi.literal import multires as literal
 from refgi.settings import of
 from refgi.splat.multires.refinement.criteria import depth_ranges, discontinuities, normal_ranges
 from refgi.splat.multires.refinement.derivatives import curvatures, depth_slopes
-from refgi.splat.multires.refinement.grid import level_shape, top_level
 from refgi.splat.multires.settings import MultiresSettings
 from tests.pairs.sets import random_directions, unit
 from tests.splat.multires.choices import only

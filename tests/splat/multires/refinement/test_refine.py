@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from refgi import Frame, load_scene
+from refgi.error_target.grid import level_picture, level_shape, top_level
 from refgi.jit import threads
 from refgi.literal import multires as literal
 from refgi.settings import of
 from refgi.splat.multires.refinement.criteria import depth_ranges, discontinuities
-from refgi.splat.multires.refinement.grid import level_picture, level_shape, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.settings import Criteria, MultiresSettings
 from tests.splat.multires.choices import only

@@ -4,12 +4,12 @@
 import numpy as np
 import pytest
 
+from refgi.error_target.grid import Subsplats, level_shape, representatives
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights.selection import choose_lights, footprints
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
-from refgi.splat.multires.refinement.grid import Subsplats, level_shape, representatives
 from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
 from tests.splat.multires.choices import unclamped
 

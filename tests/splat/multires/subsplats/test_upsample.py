@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from refgi.error_target.grid import level_shape, top_level
 from refgi.errors import InputError
 from refgi.jit import threads
 from refgi.literal import multires_upsample as literal
-from refgi.splat.multires.refinement.grid import level_shape, top_level
 from refgi.splat.multires.refinement.refine import refine
 from refgi.splat.multires.subsplats.upsample import upsample
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from refgi.cluster import ValSettings, val
+from refgi.error_target.grid import Subsplats, level_shape, representatives
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.scene import load_scene
 from refgi.settings import of
-from refgi.splat.multires.refinement.grid import Subsplats, level_shape, representatives
 from refgi.splat.multires.settings import MultiresSettings
 from refgi.splat.multires.subsplats.evaluate import evaluate_shadowed, evaluate_visible
 from refgi.truth import VplSettings, vpl

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from refgi.error_target.grid import level_shape, representatives, top_level
 from refgi.literal import multires as literal
-from refgi.splat.multires.refinement.grid import level_shape, representatives, top_level
 
 SIZES = [(1, 1), (1, 9), (13, 1), (8, 8), (21, 34)]
 

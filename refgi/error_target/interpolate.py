@@ -24,9 +24,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from refgi.error_target.grid import level_shape, representative
 from refgi.jit import kernel, prange, threads
 from refgi.rsm.pool import plane
-from refgi.splat.multires.refinement.grid import level_shape, representative
 from refgi.stages import stage
 from refgi.types import Array
 

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from refgi.error_target.interpolate import SurfaceLevel, blend_weights, tent_of
+from refgi.error_target.near import SIDE, NearLight, near_irradiance_at
 from refgi.jit import kernel, prange, threads
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.tiles import put, taken
 from refgi.rsm.pool import plane
-from refgi.splat.multires.error_target.interpolate import SurfaceLevel, blend_weights, tent_of
-from refgi.splat.multires.error_target.near import SIDE, NearLight, near_irradiance_at
 from refgi.stages import stage
 from refgi.types import Array
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster import ValSettings, val
+from refgi.error_target.near import SIDE, shadowed_by_clusters
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights.selection import choose_lights
@@ -15,7 +16,7 @@ from refgi.pairs.shadow_rays import receivers, shadowed_sum
 from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.splat.multires import MultiresSettings, multires
-from refgi.splat.multires.error_target.near import SIDE, shadowed_by_clusters, shadowed_by_rays
+from refgi.splat.multires.subsplats.near_rays import shadowed_by_rays
 from refgi.stages import observe
 from refgi.truth import VplSettings, vpl
 

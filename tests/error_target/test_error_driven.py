@@ -6,6 +6,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from refgi.error_target import near as sum_module
+from refgi.error_target import trial
+from refgi.error_target.error_driven import draw_samples, error_driven, estimate_error, estimate_mean
+from refgi.error_target.interpolate import blend_weights, surface_levels
+from refgi.error_target.near import near_light
+from refgi.error_target.trial import fill_coarsest, fill_level, fill_picture
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
@@ -14,12 +20,7 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import checked
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
-from refgi.splat.multires.error_target import near as sum_module
-from refgi.splat.multires.error_target import trial
-from refgi.splat.multires.error_target.error_driven import draw_samples, error_driven, estimate_error, estimate_mean
-from refgi.splat.multires.error_target.interpolate import blend_weights, surface_levels
-from refgi.splat.multires.error_target.near import near_light
-from refgi.splat.multires.error_target.trial import fill_coarsest, fill_level, fill_picture
+from refgi.splat.multires.refinement.refine import refine
 from refgi.stages import observe
 from tests.splat.multires.choices import by_error, unclamped
 
@@ -41,6 +42,10 @@ def full_sum(frame, settings):
 
 def driven(buffer, lights, settings, area):
     return error_driven(buffer, lights, settings.subsplats, settings.effective_pairs, area, settings.lights.seed)
+
+
+def leaves(found):
+    return refine(found.split, found.covered, "off")
 
 
 class Blank(NamedTuple):
@@ -107,13 +112,13 @@ def test_subsplats_are_the_pictures(box):
     lights, area, full = full_sum(box, settings)
     found = driven(box.gbuffer, lights, settings, area)
     times = sum(np.kron(leaf, np.ones((1 << level, 1 << level)))[:90, :120]
-                for level, leaf in enumerate(found.subsplats.leaf))
+                for level, leaf in enumerate(leaves(found).leaf))
     assert (times[box.gbuffer.covered] == 1).all()
-    pixels = found.subsplats.leaf[0]
+    pixels = leaves(found).leaf[0]
     assert pixels.any()
     np.testing.assert_array_equal(found.irradiance[:, pixels], full[:, pixels])
     finer = driven(box.gbuffer, lights, by_error(0.02, lights=64), area)
-    assert len(finer.subsplats.level) > len(found.subsplats.level)
+    assert len(leaves(finer).level) > len(leaves(found).level)
     assert finer.pairs > found.pairs
 
 
@@ -123,7 +128,7 @@ def test_no_error_at_all_is_the_full_sum_to_the_bit(box):
     found = driven(box.gbuffer, lights, settings, area)
     np.testing.assert_array_equal(found.irradiance, full)
     assert found.error == found.high == 0
-    assert found.subsplats.counts[1:].sum() == 0
+    assert leaves(found).counts[1:].sum() == 0
 
 
 def test_threads_change_no_bit(box):
@@ -155,7 +160,7 @@ def test_nothing_to_see_and_no_light(box):
     buffer = Blank(np.zeros((3, 20, 30), np.float32), np.zeros((3, 20, 30), np.float32), np.zeros((20, 30), bool))
     empty = driven(buffer, lights, settings, area)
     assert (empty.irradiance == 0).all()
-    assert empty.error == empty.pairs == len(empty.subsplats.level) == 0
+    assert empty.error == empty.pairs == len(leaves(empty).level) == 0
 
 
 def test_a_target_is_needed():

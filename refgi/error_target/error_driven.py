@@ -17,23 +17,22 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from refgi.error_target.grid import top_level
+from refgi.error_target.interpolate import surface_levels
+from refgi.error_target.near import PixelSum, unshadowed
+from refgi.error_target.trial import ExactIrradiance, Trials
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers, checked
 from refgi.pairs.settings import AutoLightcuts, Lightcuts
 from refgi.sampling import ERROR_SAMPLES, draws
-from refgi.splat.multires.error_target.interpolate import surface_levels
-from refgi.splat.multires.error_target.near import PixelSum, unshadowed
-from refgi.splat.multires.error_target.trial import ExactIrradiance, Trials
-from refgi.splat.multires.refinement.grid import Subsplats, top_level
-from refgi.splat.multires.refinement.refine import refine
 from refgi.stages import skip, stage, tally
 from refgi.types import Array
 
 if TYPE_CHECKING:
+    from refgi.error_target.settings import ErrorTarget
     from refgi.lights import PixelLights
     from refgi.pairs.settings import PairSettings
     from refgi.rsm import GBuffer
-    from refgi.splat.multires.settings import ByError
 
 DEVIATIONS = 3.0  # standard errors between the estimate and either bound
 RULE_OF_THREE = 3.0  # samples: what no one of n draws met has, at 95 %, a share below 3 / n
@@ -142,15 +141,10 @@ class ErrorDriven(NamedTuple):
     pairs: int  # of light and point: all trials, samples and near lights included
     full_pairs: int  # of the full sum
 
-    @property
-    def subsplats(self) -> Subsplats:
-        """The leaves, listed when asked for."""
-        return refine(self.split, self.covered, "off")
-
 
 @stage("multires.error_driven")
 def error_driven(
-    buffer: "GBuffer", lights: "PixelLights", settings: "ByError", pairs: "PairSettings",
+    buffer: "GBuffer", lights: "PixelLights", settings: "ErrorTarget", pairs: "PairSettings",
     footprint: Array | None = None, seed: int = 0, lightcuts: AutoLightcuts | Lightcuts | None = None,
     shadowed: PixelSum | None = None,
 ) -> ErrorDriven:

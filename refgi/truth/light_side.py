@@ -80,7 +80,7 @@ def _find(sums: Array, count: int, step: int, i: int, target: Any) -> int:
     j = 0
     while step > 0:
         k = min(j + step, count - 1)
-        j += (k - j) * np.int64(sums[k * TILE + i] <= target)
+        j += (k - j) * int(sums[k * TILE + i] <= target)
         step >>= 1
     return j
 

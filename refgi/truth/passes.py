@@ -117,7 +117,7 @@ def _hemisphere(task: Task, words: Array, sums: Array) -> None:
         add_directions(task, task.settings.directions_per_pass, words, sums)
     for group in task.groups:
         found = np.zeros((3, len(group.chosen)))
-        add_directions(task._replace(receivers=group.receivers), group.count, words, found)
+        add_directions(task._replace(receivers=group.receivers), group.directions, words, found)
         sums[:, group.chosen] += found
 
 

@@ -26,7 +26,7 @@ SOFT = 8.0  # exponent up to which directions of the hemisphere do as well as th
 class Group(NamedTuple):
     """Receivers that have as many directions each."""
 
-    count: int
+    directions: int
     chosen: Array  # (g,) int64: which of the task's receivers
     receivers: RayReceivers
 

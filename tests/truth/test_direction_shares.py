@@ -37,7 +37,7 @@ def counts_of(task):
     """Return the directions of each receiver; 0 where it is in no group or in two."""
     counts, groups = np.zeros((2, len(task.receivers.pixel)), np.int64)
     for group in task.groups:
-        counts[group.chosen] = group.count
+        counts[group.chosen] = group.directions
         groups[group.chosen] += 1
     return np.where(groups == 1, counts, 0)
 

@@ -25,8 +25,8 @@ from refgi.types import Array
 CHUNK = 1024  # rays that one parallel iteration owns
 BYTES = ir.IntType(8).as_pointer()
 # words of Embree's RTCFilterFunctionNArguments
-VALID, USER, CONTEXT, RAY, HIT = range(5)
-PRIMITIVE = 5  # word of 4 bytes in a hit: which triangle
+VALID, USER, CONTEXT, RAY, HIT, COUNT = range(6)
+PRIMITIVE = 5  # row of a packet's hits: which triangle
 
 
 class RayHoles(NamedTuple):
@@ -107,11 +107,12 @@ _pointer: Any = intrinsic(_pointer_of)
 
 @kernel
 def _reject(address: int) -> None:
-    """Refuse the hit that Embree asks for where it lies in a hole."""
-    words = carray(_pointer(address), 5, np.int64)
+    """Refuse each hit that Embree asks for, one of each of a packet's rays, where it lies in a hole."""
+    words = carray(_pointer(address), 6, np.int64)
     record = carray(_pointer(words[USER]), 14, np.int64)
-    ray = carray(_pointer(words[RAY]), 7, np.float32)
-    triangle = carray(_pointer(words[HIT]), 6, np.int32)[PRIMITIVE]
+    lanes = words[COUNT] & 0xFFFFFFFF
+    ray, hit = carray(_pointer(words[RAY]), 7 * lanes, np.float32), carray(_pointer(words[HIT]), 6 * lanes, np.int32)
+    valid = carray(_pointer(words[VALID]), lanes, np.int32)
     table = AlphaTable(carray(_pointer(record[8]), record[9], np.float32),
                        carray(_pointer(record[10]), (record[11], 6), np.int64),
                        carray(_pointer(record[12]), (record[13], 2), np.float64))
@@ -120,10 +121,12 @@ def _reject(address: int) -> None:
                      carray(_pointer(record[2]), (record[3], 9), np.float64),
                      carray(_pointer(record[4]), (record[5], 6), np.float64),
                      carray(_pointer(record[6]), record[7], np.int64), table)
-    there = is_there(holes, numbers[triangle], np.float64(ray[0]), np.float64(ray[1]), np.float64(ray[2]),
-                     np.float64(ray[4]), np.float64(ray[5]), np.float64(ray[6]))
-    if not there:
-        carray(_pointer(words[VALID]), 1, np.int32)[0] = 0
+    for k in range(lanes):
+        if valid[k] and not is_there(
+                holes, numbers[hit[PRIMITIVE * lanes + k]], np.float64(ray[k]), np.float64(ray[lanes + k]),
+                np.float64(ray[2 * lanes + k]), np.float64(ray[4 * lanes + k]), np.float64(ray[5 * lanes + k]),
+                np.float64(ray[6 * lanes + k])):
+            valid[k] = 0
 
 
 def _entry_of(_: Any, function: Any) -> Any:

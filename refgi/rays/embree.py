@@ -1,7 +1,7 @@
 """Two backends of Embree: its C functions called by address, and embreex's own `run`.
 
 The wheel of embreex carries Embree's shared library. Called by address, its functions cost nothing beyond the
-traversal: kernels keep one ray on the stack, no arrays are allocated, and a mesh is shared with Embree as it lies in
+traversal: kernels keep sixteen rays at hand, no arrays are allocated, and a mesh is shared with Embree as it lies in
 memory (embreex copies it vertex by vertex in Python, 0.1 s per 100k triangles). `run` needs nothing but embreex
 itself. Both take the same float32 triangles in the same order with the robust flag, hence give the same answers.
 
@@ -78,7 +78,7 @@ class AddressBackend:
         self._filter = None if cut is None else Filter(cut.holes, cut.numbers)
         meshes = [_Mesh(self._buffers[1], whole), _Mesh(self._buffers[2], len(faces) - whole, self._filter)]
         device, scene = _build(library, self._buffers[0], len(vertices), [mesh for mesh in meshes if mesh.size])
-        self.calls = Calls(_address(library.rtcIntersect1), _address(library.rtcOccluded1), np.uint64(scene),
+        self.calls = Calls(_address(library.rtcIntersect16), _address(library.rtcOccluded16), np.uint64(scene),
                            whole if whole < len(faces) else 0)
         weakref.finalize(self, _release, library, device, scene)
 
@@ -291,8 +291,8 @@ def _declared(library: ctypes.CDLL) -> ctypes.CDLL:
         ("rtcCommitScene", None, [pointer]),
         ("rtcReleaseScene", None, [pointer]),
         ("rtcReleaseDevice", None, [pointer]),
-        ("rtcIntersect1", None, [pointer, pointer, pointer]),
-        ("rtcOccluded1", None, [pointer, pointer, pointer]),
+        ("rtcIntersect16", None, [pointer, pointer, pointer, pointer]),
+        ("rtcOccluded16", None, [pointer, pointer, pointer, pointer]),
     ):
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments

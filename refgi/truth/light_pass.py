@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from refgi.pairs.shadow_rays import RayReceivers
+from refgi.rsm.pool import plane
 from refgi.truth.camera_visibility import visible_vertices
 from refgi.truth.light_grid import Density, cell_centres, density_of, footprint, rays_through, stratified_sets
 from refgi.truth.light_side import pick, tiles
@@ -74,7 +75,7 @@ def pick_points(task: Task, sets: PointSets, span: tuple[int, int], picks: int, 
     `span`: first receiver and one past the last. `picks`: picks of each receiver. `seed`: random shift of each
     receiver's picks. Result: shadow rays, not traced, and which point each goes to.
     """
-    rays, picked = shadow_batch((span[1] - span[0]) * picks), np.empty((span[1] - span[0]) * picks, np.int32)
+    rays, picked = shadow_batch((span[1] - span[0]) * picks), plane(((span[1] - span[0]) * picks,), np.int32)
     written = (rays.origin, rays.direction, rays.reach, rays.contribution, picked)
     sampling = (span[0], picks, seed, np.float32(task.tracer.grain), task.sides.hide)
     if task.lobes is None:

@@ -2,10 +2,10 @@
 
 The picture's pixels alternate between several sets of light vertices, so that what one set misses does not show in all
 of them; receivers of one set make up tiles. For receiver x and sender i the unshadowed term is p_i min(q_i <n_x.w> /
-r^2, b_i), with the sender's pattern q. A receiver sums the terms in blocks of 32 and parts of 8, places its picks
-evenly over the total with one random shift (systematic sampling), finds the point that each falls on, and traces a
-shadow ray to it (next-event estimation to a light vertex). A pick stands for total / picks, so what remains random is
-visibility and colour. Sums and comparisons run in float32, everywhere in one order.
+r^2, b_i), with the sender's pattern q. A receiver sums the terms one after the other, places its picks evenly over the
+total with one random shift (systematic sampling), finds by bisection of the running sums the point that each falls on,
+and traces a shadow ray to it (next-event estimation to a light vertex). A pick stands for total / picks, so what
+remains random is visibility and colour. Terms and comparisons run in float32, sums in one order everywhere.
 """
 
 from itertools import pairwise
@@ -20,9 +20,7 @@ from refgi.sampling import hash_bits
 from refgi.truth.light_vertices import BLOCK, LightVertices
 from refgi.types import Array
 
-TILE = 256  # most receivers that one parallel iteration owns: the SIMD lanes
-PART = 8  # senders whose terms a pick may have to compute again
-PARTS = BLOCK // PART
+TILE = 64  # most receivers that one parallel iteration owns: the SIMD lanes
 TINY = np.float32(1e-30)  # m^2; smaller squared distances count as this one, so that no 0 / 0 arises
 BELOW_1 = np.float32(1 - 2.0**-24)
 
@@ -43,29 +41,48 @@ def _bounded_geometry(
 
 
 @kernel
-def _sum_diffuse(points: LightVertices, tile: Array, first: int, count: int, parts: Array) -> None:
-    """Fill the sums of the terms of each part of diffuse senders at each receiver of a tile, two senders at a time."""
-    for p in range(count):
-        for j in range(first + p * PART, first + p * PART + PART, 2):
-            px, py, pz = points.position[0, j], points.position[1, j], points.position[2, j]
-            qx, qy, qz = points.position[0, j + 1], points.position[1, j + 1], points.position[2, j + 1]
-            power, power_q, bound, bound_q = points.power[j], points.power[j + 1], points.bound[j], points.bound[j + 1]
-            kx, ky, kz = points.axis[0, j], points.axis[1, j], points.axis[2, j]
-            lx, ly, lz = points.axis[0, j + 1], points.axis[1, j + 1], points.axis[2, j + 1]
-            for i in range(TILE):
-                x, y, z, nx, ny, nz = tile[0, i], tile[1, i], tile[2, i], tile[3, i], tile[4, i], tile[5, i]
-                one = power * _bounded_geometry(px - x, py - y, pz - z, nx, ny, nz, kx, ky, kz, bound)
-                two = power_q * _bounded_geometry(qx - x, qy - y, qz - z, nx, ny, nz, lx, ly, lz, bound_q)
-                parts[p, i] = (parts[p, i] + one) + two
+def _fill_sums(points: LightVertices, tile: Array, first: int, sums: Array) -> None:
+    """Fill the running sums of the terms of diffuse senders at each receiver of a tile, two senders at a time.
+
+    `tile`: position and normal, one after the other. `sums`: a row of receivers for each sender behind one of zeros.
+    Kahan's summation: what rounding takes from a small term goes to the next ones.
+    """
+    lost = np.zeros(TILE, np.float32)
+    for i in range(TILE):
+        sums[i] = np.float32(0)
+    for j in range(0, len(sums) // TILE - 1, 2):
+        k = first + j
+        px, py, pz = points.position[0, k], points.position[1, k], points.position[2, k]
+        qx, qy, qz = points.position[0, k + 1], points.position[1, k + 1], points.position[2, k + 1]
+        power, power_q, bound, bound_q = points.power[k], points.power[k + 1], points.bound[k], points.bound[k + 1]
+        kx, ky, kz = points.axis[0, k], points.axis[1, k], points.axis[2, k]
+        lx, ly, lz = points.axis[0, k + 1], points.axis[1, k + 1], points.axis[2, k + 1]
+        rows = sums[j * TILE : (j + 3) * TILE]
+        for i in range(TILE):
+            x, y, z = tile[i], tile[i + TILE], tile[i + 2 * TILE]
+            nx, ny, nz = tile[i + 3 * TILE], tile[i + 4 * TILE], tile[i + 5 * TILE]
+            one = power * _bounded_geometry(px - x, py - y, pz - z, nx, ny, nz, kx, ky, kz, bound) - lost[i]
+            first_sum = rows[i] + one
+            two = power_q * _bounded_geometry(qx - x, qy - y, qz - z, nx, ny, nz, lx, ly, lz, bound_q)
+            two = two - ((first_sum - rows[i]) - one)
+            second_sum = first_sum + two
+            lost[i] = (second_sum - first_sum) - two
+            rows[i + TILE] = first_sum
+            rows[i + 2 * TILE] = second_sum
 
 
 @kernel
-def _diffuse_term(points: LightVertices, j: int, tile: Array, i: int) -> Any:
-    """Return the term of one diffuse sender at one receiver, bit for bit that which was summed."""
-    dx, dy = points.position[0, j] - tile[0, i], points.position[1, j] - tile[1, i]
-    dz = points.position[2, j] - tile[2, i]
-    return points.power[j] * _bounded_geometry(dx, dy, dz, tile[3, i], tile[4, i], tile[5, i], points.axis[0, j],
-                                      points.axis[1, j], points.axis[2, j], points.bound[j])
+def _find(sums: Array, count: int, step: int, i: int, target: Any) -> int:
+    """Return the first of `count` senders at which the running sum of receiver i exceeds a target, else the last.
+
+    `step`: the largest power of two below `count`. Free of branches, so that one pick need not wait for another.
+    """
+    j = 0
+    while step > 0:
+        k = min(j + step, count - 1)
+        j += (k - j) * int(sums[k * TILE + i] <= target)
+        step >>= 1
+    return j
 
 
 @kernel
@@ -116,53 +133,40 @@ def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: t
     reach is 0 where there is nothing to gain.
     """
     members, table = tiles
+    longest = (starts[:, 1] - starts[:, 0]).max() * BLOCK
+    tile, sums = np.empty(6 * TILE, np.float32), np.empty((longest + 1) * TILE, np.float32)
     for number in prange(len(table)):
         low, high, chosen = table[number, 0], table[number, 1], table[number, 2]
-        count = high - low
-        # positions and normals; lanes beyond the count receive nothing
-        tile = np.zeros((6, TILE), np.float32)
-        for c in range(3):
-            for i in range(count):
-                tile[c, i] = receivers.position[c, members[low + i]]
-                tile[3 + c, i] = receivers.normal[c, members[low + i]]
-        first, size = starts[chosen, 0] * BLOCK, starts[chosen, 1] - starts[chosen, 0]
-        parts = np.zeros((size * PARTS, TILE), np.float32)
-        _sum_diffuse(points, tile, first, size * PARTS, parts)
-        blocks = np.zeros((size, TILE), np.float32)
-        for p in range(parts.shape[0]):
-            for i in range(TILE):
-                blocks[p // PARTS, i] += parts[p, i]
-        _pick_all(points, receivers, members[low:high], tile, sampling, (first, blocks, parts), rays)
+        tile[:] = 0  # lanes beyond the last receiver receive nothing
+        for i in range(high - low):
+            for c in range(3):
+                tile[c * TILE + i] = receivers.position[c, members[low + i]]
+                tile[(3 + c) * TILE + i] = receivers.normal[c, members[low + i]]
+        first, count = starts[chosen, 0] * BLOCK, (starts[chosen, 1] - starts[chosen, 0]) * BLOCK
+        _fill_sums(points, tile, first, sums[: (count + 1) * TILE])
+        _pick_all(points, receivers, members[low:high], sampling, (first, sums[: (count + 1) * TILE]), rays)
 
 
 @kernel
-def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array, tile: Array,
-              sampling: tuple[int, int, int, Any, bool], sums: tuple[int, Array, Array],
+def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array,
+              sampling: tuple[int, int, int, Any, bool], senders: tuple[int, Array],
               rays: tuple[Array, Array, Array, Array, Array]) -> None:
-    """Let receivers pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""
+    """Let receivers pick among senders, the first one's number and the running sums of their terms."""
     origins, directions, reach, contribution, picked = rays
     first, picks, seed, grain, hide = sampling
-    first_point, blocks, parts = sums
-    real = np.float32
+    first_point, sums = senders
+    real, count, step = np.float32, len(sums) // TILE - 1, 1
+    while 2 * step < count:
+        step *= 2
     for i in range(len(members)):
-        r, total = members[i], real(0)
-        for b in range(blocks.shape[0]):
-            total += blocks[b, i]
-        for s in range(picks):
-            reach[(r - first) * picks + s] = real(0)
+        r, total = members[i], sums[count * TILE + i]
         shift, share = random_shift(receivers.pixel[r], seed), total / real(picks)
-        b, before = 0, real(0)  # block, and the sum of those before it
-        for s in range(picks if total > real(0) else 0):
+        for s in range(picks):
             ray = (r - first) * picks + s
-            target = (real(s) + shift) * share
-            b, before, p, rest = part_of(blocks, parts, i, target, b, before)
-            j, end = first_point + p * PART, first_point + p * PART + PART - 1
-            term = _diffuse_term(points, j, tile, i)
-            while j < end and term <= rest:
-                rest -= term
-                j += 1
-                term = _diffuse_term(points, j, tile, i)
-            if term > real(0):
+            k = _find(sums, count, step, i, (real(s) + shift) * share)
+            reach[ray] = real(0)
+            if sums[(k + 1) * TILE + i] > sums[k * TILE + i]:
+                j = first_point + k
                 reach[ray] = aim(points, j, receivers, r, grain, hide, origins, directions, ray)
                 picked[ray] = j
                 for c in range(3):
@@ -173,20 +177,3 @@ def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array, ti
 def random_shift(pixel: int, seed: int) -> Any:
     """Return how far a receiver's picks are shifted in a pass: 0 to 1 of the way from one to the next."""
     return np.float32(hash_bits(np.uint32(pixel) ^ np.uint32(seed)) >> np.uint32(8)) * np.float32(2.0**-24)
-
-
-@kernel
-def part_of(blocks: Array, parts: Array, i: int, target: Any, b: int, before: Any) -> tuple[int, Any, int, Any]:
-    """Find the part of senders that a pick of receiver i falls in, from block b on, `before` the sum of those before.
-
-    Returns its block, the sum before that, the part, and what of `target` remains there.
-    """
-    while b < blocks.shape[0] - 1 and before + blocks[b, i] <= target:
-        before += blocks[b, i]
-        b += 1
-    rest = target - before
-    p, end = b * PARTS, b * PARTS + PARTS - 1
-    while p < end and parts[p, i] <= rest:
-        rest -= parts[p, i]
-        p += 1
-    return b, before, p, rest

@@ -19,7 +19,7 @@ from refgi.truth.surfaces import Surfaces, face_normal, height_above, shading_no
 from refgi.types import Array
 
 SMALLEST = 1e-12
-BLOCK = 32  # points whose contributions are summed before a pick looks inside
+BLOCK = 32  # points; sets are padded to whole ones
 
 
 class LightVertices(NamedTuple):

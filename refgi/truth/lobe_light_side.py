@@ -19,11 +19,13 @@ import numpy as np
 from refgi.elementary import exp2, log2p1
 from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
-from refgi.truth.light_side import BELOW_1, PART, PARTS, TILE, aim, part_of, random_shift
+from refgi.truth.light_side import BELOW_1, TILE, aim, random_shift
 from refgi.truth.light_vertices import BLOCK, LightVertices
 from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, density_on_axis
 from refgi.types import Array
 
+PART = 8  # senders whose terms a pick may have to compute again
+PARTS = BLOCK // PART
 NEAREST = np.float32(1e-12)  # m^2; smaller squared distances count as this one: no term of the sharpest lobe overflows
 LANES = 16  # receivers of a tile are filled up to a multiple of that
 ROWS = 12  # of a tile: position, normal, m, P, (P + 2) / (2 pi), D
@@ -162,3 +164,20 @@ def _pick_all(points: LightVertices, receivers: RayReceivers, lobes: Lobes, memb
                 picked[ray] = j
                 for c in range(3):
                     contribution[ray, c] = share * points.colour[c, j] * real(lobes.specular[c, r])
+
+
+@kernel
+def part_of(blocks: Array, parts: Array, i: int, target: Any, b: int, before: Any) -> tuple[int, Any, int, Any]:
+    """Find the part of senders that a pick of receiver i falls in, from block b on, `before` the sum of those before.
+
+    Returns its block, the sum before that, the part, and what of `target` remains there.
+    """
+    while b < blocks.shape[0] - 1 and before + blocks[b, i] <= target:
+        before += blocks[b, i]
+        b += 1
+    rest = target - before
+    p, end = b * PARTS, b * PARTS + PARTS - 1
+    while p < end and parts[p, i] <= rest:
+        rest -= parts[p, i]
+        p += 1
+    return b, before, p, rest

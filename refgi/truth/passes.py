@@ -113,8 +113,17 @@ def one_pass(task: Task, number: int) -> Array:
 
 def _hemisphere(task: Task, words: Array, sums: Array) -> None:
     """Add the hemisphere estimator, by its MIS weight where the light side has the rest."""
-    count = task.settings.directions_per_pass
-    points, reach = scrambled_points(count, int(words[3])), _reach(task)
+    if not task.groups:
+        add_directions(task, task.settings.directions_per_pass, words, sums)
+    for group in task.groups:
+        found = np.zeros((3, len(group.chosen)))
+        add_directions(task._replace(receivers=group.receivers), group.directions, words, found)
+        sums[:, group.chosen] += found
+
+
+def add_directions(task: Task, count: int, words: Array, sums: Array) -> None:
+    """Add what so many directions of each receiver find; `words`: of a pass."""
+    points, reach = scrambled_points(count, int(words[3])), directions_reach(task)
     for first, last in spans(task, count):
         paths = paths_for((last - first) * count)
         send(task.receivers, (first, last), points, int(words[3]), reach, task.grain_below, paths)
@@ -146,7 +155,7 @@ def follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums:
             return
 
 
-def _reach(task: Task) -> float:
+def directions_reach(task: Task) -> float:
     """Return the length of hemisphere rays: beyond, the geometry term stays below the bound; lobes know none."""
     bound, surfaces = task.settings.shared_bound, task.surfaces
     if bound == 0 or task.settings.bounces > 1 or surfaces.specular.any():

@@ -17,6 +17,7 @@ from numba import types
 from refgi.jit import by_type, kernel, prange
 from refgi.radiometry import DIRECTIONAL
 from refgi.rays import MISS, STEPS, ray_offset
+from refgi.rsm.pool import plane
 from refgi.scene import LightTable
 from refgi.scene.texture.lookup import colour_at, coordinates_at, point_sample
 from refgi.truth.surfaces import Surfaces, face_normal, lift
@@ -121,9 +122,9 @@ def _pass_through(surfaces: Surfaces, grain: float, paths: Paths, ray: int) -> N
 
 def paths_for(count: int) -> Paths:
     """Allocate a batch of paths."""
-    origin, direction, weight = (np.empty((count, 3), np.float32) for _ in range(3))
-    reach, travelled, cosine, distance = (np.empty(count, np.float32) for _ in range(4))
-    return Paths(origin, direction, reach, travelled, cosine, np.empty(count, np.int32), distance, weight)
+    origin, direction, weight = (plane((count, 3), np.float32) for _ in range(3))
+    reach, travelled, cosine, distance = (plane((count,), np.float32) for _ in range(4))
+    return Paths(origin, direction, reach, travelled, cosine, plane((count,), np.int32), distance, weight)
 
 
 @kernel

@@ -47,7 +47,8 @@ class TruthSettings(Settings):
                               study=True)
     uniform_share: float = setting(0.5, "share of each light's rays that are uniform", above=0.0, most=1.0, study=True)
     picks: int = setting(PICKS, "light vertices that each receiver picks in a pass", least=1, most=1024, study=True)
-    directions: int | None = setting(None, "hemisphere directions of each receiver in a pass; none: 8, or 16 alone",
+    directions: int | None = setting(None, "hemisphere directions of a receiver in a pass, shared out where they are "
+                                     "short; none: 8, or 16 alone",
                                      least=1, most=65536, study=True)
     bound: float = setting(BOUND, "largest geometry term left to the light side, in 1 / footprint of a direction",
                            above=0.0, study=True)

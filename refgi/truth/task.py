@@ -7,6 +7,7 @@ import numpy as np
 
 from refgi.pairs.shadow_rays import RayReceivers, add_unoccluded
 from refgi.rays import Tracer
+from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection
 from refgi.scene import LightTable, Scene
 from refgi.truth.caustics import Film
@@ -22,6 +23,14 @@ from refgi.types import Array
 SOFT = 8.0  # exponent up to which directions of the hemisphere do as well as those around the lights' images
 
 
+class Group(NamedTuple):
+    """Receivers that have as many directions each."""
+
+    directions: int
+    chosen: Array  # (g,) int64: which of the task's receivers
+    receivers: RayReceivers
+
+
 class Task(NamedTuple):
     """Inputs of a pass."""
 
@@ -32,10 +41,12 @@ class Task(NamedTuple):
     lights: LightTable
     receivers: RayReceivers
     set_of: Array  # (r,) which set of light vertices each receiver picks from
+    shape: tuple[int, ...]  # of the picture
     caustics: Film | None = None
     left_to_photons: float = math.inf  # exponent from which on a sender's lobe comes by photons alone
     view: Projection | None = None  # only surfaces visible in it emit; None: all do
     densities: tuple[Density | None, ...] = ()  # of each light's rays; none: even ones
+    groups: tuple[Group, ...] = ()  # by directions; none: all receivers have the same
     cells: LobeCells | None = None  # of senders' lobes; None: no lobe comes by them
     lobes: Lobes | None = None  # of the receivers, where their lobes and not their irradiance are asked for
 
@@ -91,8 +102,8 @@ def spans(task: Task, per_receiver: int) -> list[tuple[int, int]]:
 
 def shadow_batch(count: int) -> Shadows:
     """Allocate a batch of shadow rays."""
-    return Shadows(np.empty((count, 3), np.float32), np.empty((count, 3), np.float32), np.empty(count, np.float32),
-                   np.empty(count, np.bool_), np.empty((count, 3), np.float32))
+    origin, direction, contribution = (plane((count, 3), np.float32) for _ in range(3))
+    return Shadows(origin, direction, plane((count,), np.float32), plane((count,), np.bool_), contribution)
 
 
 def add_unblocked(task: Task, rays: Shadows, first: int, per_receiver: int, sums: Array, visibility: bool) -> None:

@@ -22,6 +22,7 @@ from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
 from refgi.truth.cell_pass import with_cells
 from refgi.truth.checkpoint import FIRST_LINE, Checkpoint
+from refgi.truth.direction_shares import directions_shared_out
 from refgi.truth.light_pass import pilot
 from refgi.truth.lobe_pass import lobe_pass
 from refgi.truth.lobe_receivers import glossy_triangles, lobes_of, meets_photons
@@ -228,8 +229,8 @@ def task_of(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_
 
 
 def _guided(task: Task) -> Task:
-    """Return a task with what the light's side is guided by: densities of its rays, and cells of lobes."""
-    return with_cells(task._replace(densities=pilot(task)))
+    """Return a task with densities of the lights' rays, cells of lobes and shares of directions."""
+    return with_cells(task._replace(densities=pilot(task), groups=directions_shared_out(task)))
 
 
 def without_pilot(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
@@ -240,7 +241,8 @@ def without_pilot(scene: Scene, tracer: Any, position: Array, normal: Array, tri
     caustics, left_to_photons = _photons(scene, triangle_id.shape, settings)
     reflecting = surfaces(scene, left_to_photons)
     view = camera_projection(scene.camera, *triangle_id.shape[::-1]) if settings.emitters == "visible" else None
-    return Task(scene, settings, tracer, reflecting, lights_of(scene), points, set_of, caustics, left_to_photons, view)
+    return Task(scene, settings, tracer, reflecting, lights_of(scene), points, set_of, triangle_id.shape, caustics,
+                left_to_photons, view)
 
 
 def _with_lobes(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,

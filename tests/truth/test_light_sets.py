@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from refgi import jit
 from refgi.frame import Frame
@@ -11,12 +12,12 @@ from refgi.rays import Tracer
 from refgi.scene import DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight, load_scene
 from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.light_grid import cell_centres, density_of, light_rays, rays_through, stratified_sets, warp
-from refgi.truth.light_pass import fresh_points
+from refgi.truth.light_pass import fresh_points, pick_points
 from refgi.truth.light_side import TILE, tiles
-from refgi.truth.light_vertices import BLOCK
+from refgi.truth.light_vertices import BLOCK, LightVertices, PointSets
 from refgi.truth.task import sets_of
 from refgi.truth.truth import accumulate, task_of
-from tests.truth.scenes import CAMERA, corner_room, receivers_in_corner, rectangle, scene
+from tests.truth.scenes import CAMERA, corner_room, floor, receivers_in_corner, rectangle, scene
 
 SIGMAS = 4.0  # a mean of a few dozen passes lies outside once in some 5,000 runs
 SPOT = SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.3, 0.6, (2.0, 1.5, 1.0))
@@ -203,3 +204,71 @@ def test_same_bits_for_threads_and_batches_with_many_sets(frame):
         assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(first, again, strict=True))
 
 
+PICKS = 16
+ROUNDING = 1e-4  # of a pick: float32 terms against float64, a few ULP of the total
+
+
+def terms_of(points, receivers):
+    """Return p min(G, b) of each sender (columns) at each receiver (rows), by NumPy in float64."""
+    position, axis, to, up = (np.asarray(a, np.float64) for a in (
+        points.position, points.axis, receivers.position, receivers.normal))
+    d = position[:, None, :] - to[:, :, None]
+    square = (d**2).sum(axis=0)
+    leaving, arriving = -(axis[:, None, :] * d).sum(axis=0), (up[:, :, None] * d).sum(axis=0)
+    geometry = np.maximum(leaving, 0) * np.maximum(arriving, 0) / square**2
+    return points.power * np.minimum(geometry, points.bound)
+
+
+def test_picks_are_spaced_evenly_over_the_terms(frame, evidence):
+    """Oracle: of any run of senders from the first on a receiver picks its share of 16, to less than one."""
+    task = frame_task(frame, TruthSettings())
+    sets, count = fresh_points(task, np.random.default_rng(3)), 400
+    rays, picked = pick_points(task, sets, (0, count), PICKS, 5)
+    off, error = 0.0, 0.0
+    for number in range(16):
+        low, high = BLOCK * sets.starts[number]
+        mine = np.flatnonzero(task.set_of[:count] == number)
+        terms = terms_of(type(sets.points)(*(field[..., low:high] for field in sets.points)),
+                         type(task.receivers)(*(field[..., mine] for field in task.receivers)))
+        total = terms.sum(axis=1)
+        chosen = picked.reshape(count, PICKS)[mine] - low
+        met = np.stack([np.bincount(row, minlength=high - low).cumsum() for row in chosen])
+        off = max(off, np.abs(met - PICKS * terms.cumsum(axis=1) / total[:, None]).max())
+        share = rays.contribution.reshape(count, PICKS, 3)[mine] / sets.points.colour.T[chosen + low]
+        error = max(error, np.nanmax(np.abs(share * PICKS / total[:, None, None] - 1)))
+    evidence(f"picks of runs of senders are at most {off:.4f} off their share; totals {error:.1e}")
+    assert off < 1 + ROUNDING
+    assert error < 1e-5
+
+
+def test_picks_of_many_passes_follow_the_terms(frame):
+    """Chi-square of the first receiver's picks over 512 shifts, in runs of senders of about a sixteenth each."""
+    task, shifts = frame_task(frame, TruthSettings()), 512
+    sets = fresh_points(task, np.random.default_rng(4))
+    low, high = BLOCK * sets.starts[task.set_of[0]]
+    terms = terms_of(type(sets.points)(*(field[..., low:high] for field in sets.points)),
+                     type(task.receivers)(*(field[..., :1] for field in task.receivers)))
+    share = terms[0].cumsum() / terms[0].sum()
+    run = np.minimum((share * 61).astype(int), 60)  # runs that the spacing of the picks does not fit
+    expected = np.bincount(run, terms[0] / terms[0].sum(), 61)
+    one = np.concatenate([pick_points(task, sets, (0, 1), 1, seed)[1] for seed in range(shifts)]) - low
+    met = np.bincount(run[one], minlength=61)
+    kept = expected > 0
+    statistic = ((met - shifts * expected)[kept] ** 2 / (shifts * expected[kept])).sum()
+    assert chi2.ppf(1e-4, kept.sum() - 1) < statistic < chi2.ppf(1 - 1e-4, kept.sum() - 1)
+
+
+def test_many_weak_senders_behind_a_strong_one_are_not_lost_to_rounding():
+    """A strong sender and 2^15 of 2e-8 of it, each less than half a ULP of the sum: 6.6e-4 together."""
+    weak, count = 2e-8, 1 << 15
+    power = np.full(count, weak, np.float32)
+    power[0] = 1
+    down, place = (np.repeat(np.array([[0.0], [y], [0.0]], np.float32), count, axis=1) for y in (-1.0, 2.0))
+    points = LightVertices(place, down, down, down, power, np.ones((3, count), np.float32), np.ones(count, np.float32),
+                           np.ones(count, np.float32), np.full(count, np.inf, np.float32), np.zeros(count, np.int32))
+    room = scene([floor()], SPOT)
+    task = task_of(room, Tracer(room.geometry), np.zeros((3, 1, 1)), np.array([0.0, 1, 0]).reshape(3, 1, 1),
+                   np.zeros((1, 1), np.int32), TruthSettings())
+    rays, _ = pick_points(task, PointSets(points, np.array([[0, count // BLOCK]])), (0, 1), PICKS, 1)
+    total = (1 + (count - 1) * weak) / 4  # G = 1 / r^2
+    assert rays.contribution[:, 0] * PICKS == pytest.approx(total, rel=1e-6)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.stability.file_formats import GRID, MTL, NAME, PATH, PLAN, VALUES
+from refgi.truth.checkpoint import FIRST_LINE
 from tests.scene.samples import SCENE, glb_bytes, gltf_tree, ply_bytes
 
 Make = Callable[[Path], Any]
@@ -73,7 +74,7 @@ def exr_bytes(window: tuple[int, int, int, int], *, tiled: bool = False, channel
 def _checkpoint(length: int) -> Make:
     def write(path: Path) -> None:
         with path.open("wb") as file:
-            file.write(b"refgi truth checkpoint 2\n" + NAME)
+            file.write(FIRST_LINE + NAME)
             file.truncate(length)
 
     return write

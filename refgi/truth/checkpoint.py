@@ -20,7 +20,7 @@ from refgi.errors import InputError, RefgiWarning, expect
 from refgi.image import temporary_name
 from refgi.truth.result import Moments, no_passes
 
-FIRST_LINE = b"refgi truth checkpoint 3\n"
+FIRST_LINE = b"refgi truth checkpoint 4\n"
 KINDS = ("<i8", "<f8", "<f8", "<i8", "<f8", "<i4")  # of the fields of `Moments`
 DIGEST = 32  # bytes of SHA-256
 SECONDS_BETWEEN = 10.0  # saves are at least that far apart

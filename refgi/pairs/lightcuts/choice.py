@@ -31,7 +31,7 @@ LIGHTS = 4096  # in the tree that is tried, at most a quarter of all
 TILES, PART = 16, 64  # tiles of the full sum that are looked at, and receivers of each that a cut is tried for
 GROWTH = 0.3, 0.8  # powers of the number of lights that a cut's work grows with
 PAIR, TEST, CUT_PAIR, BOUND, NODE, RECEIVER = 0.42, 0.2, 0.45, 34.0, 600.0, 160.0  # ns of one thread
-SURE = 0.7  # of the full sum's time, what clusters may be estimated to take: estimates are 0.8 to 1.6 times what is met
+SURE = 0.7  # of the full sum's time, what clusters may be estimated to take: estimates are 0.8 to 2.3 times what is met
 
 
 def for_lights(lightcuts: AutoLightcuts | Lightcuts | None, lights: "PixelLights") -> AutoLightcuts | Lightcuts | None:

@@ -28,12 +28,27 @@ class SamplingError(NamedTuple):
                 f"{self.samples:,} {self.of})")
 
 
+class LightcutsChoice(NamedTuple):
+    """Clusters of pixel lights that a method chose to sum in place of the lights."""
+
+    lights: int
+    error: float  # of a receiver's sum over channels, at most, as a share of it
+    share: float  # estimated time over that of the full sum
+
+    @property
+    def statement(self) -> str:
+        """In a line."""
+        return (f"lightcuts: clusters of {self.lights:,} lights, within {100 * self.error:g} % of every sum, in about "
+                f"{self.share:.2g} of its time")
+
+
 class Diagnosis:
     """What a method found of the picture that it is making."""
 
     def __init__(self, due: bool) -> None:
         self.due = due
         self.sampling_error: SamplingError | None = None
+        self.lightcuts: LightcutsChoice | None = None
 
 
 _open: ContextVar[Diagnosis | None] = ContextVar("refgi_diagnosis", default=None)
@@ -61,6 +76,12 @@ def is_due(name: str) -> bool:
         return True
     skip(name, "estimated on an earlier frame")
     return False
+
+
+def tell_lightcuts(choice: LightcutsChoice) -> None:
+    """Tell whoever collects diagnostics that lights are summed by clusters."""
+    if (found := _open.get()) is not None:
+        found.lightcuts = choice
 
 
 def asked(name: str) -> Diagnosis | None:

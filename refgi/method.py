@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from refgi.diagnostics import SamplingError, diagnosing
+from refgi.diagnostics import LightcutsChoice, SamplingError, diagnosing
 from refgi.errors import InputError, RefgiWarning
 from refgi.settings import Settings
 from refgi.stages import sharing
@@ -48,6 +48,7 @@ class Light(NamedTuple):
     lobes: Array | None = None  # (3, h, w) radiance of receivers' lobes by indirect light, W/m^2/sr, if any
     lobe_estimate: Any = None  # that the lobes are the mean of
     sampling_error: SamplingError | None = None  # of a method that draws lights or samples, where it was asked for
+    lightcuts: LightcutsChoice | None = None  # of a method that chose to sum clusters of lights
 
 
 class Extent(NamedTuple):
@@ -123,7 +124,7 @@ class Method(NamedTuple):
             else:
                 with sharing():
                     light = Light(*self.compute(frame, settings), *self.compute_lobes(frame, settings))
-        return light._replace(sampling_error=found.sampling_error)
+        return light._replace(sampling_error=found.sampling_error, lightcuts=found.lightcuts)
 
     def made(self, frame: Any, settings: Any) -> "Light":
         """Return what the method makes of a frame, without its estimates."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from refgi.diagnostics import SamplingError, diagnosing, is_due
+from refgi.diagnostics import LightcutsChoice, SamplingError, diagnosing, is_due
 from refgi.errors import InputError, RefgiWarning
 from refgi.method import Method
 from refgi.skips import left_out
@@ -86,6 +86,7 @@ class Picture(NamedTuple):
     lobes: Array | None = None  # (3, h, w) radiance of receivers' lobes by indirect light, W/m^2/sr, if any
     lobe_estimate: Any = None  # as `estimate`, of the lobes, W/m^2/sr
     sampling_error: SamplingError | None = None  # of the irradiance, of methods that draw lights or samples
+    lightcuts: LightcutsChoice | None = None  # of methods that chose to sum clusters of lights
 
 
 class KeepingEstimate:
@@ -175,7 +176,8 @@ def render(scene: "Scene | str | Path", method: str = "sii", settings: Any = Non
     light = known.light(frame, settings)
     _warn_of_backs(frame)
     picture = Picture(frame, light.irradiance, frame.radiance(light.irradiance, light.lobes), light.estimate,
-                      lobes=light.lobes, lobe_estimate=light.lobe_estimate, sampling_error=light.sampling_error)
+                      lobes=light.lobes, lobe_estimate=light.lobe_estimate, sampling_error=light.sampling_error,
+                      lightcuts=light.lightcuts)
     if not left_out("frame.buffers", lambda: (len(frame.unused), len(BUFFERS))):
         for name in frame.unused:
             getattr(frame, name)

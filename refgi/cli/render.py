@@ -11,6 +11,7 @@ from refgi.cli.session import DONE, FAILED, Session, say
 from refgi.cli.settings import preset
 
 DARKEST, BRIGHTEST = 1e-3, 1e3  # radiance times exposure that a picture's brightest pixel usually has
+STATED = "sampling_error", "lightcuts"  # of a picture, for its record
 DARKEST_OF_GLTF = 1e-2  # whose lights may be in W/sr, 683 times as strong as the format says
 
 if TYPE_CHECKING:
@@ -119,7 +120,7 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     size = "x".join(map(str, content["size"]))
     text = f"{job.scene.name} by {job.method}: {size} in {seconds:.2f} s"
     text += f" -> {', '.join(content['files'])}" if files.files else ""
-    text += "".join(f"\n{record[key]['statement']}" for key in ("estimate", "sampling_error") if key in record)
+    text += "".join(f"\n{record[key]['statement']}" for key in ("estimate", *STATED) if key in record)
     text += f"\nlobes: {record['estimate']['lobes']['statement']}" if "lobes" in record.get("estimate", {}) else ""
     if engine is not None:
         content["literal"] = [one._asdict() for one in engine.timed]
@@ -134,7 +135,7 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
 
 
 def _record(job: "Job", picture: "Picture") -> "Record":
-    from refgi.provenance import estimate_record, method_record, sampling_record, scene_record
+    from refgi.provenance import estimate_record, method_record, scene_record, stated_record
 
     frame, estimate = picture.frame, picture.estimate
     options = {"dtype": frame.dtype.name, "rsm_resolution": frame.rsm_resolution, "shadows": frame.shadows}
@@ -147,8 +148,9 @@ def _record(job: "Job", picture: "Picture") -> "Record":
         record |= job.still.record
     if estimate is not None:
         record |= estimate_record(estimate, picture.lobe_estimate)
-    if picture.sampling_error is not None:
-        record |= {"sampling_error": sampling_record(picture.sampling_error)}
+    for key in STATED:
+        if (stated := getattr(picture, key)) is not None:
+            record |= {key: stated_record(stated)}
     return record
 
 
@@ -168,7 +170,7 @@ def _content(picture: "Picture", job: "Job", seconds: float, record: "Record") -
             "covered_pixels": int(covered.sum()), "mean_indirect_irradiance": float(mean), **lobes,
             "brightest_radiance": float(picture.radiance.max()),
             "non_finite_pixels": count_non_finite(picture.radiance), "versions": record["versions"],
-            "provenance": record, **{key: record[key] for key in ("estimate", "sampling_error") if key in record},
+            "provenance": record, **{key: record[key] for key in ("estimate", *STATED) if key in record},
         }
 
 

@@ -46,8 +46,7 @@ SLOPES = 0.5, 1.2  # what they may tell
 AIM = 0.95  # of the target, where the next trial is to end
 STEPS = 0.3, 0.9  # of a threshold, where the next may lie
 ENOUGH = 0.75  # of the pixels evaluated: then the rest are as well
-MANY = 65536  # lights, from which on "auto" sums them by clusters
-CLUSTERED = 0.1  # of the target, the error of those sums
+CLUSTERED = 0.1  # of the target, the error of sums by clusters that "auto" chooses, at most
 LEAST_ERROR = 1e-6  # that lightcuts know
 LAST = 16  # trial, after which every pixel is evaluated: cells of which nothing bright is known may never be split
 
@@ -151,7 +150,7 @@ def error_driven(
     """Evaluate a picture to a relative error, `settings.target`.
 
     seed: Of the samples that estimate the error.
-    lightcuts: Whether lights may be summed by clusters: "auto" takes a share of the target for it where they are many;
+    lightcuts: Whether lights may be summed by clusters: "auto" takes a share of the target for it where that pays;
         by name, with an error of its own that counts against the target.
     shadowed: The same lights under their visibility, which are then never clustered.
     -> ErrorDriven: The picture, its subsplats, error and cost.
@@ -191,11 +190,6 @@ def error_driven(
     return ErrorDriven(picture, tuple(trials.split), receivers.covered, *found, threshold, count, evaluated, full_pairs)
 
 
-def clusters(lights: "PixelLights", lightcuts: AutoLightcuts | Lightcuts | None) -> bool:
-    """Return whether lights are summed by clusters."""
-    return isinstance(lightcuts, Lightcuts) or (isinstance(lightcuts, AutoLightcuts) and lights.flux.shape[1] >= MANY)
-
-
 def _evaluated_samples(
     receivers: Receivers, lights: "PixelLights", pairs: "PairSettings", footprint: Array | None, samples: ErrorSamples,
     target: float, lightcuts: AutoLightcuts | Lightcuts | None,
@@ -204,16 +198,18 @@ def _evaluated_samples(
 
     Where that is more than half of the target, lights are summed in full.
     """
-    if clusters(lights, lightcuts):
-        error = lightcuts.error if isinstance(lightcuts, Lightcuts) else CLUSTERED * target
-        packed = checked(receivers, lights, pairs, footprint, Lightcuts(min(max(error, LEAST_ERROR), 1.0)))
+    if isinstance(lightcuts, AutoLightcuts):
+        lightcuts = AutoLightcuts(max(min(lightcuts.error, CLUSTERED * target), LEAST_ERROR))
+    packed = checked(receivers, lights, pairs, footprint, lightcuts)
+    if packed.tree is not None:
         summed = unshadowed(receivers, packed)
         exact = _evaluated(receivers, summed, samples)
-        taken = 0.0 if packed.tree is None else packed.tree.error * _largest_ratio(samples, exact.at(samples.pixel))
+        taken = packed.tree.error * _largest_ratio(samples, exact.at(samples.pixel))
         if taken <= target / 2:
             return summed, exact, taken
         skip("pairs.lightcuts", f"bounds of {taken:.2%} of the mean are too much for the target")
-    summed = unshadowed(receivers, checked(receivers, lights, pairs, footprint))
+        packed = packed._replace(tree=None)
+    summed = unshadowed(receivers, packed)
     return summed, _evaluated(receivers, summed, samples), 0.0
 
 

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from refgi.errors import expect
+from refgi.pairs.lightcuts.choice import chosen
 from refgi.pairs.lightcuts.cuts import add_cuts
 from refgi.pairs.lobe_sum import add_lobes
-from refgi.pairs.packing import Packed, PackedLobes, pack, with_tree
+from refgi.pairs.packing import Packed, PackedLobes, clustered, pack
 from refgi.pairs.pair_sum import TILE, sum_pairs
 from refgi.pairs.ranged_sum import LANES
-from refgi.pairs.settings import Lightcuts, PairSettings, SphereClamp
+from refgi.pairs.settings import AutoLightcuts, Lightcuts, PairSettings, SphereClamp
 from refgi.pairs.sphere_sum import sum_spheres
 from refgi.pairs.tile_counts import lobe_tiles, tiles_behind
 from refgi.pairs.tiles import block_by_block, clear, put, receiving, taken
@@ -42,12 +43,13 @@ class Receivers(NamedTuple):
 @stage("pairs.sum")
 def irradiance(
     receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None,
-    lightcuts: Lightcuts | None = None,
+    lightcuts: AutoLightcuts | Lightcuts | None = None,
 ) -> Array:
     """Sum the irradiance of every pixel light at every receiver (SII Eq. 2).
 
     receivers: Points to light; their dtype is that of the result.
-    lightcuts: Sum diffuse lights by clusters, to an error; lobes are summed in full.
+    lightcuts: Sum diffuse lights by clusters, to an error; lobes are summed in full. "auto": where that is estimated
+        to take less time.
     -> (3, h, w): Irradiance, W/m^2, linear RGB; 0 where there is no surface. Contains both cosines and the light's
         1/pi; excludes the receiver's albedo/pi and visibility.
 
@@ -69,7 +71,7 @@ def irradiance(
 
 def summed(
     receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None,
-    lightcuts: Lightcuts | None = None,
+    lightcuts: AutoLightcuts | Lightcuts | None = None,
 ) -> Array:
     """Return what `irradiance` does, unobserved."""
     packed = checked(receivers, lights, settings, footprint, lightcuts)
@@ -107,17 +109,23 @@ def _listed_lobes(position: Array, normal: Array, lobes: PackedLobes) -> Array |
 
 def checked(
     receivers: Receivers, lights: "PixelLights", settings: PairSettings, footprint: Array | None,
-    lightcuts: Lightcuts | None = None,
+    lightcuts: AutoLightcuts | Lightcuts | None = None,
 ) -> Packed:
     """Check the arguments of a sum over pairs, as `irradiance`, and pack its lights in the dtype of the receivers.
 
     `footprint` (N,) is the surface each light stands for, m^2; `lightcuts` the clusters to sum diffuse lights by.
     """
     _check(receivers, lights, settings, footprint)
-    packed = pack(lights, settings, footprint, receivers.position.dtype)
+    dtype, packed = receivers.position.dtype, None
+    if not isinstance(lightcuts, Lightcuts):
+        packed = pack(lights, settings, footprint, dtype)
+        lightcuts = None if lightcuts is None else chosen(lightcuts, packed, receivers)
+    if lightcuts is not None:
+        packed = clustered(lights, settings, footprint, dtype, lightcuts.error)
+    assert packed is not None
     if packed.lobes is None:
         skip("pairs.lobes", "no pixel light is glossy")
-    return packed if lightcuts is None else with_tree(packed, lightcuts)
+    return packed
 
 
 def over_receivers(receivers: Receivers, packed: Packed, add: Callable[[Array, Array, Array, Array], None]) -> Array:

@@ -14,8 +14,9 @@ from refgi.jit import kernel
 from refgi.pairs.lightcuts.tree import LightTree, light_tree
 from refgi.pairs.pair_sum import Clamp
 from refgi.pairs.pixel_lights import CLAMPED, CORRECTED, FULL_LOBE, LITERAL, NO_NORM, Widening, lobe_norm_factor
-from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, Lightcuts, PairSettings, SphereClamp
+from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, PairSettings, SphereClamp
 from refgi.skips import left_out
+from refgi.stages import stage
 from refgi.types import Array
 
 if TYPE_CHECKING:
@@ -70,17 +71,27 @@ def pack(lights: "PixelLights", settings: PairSettings, footprint: Array | None,
     return Packed(diffuse, clamp, spheres, lobes, shines, glossy)
 
 
-def with_tree(packed: Packed, lightcuts: Lightcuts) -> Packed:
-    """Return packed lights with a light tree over the diffuse ones, if any, for sums to the error of lightcuts.
+@stage("pairs.light_tree")
+def clustered(
+    lights: "PixelLights", settings: PairSettings, footprint: Array | None, dtype: npt.DTypeLike, error: float
+) -> Packed:
+    """Pack lights and build the light tree over the diffuse ones, if there are any.
 
-    `InputError` if a light has a flux below 0, or lights are spheres.
+    error: Largest error of a receiver's sum over channels, as a share of it.
+    -> Packed: The lights and their tree, of as many levels as leave at most FAN nodes on the highest.
+
+    Raises
+    ------
+    InputError
+        If a light has a flux below 0, or lights are spheres.
     """
+    packed = pack(lights, settings, footprint, dtype)
     expect(packed.spheres is None, "clamp", "another one with lightcuts, which bound no spheres", "sphere")
     expect(bool((packed.diffuse[6:] >= 0).all()), "lights.flux", "numbers >= 0 with lightcuts",
            packed.diffuse[6:].min(initial=0.0))
     if packed.diffuse.shape[1] == 1:
         return packed
-    return packed._replace(tree=light_tree(packed.diffuse, packed.clamp, lightcuts.error))
+    return packed._replace(tree=light_tree(packed.diffuse, packed.clamp, error))
 
 
 def with_dark_lobes(lights: "PixelLights") -> "PixelLights":

@@ -9,6 +9,8 @@ from refgi.settings import Settings, setting
 
 STRONGEST_CLAMP = 1e18  # m, 1/m^2 or 1: its square stays within float32
 LAST_SEED = 2**32 - 1
+LEAST_LIGHTS = 8192  # that lightcuts "auto" may cluster
+LARGEST_ERROR = "largest error of a receiver's sum over channels, as a share of it"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,9 +59,11 @@ Clamp = AutoClamp | DistanceClamp | GeometryClamp | DiscClamp | SphereClamp
 
 @dataclasses.dataclass(frozen=True)
 class AutoLightcuts(Settings):
-    """Bounded lightcuts where a method works to an error and has many lights; else none."""
+    """Bounded lightcuts where they are estimated to take less time than the sum of all lights; else none."""
 
     NAME = "auto"
+
+    error: float = setting(0.02, LARGEST_ERROR, least=1e-6, most=1.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,8 +73,7 @@ class Lightcuts(Settings):
     NAME = "bounded"
     PRINCIPAL = "error"
 
-    error: float = setting(0.02, "largest error of a receiver's sum over channels, as a share of it", least=1e-6,
-                           most=1.0)
+    error: float = setting(0.02, LARGEST_ERROR, least=1e-6, most=1.0)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,12 +13,12 @@ from refgi.provenance.record import (
     estimate_record,
     method_record,
     program,
-    sampling_record,
     scene_record,
+    stated_record,
     versions,
 )
 
 __all__ = [
     "CONTENT", "UNITS", "Job", "Record", "estimate_record", "job_of", "method_record", "plain", "program",
-    "read_record", "sampling_record", "scene_record", "versions",
+    "read_record", "scene_record", "stated_record", "versions",
 ]

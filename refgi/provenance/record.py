@@ -23,7 +23,7 @@ from refgi.scene import Scene
 from refgi.scene.placed import APPROXIMATION
 
 if TYPE_CHECKING:
-    from refgi.diagnostics import SamplingError
+    from refgi.diagnostics import LightcutsChoice, SamplingError
 
 PACKAGES = ("refgi", "numpy", "numba", "llvmlite", "scipy", "embreex", "OpenEXR", "imageio", "pillow", "matplotlib",
             "click", "rich", "pydantic", "jinja2", "flip-evaluator")
@@ -156,12 +156,12 @@ def method_record(method: str, settings: Any) -> Record:
     return {"method": method, "settings": plain(settings)}
 
 
-def sampling_record(error: "SamplingError") -> Record:
-    """Return a method's sampling error: shares of the mean indirect light, what it is of, and a statement.
+def stated_record(stated: "SamplingError | LightcutsChoice") -> Record:
+    """Return what a method says of its picture, with a statement in a line.
 
     Parameters
     ----------
-    error : SamplingError
+    stated : SamplingError or LightcutsChoice
         As a picture has it.
 
     Returns
@@ -169,7 +169,7 @@ def sampling_record(error: "SamplingError") -> Record:
     dict
         JSON values.
     """
-    return {**plain(error._asdict()), "statement": error.statement}
+    return {**plain(stated._asdict()), "statement": stated.statement}
 
 
 def estimate_record(estimate: Any, lobes: Any = None) -> Record:

@@ -95,6 +95,7 @@ class PictureRecord(_Entry):
     settings: Objects
     estimate: EstimateEntry = EstimateEntry()
     sampling_error: Objects | None = None
+    lightcuts: Objects | None = None
     path: PathEntry | None = None
     of: Count = 0
     temporal: Objects | None = None

@@ -45,6 +45,7 @@ SHADOWS = {"subsplats.visibility": "val", "subsplats.visibility.maps": 16, "ligh
            "lights.source.pattern": "halton"}
 FEW_SHADOWS = SHADOWS | {"subsplats.visibility.clusters.count": 4}
 UNCLAMPED = SHADOWS | {"pairs.clamp": None}  # as in val, whose cases these are
+FEW = "few lights are summed in full in any case"
 STRICT = "so small an error leaves no cluster of a few lights: what larger ones do is told in tests/pairs/lightcuts"
 SAME_LIST = "both ways find the same subsplats"
 
@@ -119,7 +120,8 @@ CASES = {
     "auto of paths": Case({"lights.source": "walk"}),
     "auto of roulette": Case({"lights.openness.flux": "roulette", "lights.openness.radius": 2.0}),
     "clusters": Case({"lightcuts": "bounded", "lightcuts.error": 1e-6}, same=STRICT),
-    "no clusters": Case({"lightcuts": None}, same="few lights are summed in full in any case"),
+    "no clusters": Case({"lightcuts": None}, same=FEW),
+    "clusters where they pay": Case({"lightcuts.error": 0.3}, same=FEW),
     **under("pairs", PAIR_CASES), **OCCLUSION_CASES,
 }
 # pictures of so many pixels that not all are samples of the error
@@ -315,7 +317,10 @@ def test_lightcuts_are_part_of_an_error(monkeypatch):
     keys = {"subsplats": "error", "subsplats.target": 0.05, "subsplats.coarsest": 16}
     covered = frame.gbuffer.covered
     full = multires(frame, cut(**{"subsplats.coarsest": 65536}))[:, covered]
-    monkeypatch.setattr(sys.modules["refgi.error_target.error_driven"], "MANY", 1000)
+    choice = sys.modules["refgi.pairs.lightcuts.choice"]
+    monkeypatch.setattr(choice, "LEAST_LIGHTS", 1000)
+    monkeypatch.setattr(choice, "LEAST_PAIRS", 0)
+    monkeypatch.setattr(choice, "estimated_share", lambda *_: 0.5)
     auto = Case({}).settings(MultiresSettings, {"lights.count": 3000, **keys})
     with observe() as log:
         picture = multires(frame, auto)[:, covered]
@@ -324,6 +329,23 @@ def test_lightcuts_are_part_of_an_error(monkeypatch):
     with observe() as log:
         multires(frame, cut(**keys))
     assert "pairs.lightcuts" not in {run.name for run in log.runs}
+
+
+def test_lightcuts_are_chosen_where_they_pay(monkeypatch):
+    """By an estimate alone: at subsplats the bits of those asked for by name, with an error target a share of it."""
+    choice = sys.modules["refgi.pairs.lightcuts.choice"]
+    monkeypatch.setattr(choice, "LEAST_LIGHTS", 1000)
+    monkeypatch.setattr(choice, "LEAST_PAIRS", 0)
+    monkeypatch.setattr(choice, "TILES", 1)
+    monkeypatch.setattr(choice, "estimated_share", lambda *_: 0.5)
+    case = Case({}, frame={"rsm_resolution": 64, **WIDE})
+    for subsplats, named in (("geometry", 0.3), ("error", 0.005), ("error", 0.001)):
+        keys = {"lights.count": 3000, "subsplats": subsplats} | (
+            {"subsplats.target": 0.05} if subsplats == "error" else {"subsplats.coarsest": 64})
+        own = {"lightcuts.error": named if named != 0.005 else 0.3}
+        got = multires(case.seen(), case.settings(MultiresSettings, keys | own))
+        asked = case.settings(MultiresSettings, keys | {"lightcuts": "bounded", "lightcuts.error": named})
+        np.testing.assert_array_equal(got, multires(case.seen(), asked))
 
 
 def test_lightcuts_refuse_what_they_do_not_know():

@@ -1,20 +1,25 @@
 """Wiring of `sii`: every setting reaches the picture, the counts and the ledger as the literal text has it."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from benchmarks.papers.sii.subjects import counted
 from refgi.errors import InputError
+from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import LightSettings
+from refgi.methods import METHODS
 from refgi.settings import replaced
 from refgi.splat import Receivers, SiiSettings, cut_irradiance, sii
 from refgi.splat.sii.approximations import sii_ledger
 from refgi.splat.sii.reach.fragments import fragments
+from refgi.stages import Memory, reusing
 from tests.literal.whole import sii as literal
 from tests.literal.whole.pairs import occluded_of, with_clamp
 from tests.naive import ledger
-from tests.wiring.cases import Case, needed, uncovered, under
+from tests.wiring.cases import SCENES, Case, needed, uncovered, under
 from tests.wiring.features import SII, featured
 from tests.wiring.fold import fold
 from tests.wiring.pair_cases import OCCLUSION_CASES, PAIR_CASES
@@ -36,6 +41,7 @@ RIM = MESH | {"reach.bound.inflate": False, "lights.count": 6}
 FINE = {"width": 40, "height": 30}
 CANDIDATES = "a bound finds the pixels that the threshold is tested at"
 
+FEW = "few lights are summed in full in any case"
 STRICT = "so small an error leaves no cluster of a few lights: what larger ones do is told in tests/pairs/lightcuts"
 
 REACH_CASES = {
@@ -66,6 +72,8 @@ REACH_CASES = {
 }
 CUT_CASES = {
     "clusters": Case({"lightcuts": "bounded", "lightcuts.error": 1e-6}, same=STRICT),
+    "no clusters": Case({"lightcuts": None}, same=FEW),
+    "clusters where they pay": Case({"lightcuts.error": 0.3}, same=FEW),
     "clusters at half the resolution": Case({"lightcuts": "bounded", "lightcuts.error": 1e-6},
                                             over={"half_resolution": True}, same=STRICT),
 }
@@ -176,6 +184,36 @@ def test_lightcuts_reach_the_sum(half):
         changes.append((np.abs(got - full).sum(axis=0) / np.maximum(full.sum(axis=0), 1e-300)).max())
         assert changes[-1] < error
     assert changes[0] > 2 * changes[1] > 1e-6
+
+
+@pytest.mark.parametrize("share", [0.5, 2.0])
+def test_lightcuts_are_chosen_where_they_pay(monkeypatch, share):
+    """By an estimate alone, to the bit; the picture says so, and a cut leaves them out."""
+    choice = sys.modules["refgi.pairs.lightcuts.choice"]
+    monkeypatch.setattr(choice, "LEAST_LIGHTS", 1000)
+    monkeypatch.setattr(choice, "LEAST_PAIRS", 0)
+    monkeypatch.setattr(choice, "estimated_share", lambda *_: share)
+    case, keys = Case({}, frame={"rsm_resolution": 64, **FINE}), {"lights.count": 3000, "lightcuts.error": 0.3}
+    made = METHODS["sii"].light(case.seen(), case.settings(SiiSettings, keys))
+    named = {**keys, "lightcuts": "bounded"} if share < 1 else {"lights.count": 3000, "lightcuts": None}
+    np.testing.assert_array_equal(made.irradiance, sii(case.seen(), case.settings(SiiSettings, named)))
+    stated = made.lightcuts and (made.lightcuts.error, made.lightcuts.share)
+    assert stated == ((0.3, share) if share < 1 else None)
+    cut = METHODS["sii"].light(case.seen(), case.settings(SiiSettings, {**CUT, **keys}))
+    assert cut.lightcuts is None
+    few = METHODS["sii"].light(case.seen(), case.settings(SiiSettings, {**keys, "lights.count": 999}))
+    assert few.lightcuts is None
+
+
+def test_a_tree_is_kept_while_lights_rest():
+    base = Case({}).settings(SiiSettings, {"lights.count": 300, "lightcuts": "bounded"})
+    scene, memory = SCENES["lamps"](), Memory()
+    status = []
+    for moved in (scene, scene.with_camera(eye=(0.1, *scene.camera.eye[1:])), scene.with_lights(scene.lights[0])):
+        with reusing(memory) as runs:
+            sii(Frame(moved, width=17, height=13, rsm_resolution=16), base)
+        status += [run.status for run in runs if run.name == "pairs.light_tree"]
+    assert status == ["ran", "reused", "ran"]
 
 
 def test_lightcuts_refuse_what_they_do_not_know():

@@ -67,15 +67,22 @@ def add_cuts(position: Array, normal: Array, tree: LightTree, irradiance: Array)
         the full sum's channels, at every receiver, but for rounding.
     -> None: `irradiance` holds the sums.
     """
-    order, starts = group_receivers(position, normal)
-    pairs = np.zeros(len(starts) - 1, np.int64)
-    _sum_groups(position, normal, order, starts, tree, irradiance, pairs)
-    tally("pairs", lambda: int(pairs.sum()))
+    pairs, _ = sum_groups(position, normal, *group_receivers(position, normal), tree, irradiance)
+    tally("pairs", lambda: pairs)
+
+
+def sum_groups(
+    position: Array, normal: Array, order: Array, starts: Array, tree: LightTree, irradiance: Array
+) -> tuple[int, int]:
+    """Fill irradiance (3, n), W/m^2, of receivers in groups; return how many pairs and how many bounds that took."""
+    work = np.zeros((len(starts) - 1, 2), np.int64)
+    _sum_groups(position, normal, order, starts, tree, irradiance, work)
+    return int(work[:, 0].sum()), int(work[:, 1].sum())
 
 
 @kernel(parallel=True)
 def _sum_groups(
-    position: Array, normal: Array, order: Array, starts: Array, tree: LightTree, irradiance: Array, pairs: Array
+    position: Array, normal: Array, order: Array, starts: Array, tree: LightTree, irradiance: Array, work: Array
 ) -> None:
     for g in prange(len(starts) - 1):
         first, size = starts[g], starts[g + 1] - starts[g]
@@ -84,15 +91,15 @@ def _sum_groups(
             for axis in range(3):
                 tile[X + axis, i] = position[axis, order[first + i]]
                 tile[NX + axis, i] = normal[axis, order[first + i]]
-        pairs[g] = _sum_group(tile, size, tree)
+        work[g, 0], work[g, 1] = _sum_group(tile, size, tree)
         for i in range(size):
             for c in range(3):
                 irradiance[c, order[first + i]] = tile[TOTAL + c, i]
 
 
 @kernel
-def _sum_group(tile: Array, size: int, tree: LightTree) -> int:
-    """Fill the totals of a tile's first `size` receivers; return how many pairs that took."""
+def _sum_group(tile: Array, size: int, tree: LightTree) -> tuple[int, int]:
+    """Fill the totals of a tile's first `size` receivers; return how many pairs and how many bounds that took."""
     most = tree.starts[1] + 1
     halves = Halves(np.zeros((DEPTHS + 2, 3), np.int64), np.empty((DEPTHS, most), np.int32),
                     np.empty((DEPTHS, most), np.int8), np.zeros(DEPTHS, np.int64), np.zeros(DEPTHS), np.zeros(DEPTHS))
@@ -134,7 +141,7 @@ def _sum_group(tile: Array, size: int, tree: LightTree) -> int:
             waiting = _halve(halves, waiting)
         else:
             pairs += _finish(tile, begin, end, tree, nodes, count, group, spent, allowed, kept, guess)
-    return pairs
+    return pairs, nodes.bounds[0]
 
 
 @kernel
@@ -188,7 +195,8 @@ def _finish(
     pairs, first = 0, FIRST * (allowed - spent) / max(count, LOOK)
     threshold = max(guess[0] * allowed, 0.0) if guess[0] > 0.0 else first
     copy_totals(tile, begin, end, kept)
-    count = refine(tree, nodes, count, threshold, group, 0.0)
+    if threshold >= 0.0:  # else a darker half than its group, whose share is spent
+        count = refine(tree, nodes, count, threshold, group, 0.0)
     while True:
         total = spent + sum_of_errors(nodes, count)
         if total <= allowed:
@@ -204,7 +212,7 @@ def _finish(
             kept[:], spent = 0, 0.0
             restore_totals(tile, begin, end, kept)
             count = list_top(tree, nodes, group)
-            threshold = min(threshold, allowed)
+            threshold = min(threshold, allowed) if threshold > 0.0 else FIRST * allowed / LOOK
         else:
             # the sum of bounds goes about with the root of the threshold
             share = (allowed - spent) / (total - spent)

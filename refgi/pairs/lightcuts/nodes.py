@@ -12,6 +12,8 @@ from refgi.pairs.pair_sum import COMPENSATION, GROUP, NX, SUM, TOTAL, X, pair_te
 from refgi.types import Array
 
 BATCH = 128  # nodes whose bounds are computed at a time
+# unsigned, which needs no check for places counted from the end
+NONE, ONE, TWO, THREE, FOUR = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(FAN)
 
 
 class Nodes(NamedTuple):
@@ -24,6 +26,7 @@ class Nodes(NamedTuple):
     bound: Array  # (BOUND_ROWS, BATCH) scratch
     found: Array  # (BATCH,) scratch
     opened: Array  # (BATCH / FAN,) int64 scratch
+    bounds: Array  # (1,) int64, how many were computed
 
 
 @kernel
@@ -31,7 +34,8 @@ def empty_list(tree: LightTree) -> Nodes:
     """Return memory for every node of a tree twice, which a refinement may need before it closes up."""
     count, dtype = 2 * tree.starts[-1] + FAN, tree.nodes.dtype
     return Nodes(np.empty(count, np.int32), np.empty(count, np.int8), np.empty(count, dtype), np.empty(count, dtype),
-                 np.zeros((BOUND_ROWS, BATCH), dtype), np.zeros(BATCH, dtype), np.empty(BATCH // FAN, np.int64))
+                 np.zeros((BOUND_ROWS, BATCH), dtype), np.zeros(BATCH, dtype), np.empty(BATCH // FAN, np.int64),
+                 np.zeros(1, np.int64))
 
 
 @kernel
@@ -49,15 +53,17 @@ def list_top(tree: LightTree, nodes: Nodes, group: Array) -> int:
 def evaluate(tree: LightTree, nodes: Nodes, count: int, group: Array) -> None:
     """Compute the bounds of the first `count` nodes for a group of receivers, of `bound_group`."""
     zero = tree.nodes.dtype.type(0.0)
+    nodes.bounds[0] += count
     for first in range(0, count, BATCH):
         last = min(first + BATCH, count)
         for i in range(first, last):
             level = np.int64(nodes.level[i])
             if level > 0:
-                place = np.int64(nodes.node[i]) - tree.starts[level]
-                block = block_of(tree.starts, level, place // FAN)
-                for row in range(BOUND_ROWS):
-                    nodes.bound[row, i - first] = tree.bounds[block, row, place % FAN]
+                place = np.uint64(np.int64(nodes.node[i]) - tree.starts[level])
+                block, child = np.uint64(block_of(tree.starts, level, np.int64(place // FOUR))), place % FOUR
+                lane = np.uint64(i - first)
+                for row in range(np.uint64(BOUND_ROWS)):
+                    nodes.bound[row, lane] = tree.bounds[block, row, child]
         fill_errors(nodes.bound, last - first, group, tree.least, tree.most, nodes.found)
         for i in range(first, last):
             nodes.error[i] = nodes.found[i - first] if nodes.level[i] > 0 else zero
@@ -80,6 +86,7 @@ def refine(tree: LightTree, nodes: Nodes, count: int, threshold: float, group: A
         for t in range(taken):
             _load_children(tree, nodes, t)
         fill_errors(nodes.bound, taken * FAN, group, tree.least, tree.most, nodes.found)
+        nodes.bounds[0] += taken * FAN
         for t in range(taken):
             size = _append_children(tree, nodes, t, size)
     return _close_up(nodes, size)
@@ -105,11 +112,13 @@ def _load_children(tree: LightTree, nodes: Nodes, t: int) -> None:
     i = nodes.opened[t]
     level = np.int64(nodes.level[i])
     if level > 1:
-        block = tree.bounds[block_of(tree.starts, level - 1, np.int64(nodes.node[i]) - tree.starts[level])]
-        first = np.uint64(FAN * t)  # unsigned, which needs no check for places counted from the end
-        for row in range(np.uint64(BOUND_ROWS)):
-            for k in range(np.uint64(FAN)):
-                nodes.bound[row, first + k] = block[row, k]
+        block = np.uint64(block_of(tree.starts, level - 1, np.int64(nodes.node[i]) - tree.starts[level]))
+        first = np.uint64(FAN * t)
+        for row in range(np.uint64(BOUND_ROWS)):  # all read before any is written: four lanes at once
+            p, q = tree.bounds[block, row, NONE], tree.bounds[block, row, ONE]
+            r, s = tree.bounds[block, row, TWO], tree.bounds[block, row, THREE]
+            nodes.bound[row, first], nodes.bound[row, first + ONE] = p, q
+            nodes.bound[row, first + TWO], nodes.bound[row, first + THREE] = r, s
 
 
 @kernel
@@ -119,15 +128,13 @@ def _append_children(tree: LightTree, nodes: Nodes, t: int, size: int) -> int:
     i = nodes.opened[t]
     level = np.int64(nodes.level[i])
     first = tree.starts[level - 1] + FAN * (np.int64(nodes.node[i]) - tree.starts[level])
-    last = min(first + FAN, tree.starts[level])
     nodes.node[i] = -1
-    for k in range(first, last):
-        child = FAN * t + k - first
-        nodes.node[size], nodes.level[size] = k, level - 1
-        nodes.error[size] = nodes.found[child] if level > 1 else zero
-        nodes.radius[size] = nodes.bound[RADIUS, child] if level > 1 else zero
-        size += 1
-    return size
+    at, child = np.uint64(size), np.uint64(FAN * t)
+    for k in range(np.uint64(FAN)):  # beyond the last one too, where the next node's children go
+        nodes.node[at + k], nodes.level[at + k] = first + np.int64(k), level - 1
+        nodes.error[at + k] = nodes.found[child + k] if level > 1 else zero
+        nodes.radius[at + k] = nodes.bound[RADIUS, child + k] if level > 1 else zero
+    return int(size + min(FAN, tree.starts[level] - first))
 
 
 @kernel
@@ -163,18 +170,28 @@ def add_nodes(tile: Array, begin: int, end: int, tree: LightTree, chosen: Array,
     `begin` is a multiple of LANES; rows SUM hold zeros before.
     """
     start, stop = np.uint64(begin), np.uint64((end + LANES - 1) // LANES * LANES)
-    black = len(tree.nodes) - 1
     for group in range(0, count, GROUP):
         last = min(group + GROUP, count)
-        for pair in range(group, last, 2):
-            a, b = np.int64(chosen[pair]), np.int64(chosen[pair + 1]) if pair + 1 < last else black
+        for four in range(group, last, 4):
+            a, b = _nth(tree, chosen, four, last), _nth(tree, chosen, four + 1, last)
+            c, d = _nth(tree, chosen, four + 2, last), _nth(tree, chosen, four + 3, last)
+            nodes = _load(tree.nodes, a), _load(tree.nodes, b), _load(tree.nodes, c), _load(tree.nodes, d)
             if tree.clamped:
-                limits_a = tree.least, tree.nodes[a, SOFT], tree.most
-                limits_b = tree.least, tree.nodes[b, SOFT], tree.most
-                _add_two(tile, start, stop, _load(tree.nodes, a), _load(tree.nodes, b), limits_a, limits_b)
+                _add_four(tile, start, stop, nodes, (_limits(tree, a), _limits(tree, b), _limits(tree, c),
+                                                     _limits(tree, d)))
             else:
-                _add_two(tile, start, stop, _load(tree.nodes, a), _load(tree.nodes, b), None, None)
+                _add_four(tile, start, stop, nodes, (None, None, None, None))
         _close(tile, start, stop)
+
+
+@kernel
+def _nth(tree: LightTree, chosen: Array, i: int, last: int) -> Any:
+    return np.int64(chosen[i]) if i < last else len(tree.nodes) - 1
+
+
+@kernel
+def _limits(tree: LightTree, k: int) -> Any:
+    return tree.least, tree.nodes[k, SOFT], tree.most
 
 
 @kernel
@@ -184,14 +201,16 @@ def _load(nodes: Array, k: Any) -> Any:
 
 
 @kernel
-def _add_two(tile: Array, start: Any, stop: Any, one: Any, two: Any, limits_a: Any, limits_b: Any) -> None:
+def _add_four(tile: Array, start: Any, stop: Any, nodes: Any, limits: Any) -> None:
+    one, two, three, four = nodes
     for i in range(start, stop):
         receiver = tile[X, i], tile[X + 1, i], tile[X + 2, i], tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
-        g1, g2 = pair_term(one, receiver, limits_a), pair_term(two, receiver, limits_b)
+        g1, g2 = pair_term(one, receiver, limits[0]), pair_term(two, receiver, limits[1])
+        g3, g4 = pair_term(three, receiver, limits[2]), pair_term(four, receiver, limits[3])
         # Eq. (2)
-        tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6]
-        tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7]
-        tile[SUM + 2, i] = tile[SUM + 2, i] + g1 * one[8] + g2 * two[8]
+        tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6] + g3 * three[6] + g4 * four[6]
+        tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7] + g3 * three[7] + g4 * four[7]
+        tile[SUM + 2, i] = tile[SUM + 2, i] + g1 * one[8] + g2 * two[8] + g3 * three[8] + g4 * four[8]
 
 
 @kernel

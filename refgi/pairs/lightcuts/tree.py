@@ -23,7 +23,6 @@ import numpy as np
 
 from refgi.jit import kernel, prange
 from refgi.pairs.pair_sum import Clamp
-from refgi.stages import stage
 from refgi.types import Array
 
 NORMALS = 0.3  # of the width of the scene: what normals that differ by 1 count as
@@ -138,13 +137,10 @@ class LightTree(NamedTuple):
     error: float  # of a receiver's sum over channels, as a share of it
 
 
-@stage("pairs.light_tree")
 def light_tree(lights: Array, clamp: Clamp | None, error: float) -> LightTree:
-    """Build the light tree of packed diffuse lights.
+    """Build the light tree of packed lights (9, M + 1): position, reversed normal, flux / pi >= 0; the last is black.
 
-    lights (9, M + 1): Packed lights: position, reversed normal, flux / pi >= 0; the last one is black.
-    error: Largest error of a sum.
-    -> LightTree: Of as many levels as leave at most FAN nodes on the highest.
+    It has as many levels as leave at most FAN nodes on the highest; `error` is the largest of a sum.
     """
     count = lights.shape[1] - 1
     starts = level_starts(count)

@@ -15,6 +15,7 @@ from refgi.lights.settings import (
     OPENNESS,
     RSM_RESOLUTION,
     VISIBILITY,
+    most_lights,
     without_clamp,
 )
 from refgi.method import Approximation
@@ -52,8 +53,9 @@ def _every_pixel(settings: MultiresSettings, _: Mapping[str, Any]) -> MultiresSe
     return dataclasses.replace(settings, subsplats=subsplats)
 
 
-def _every_pair(settings: MultiresSettings, _: Mapping[str, Any]) -> MultiresSettings:
-    return dataclasses.replace(settings, lightcuts=None) if settings.bounded is not None else settings
+def _every_pair(settings: MultiresSettings, options: Mapping[str, Any]) -> MultiresSettings:
+    many = settings.may_cluster(most_lights(settings.lights, 1, options["rsm_resolution"] ** 2))
+    return dataclasses.replace(settings, lightcuts=None) if many else settings
 
 
 def _undarkened(settings: MultiresSettings, _: Mapping[str, Any]) -> MultiresSettings:

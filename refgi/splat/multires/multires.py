@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from refgi.cluster.val import extra_bytes as bytes_of_shadows
-from refgi.error_target.error_driven import MANY, clusters, error_driven
+from refgi.error_target.error_driven import error_driven
 from refgi.error_target.grid import Subsplats, top_level
 from refgi.error_target.near import PixelSum, shadowed_by_clusters
 from refgi.jit import most_threads
@@ -16,6 +16,7 @@ from refgi.lights.settings import MapLights, most_lights
 from refgi.method import Extent
 from refgi.pairs.estimates import report_sampling, thinned, warn_of_clamp
 from refgi.pairs.irradiance import Receivers
+from refgi.pairs.lightcuts.choice import for_lights
 from refgi.pairs.lightcuts.tree import tree_bytes
 from refgi.splat.multires.light_lists.per_light import per_light
 from refgi.splat.multires.refinement.criteria import discontinuities
@@ -72,8 +73,8 @@ def _irradiance(
     printed: dict[str, bool] = {"filter_all": "ams_filter_all" in settings.as_published,
                                 "corner_rule": "ams_all_corners" not in settings.as_published}
     _resolve_channels(buffer, subsplats)
-    few = isinstance(subsplats, ByError) and subsplats.visibility is None and clusters(lights, settings.lightcuts)
-    some = thinned(lights, footprint) if few or settings.bounded is not None else (lights, footprint)
+    many = settings.may_cluster(lights.flux.shape[1])
+    some = thinned(lights, footprint) if many else (lights, footprint)
     seen = frame.gbuffer  # its pixels are those of the frame's albedo and direct light, also where `buffer` is finer
     receivers = Receivers(seen.position, seen.normal, seen.covered)
     warn_of_clamp(receivers, some[0], pairs, some[1], "multires")
@@ -148,7 +149,8 @@ def _evaluated(
         values = evaluate_shadowed(frame, buffer, shared, lights, settings.shadows, footprint)
     else:
         points = representative_points(buffer, shared, subsplats.representative)
-        values = evaluate(*points, lights, settings.effective_pairs, footprint, settings.bounded)
+        values = evaluate(*points, lights, settings.effective_pairs, footprint,
+                          for_lights(settings.lightcuts, lights))
     if "ams_rho_in_splat" in settings.as_published:
         values = values * buffer.albedo.reshape(3, -1)[:, shared.pixel]
     return values
@@ -201,7 +203,5 @@ def extra_bytes(settings: MultiresSettings, extent: Extent) -> int:
     Rather too many than too few: as if every pixel were a subsplat.
     """
     count = most_lights(settings.lights, extent.maps, extent.texels)
-    by_error = (isinstance(settings.subsplats, ByError) and settings.visibility is None
-                and settings.lightcuts is not None and count >= MANY)
-    cuts = tree_bytes(count, extent.float_bytes, most_threads()) if settings.bounded is not None or by_error else 0
+    cuts = tree_bytes(count, extent.float_bytes, most_threads()) if settings.may_cluster(count) else 0
     return cuts + (0 if settings.shadows is None else bytes_of_shadows(settings.shadows, extent))

@@ -11,7 +11,15 @@ from refgi.cluster.settings import ClusteredShadows, ValSettings
 from refgi.error_target.settings import LEAST_TARGET, MOST_CELLS, ErrorTarget
 from refgi.errors import expect
 from refgi.lights.settings import OCCLUSION, LightSettings, MapLights, Openness, clamped_pairs, expect_footprints
-from refgi.pairs.settings import AutoClamp, AutoLightcuts, DiscClamp, Lightcuts, PairSettings, SphereClamp
+from refgi.pairs.settings import (
+    LEAST_LIGHTS,
+    AutoClamp,
+    AutoLightcuts,
+    DiscClamp,
+    Lightcuts,
+    PairSettings,
+    SphereClamp,
+)
 from refgi.scene.values import BRIGHTEST
 from refgi.settings import Settings, of, setting
 
@@ -197,7 +205,7 @@ class MultiresSettings(Settings):
     supersampled: bool = setting(False, "rendered at twice the width and height (Sec. 4)")
     as_published: frozenset[str] = setting(frozenset(), "forms of the method to use as printed", study=True)
     lightcuts: AutoLightcuts | Lightcuts | None = setting(
-        AutoLightcuts(), "diffuse lights are summed by clusters, to an error; auto: with subsplats 'error' and many")
+        AutoLightcuts(), "diffuse lights are summed by clusters, to an error; auto: where that pays")
     ambient_occlusion: Openness | None = setting(None, OCCLUSION)
 
     def check(self) -> None:
@@ -229,10 +237,11 @@ class MultiresSettings(Settings):
                f"no {' or '.join(wrong)} with the clamp {chosen!r}, subsplats {self.subsplats.name()!r} and the "
                f"upsampling {getattr(self.subsplats, 'upsampling', None)!r}", sorted(self.as_published))
 
-    @property
-    def bounded(self) -> Lightcuts | None:
-        """The lightcuts that were asked for by name, if any."""
-        return self.lightcuts if isinstance(self.lightcuts, Lightcuts) else None
+    def may_cluster(self, count: int) -> bool:
+        """Return whether so many lights may be summed by clusters."""
+        own = isinstance(self.subsplats, ByIrradiance) or self.visibility is not None
+        many = isinstance(self.lightcuts, Lightcuts) or count >= LEAST_LIGHTS
+        return self.lightcuts is not None and not own and many
 
     @property
     def traces_rays(self) -> bool:
@@ -267,4 +276,4 @@ class MultiresSettings(Settings):
 
 # Sec. 3.3, 4, 5.2 and Fig. 11 a: pictures of 2048^2 shown at 1024^2, all diagonal neighbours, lists pass by pass
 PRESETS = {"paper": of(MultiresSettings, lights=256, pattern="grid", coarsest=16, normal_threshold=0.25,
-                       diagonal="literal", traversal="list", supersampled=True)}
+                       diagonal="literal", traversal="list", supersampled=True, lightcuts=None)}

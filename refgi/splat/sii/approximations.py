@@ -14,12 +14,13 @@ from refgi.lights.settings import (
     RSM_RESOLUTION,
     VISIBILITY,
     every_light,
+    most_lights,
     with_clamp,
 )
 from refgi.method import Approximation
 from refgi.pairs.irradiance import Receivers
 from refgi.settings import replaced
-from refgi.splat.sii.settings import MeshBound, SiiSettings
+from refgi.splat.sii.settings import MeshBound, SiiSettings, may_cluster
 from refgi.splat.sii.sii import cut_irradiance, sii
 from refgi.stages import stage
 from refgi.types import Array
@@ -51,8 +52,10 @@ def _full_precision(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
     return dataclasses.replace(settings, quantisation="none")
 
 
-def _every_pair(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
-    return dataclasses.replace(settings, lightcuts=None)
+def _every_pair(settings: SiiSettings, options: Mapping[str, Any]) -> SiiSettings:
+    texels = options["rsm_resolution"] ** 2
+    many = may_cluster(settings, most_lights(settings.lights, 1, texels))
+    return dataclasses.replace(settings, lightcuts=None) if many else settings
 
 
 APPROXIMATIONS = (

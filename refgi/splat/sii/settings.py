@@ -19,7 +19,15 @@ from refgi.lights.settings import (
 )
 from refgi.method import Extent
 from refgi.pairs.lightcuts.tree import tree_bytes
-from refgi.pairs.settings import LAST_SEED, GeometryClamp, Lightcuts, PairSettings, SphereClamp
+from refgi.pairs.settings import (
+    LAST_SEED,
+    LEAST_LIGHTS,
+    AutoLightcuts,
+    GeometryClamp,
+    Lightcuts,
+    PairSettings,
+    SphereClamp,
+)
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
 
@@ -121,7 +129,8 @@ class SiiSettings(Settings):
     pairs: PairSettings = setting(PairSettings(), "how one light lights one receiver")
     reach: ReachSettings = setting(ReachSettings(), "how far a light reaches")
     half_resolution: bool = setting(False, "evaluate one pixel of 2 x 2 and upsample by a joint bilateral filter")
-    lightcuts: Lightcuts | None = setting(None, "diffuse lights are summed by clusters, to an error")
+    lightcuts: AutoLightcuts | Lightcuts | None = setting(
+        AutoLightcuts(), "diffuse lights are summed by clusters, to an error; auto: where that pays")
     quantisation: Literal["none", "published"] = setting(
         "none", "half floats and 8 bits of the published textures of lights and receivers", study=True)
     compensation: Literal["none", "screen"] = setting(
@@ -131,9 +140,10 @@ class SiiSettings(Settings):
     def check(self) -> None:
         """Check what fields ask of each other."""
         expect_footprints(self.lights, self.pairs)
-        expect(self.lightcuts is None or self.reach.cut is None, "reach.cut", "none with lightcuts", self.reach.cut
+        bounded = isinstance(self.lightcuts, Lightcuts)
+        expect(not bounded or self.reach.cut is None, "reach.cut", "none with lightcuts", self.reach.cut
                and self.reach.cut.name())
-        expect(self.lightcuts is None or not isinstance(self.pairs.clamp, SphereClamp), "pairs.clamp",
+        expect(not bounded or not isinstance(self.pairs.clamp, SphereClamp), "pairs.clamp",
                "another one with lightcuts, which bound no spheres", "sphere")
         expect(self.compensation == "none" or isinstance(self.pairs.clamp, GeometryClamp), "compensation",
                "none without the clamp 'geometry'", self.compensation)
@@ -153,11 +163,16 @@ class SiiSettings(Settings):
 
 def extra_bytes(settings: SiiSettings, extent: Extent) -> int:
     """Estimate the bytes that lightcuts add to a picture, rather too many than too few."""
-    if settings.lightcuts is None:
-        return 0
-    return tree_bytes(most_lights(settings.lights, extent.maps, extent.texels), extent.float_bytes, most_threads())
+    count = most_lights(settings.lights, extent.maps, extent.texels)
+    return tree_bytes(count, extent.float_bytes, most_threads()) if may_cluster(settings, count) else 0
+
+
+def may_cluster(settings: SiiSettings, count: int) -> bool:
+    """Return whether so many lights may be summed by clusters."""
+    many = isinstance(settings.lightcuts, Lightcuts) or count >= LEAST_LIGHTS
+    return settings.lightcuts is not None and settings.reach.cut is None and many
 
 
 # 768 lights by a filtered look-up of the flux (Sec. 4), a cut of 5 % (Fig. 12), the ellipsoids of the appendix
 PRESETS = {"paper": SiiSettings(lights=LightSettings(source=MapLights(filtered=True)), pairs=PairSettings(clamp=None),
-                                reach=ReachSettings(cut=RelativeCut(), bound=EllipsoidBound()))}
+                                reach=ReachSettings(cut=RelativeCut(), bound=EllipsoidBound()), lightcuts=None)}

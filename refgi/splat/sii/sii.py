@@ -8,6 +8,7 @@ the same to the bit for every bound. `cut_irradiance` sums what the cut removes.
 Symbols: B = I(w) / r^2 (W/m^2), the irradiance a light causes at most, I_low the threshold (W/m^2).
 """
 
+import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,7 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import with_clamp
 from refgi.pairs.estimates import report_sampling, thinned, warn_of_clamp
 from refgi.pairs.irradiance import Receivers, checked, irradiance, over_receivers
+from refgi.pairs.lightcuts.choice import for_lights
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.ranged_sum import LANES, sum_pairs_in_range, sum_weighted_pairs
 from refgi.pairs.settings import GeometryClamp
@@ -56,6 +58,8 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))  # Sec. 3.2: deferred shading
     receivers, lights = as_stored(receivers, lights, settings)  # Sec. 4
 
+    cuts = for_lights(settings.lightcuts, lights) if settings.reach.cut is None else None
+    settings = dataclasses.replace(settings, lightcuts=cuts)
     resolved = with_reference_length(receivers, lights, settings)
 
     def evaluate(points: Receivers) -> Array:

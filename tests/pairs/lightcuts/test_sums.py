@@ -85,6 +85,18 @@ def test_the_cut_of_the_twin(name):
         assert np.abs(got[:, lane] - full).sum() <= 0.05 * full.sum() + 1e-12
 
 
+def test_halves_of_a_group_that_spent_its_error():
+    """Many clusters that are accepted one by one may be off by more than all are allowed; halves then begin anew."""
+    lights, area, points = scene("cube", 40000, 256)
+    lights.position[:] *= 4.0
+    lights.flux[:] = 1.0
+    points.position[:] = 0.5 + np.array([0.08, 0.0, 0.08])[:, None, None] * points.position
+    points.normal[:] = [[[0.0]], [[1.0]], [[0.0]]]
+    pairs = PairSettings(clamp=CLAMPS["disc"])
+    full = irradiance(points, lights, pairs, 0.1 * area)
+    assert off_by(irradiance(points, lights, pairs, 0.1 * area, Lightcuts(0.05)), full) <= 0.05
+
+
 def test_same_bits_for_all_threads_and_reruns():
     lights, area, points = scene("ball", 5000, 3000)
     found = []

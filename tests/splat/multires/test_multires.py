@@ -302,7 +302,7 @@ def test_shadows_say_what_they_take():
 def test_printed_values_are_a_preset():
     paper = PRESETS["paper"]
     assert changed(paper) == {"subsplats.criteria.diagonal": "literal", "subsplats.criteria.traversal": "list",
-                              "supersampled": True}
+                              "supersampled": True, "lightcuts": None}
     assert (paper.lights.count, paper.subsplats.coarsest, paper.subsplats.criteria.normal.threshold) == (256, 16, 0.25)
 
 

@@ -227,7 +227,8 @@ def test_settings_are_checked():
 def test_preset_of_the_paper_is_its_printed_values(box):
     """Sec. 4 and Fig. 12: 768 lights with filtered flux, cut at 5 %; the default cuts nothing."""
     paper = METHOD.preset("paper")
-    assert paper == of(SiiSettings, lights=768, filtered=True, cut_share=0.05, bound="ellipsoid", clamp="none")
+    assert paper == of(SiiSettings, lights=768, filtered=True, cut_share=0.05, bound="ellipsoid", clamp="none",
+                       lightcuts=None)
     by_hand = sii(box, of(SiiSettings, filtered=True, cut_share=0.05, bound="full", clamp="none"))
     np.testing.assert_array_equal(sii(box, paper), by_hand)
     assert METHOD.preset("default").reach.cut is None

@@ -16,7 +16,7 @@ from refgi.error_target.grid import Subsplats
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import PAIRS_AT_ONCE, Receivers, add_lights, checked
 from refgi.pairs.pair_sum import TILE
-from refgi.pairs.settings import Lightcuts, PairSettings
+from refgi.pairs.settings import AutoLightcuts, Lightcuts, PairSettings
 from refgi.pairs.shadow_rays import RayReceivers, receivers, shadowed_sum
 from refgi.pairs.tiles import taken
 from refgi.scene import Geometry
@@ -60,13 +60,13 @@ def points_of(
 @stage("multires.evaluate", steps="refgi.splat.multires.subsplats.steps.evaluate_steps")
 def evaluate(
     points: Array, normals: Array, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None,
-    lightcuts: Lightcuts | None = None,
+    lightcuts: AutoLightcuts | Lightcuts | None = None,
 ) -> Array:
     """Sum the irradiance of every pixel light at some points (Eq. 2).
 
     points (3, n): World space, m; neighbours should follow each other.
     normals (3, n): Unit normals there.
-    lightcuts: Sum diffuse lights by clusters, to an error.
+    lightcuts: Sum diffuse lights by clusters, to an error; "auto": where that is estimated to take less time.
     -> (3, n): Irradiance, W/m^2, linear RGB: that of `irradiance` at the same points, to the bit; with lightcuts within
         their error.
 
@@ -85,7 +85,7 @@ def evaluate(
 
 def sum_at(
     points: Array, normals: Array, lights: "PixelLights", settings: PairSettings, footprint: Array | None = None,
-    lightcuts: Lightcuts | None = None,
+    lightcuts: AutoLightcuts | Lightcuts | None = None,
 ) -> Array:
     """Return the sum of `evaluate`."""
     count = points.shape[1]

@@ -122,6 +122,7 @@ def warn_of_cut(
 
 
 PAPER_OVERDRAW, PAPER_LIGHTS, PAPER_CUT = 125.0, 768, 0.05  # Figure 8
+BITS = 44  # of a float64, below its exponent and 8 bits
 LEAST_SAMPLED = 64  # pixels, enough to count pairs by; of more lights than go with them every n-th is tested
 LONGEST = 10.0  # diagonals of the sample: where not even that leaves as many pairs, next to nothing is cut
 
@@ -197,10 +198,23 @@ def picture_length(receivers: Receivers, lights: "PixelLights", pairs: PairSetti
         return 1.0
     counted = round(PAPER_OVERDRAW / PAPER_LIGHTS * lights.drawn / step * position.shape[1])
     length = LONGEST * math.hypot(*np.ptp(np.concatenate([position, lights.position], axis=1), axis=1))
-    positive = strength[strength > 0]  # partition takes long over equal numbers
-    if 0 < counted <= len(positive):
-        length = min(length, math.sqrt(PAPER_CUT / float(np.partition(positive, -counted)[-counted])))
+    if 0 < counted <= np.count_nonzero(strength):
+        length = min(length, math.sqrt(PAPER_CUT / nth_largest(strength.reshape(-1), counted)))
     return min(max(length, 1 / LARGEST), LARGEST)
+
+
+def nth_largest(values: Array, n: int) -> float:
+    """Return the n-th largest of values (m,) >= 0, float64: bits of such numbers are ordered as they are.
+
+    >>> nth_largest(np.array([0.0, 3.0, 2.0, 3.0]), 3)
+    2.0
+    """
+    leading = values.view(np.int64) >> BITS
+    from_above = np.cumsum(np.bincount(leading)[::-1])
+    place = int(np.searchsorted(from_above, n))
+    among = values[leading == len(from_above) - 1 - place]
+    n -= int(from_above[place - 1]) if place else 0
+    return float(np.partition(among, -n)[-n])
 
 
 def strengths(packed: Packed, position: Array, step: int) -> Array:

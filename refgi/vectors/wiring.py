@@ -53,7 +53,7 @@ def wirings(case: Case, step: Stage, known: Arrays) -> Iterator[Bug]:
 def _one_by_one(
     case: Case, step: Stage, known: Arrays, fits: Fits, several: set[str]
 ) -> Iterator[tuple[str, Arrays]]:
-    """Yield causes, and the array that takes an input's place: first those of its kind, also such as are made later.
+    """Yield causes, and the array that takes an input's place: first its kind, also what is made later; then its field.
 
     Of kinds that the stage reads `several` of, causes say which.
     """
@@ -63,7 +63,8 @@ def _one_by_one(
     for name in step.reads:
         kind = kind_of(name)
         alike = [other for other in (*before, *after) if kind_of(other) == kind and other != name]
-        for other in (*alike, *(one for one in before if kind_of(one) != kind)):
+        others = sorted((one for one in before if kind_of(one) != kind), key=lambda one: _leaf(one) != _leaf(name))
+        for other in (*alike, *others):
             read = [known[other]] if _leaf(other) != _leaf(name) else _read_by(known[other], known[name].shape)
             cause = f"{name} is bound to {other}" if kind in several and other in alike else _cause(name, other)
             for wrong, how in zip(read, ("", ", by its index"), strict=False):

@@ -8,7 +8,8 @@ decision (an edge, a tie) the element is masked: it may differ at will.
 
 Tier T2 has the same for storage in half floats, as one bound for the array and a share of outliers; tier T2B for 8 bits
 where values have no unit and lie in [0, 1] or [-1, 1] (normals, albedo, shares), half floats elsewhere. Bounds of a
-chained run, in which every stage reads the roundings of those before, are of that form too. Where more than MOST_SPARED
+chained run, in which every stage reads the roundings of those before, in float32 or in half floats, are of that form
+too. Where more than MOST_SPARED
 of an array would be outliers, further runs find which elements they are: those are masked, and outliers are what a run
 has beside them.
 
@@ -32,6 +33,8 @@ MOST_SPARED = 0.05  # share of an array that may be beyond its bounds: with more
 ROUNDING = 2.0**-24  # of float32, relative
 HALF_ROUNDING = 2.0**-11  # of float16
 BYTE, SIGNED_BYTE = 1 / 255, 1 / 127  # steps of [0, 1] and [-1, 1] in 8 bits
+TYPICAL = 0.5  # quantile of an array's relative changes: an element that a few runs hardly move has been lucky
+LARGEST = 2.0  # times the largest change that runs have shown, where none is an outlier: one more run may have more
 CHANGE = 2.0  # roundings that inputs are changed by, at most
 FLUSHED = 2.0**-126  # smaller numbers are subnormal in float32: many machines flush them to 0
 BELOW_1 = 1.0 - 2.0**-24  # sample points stay in [0, 1)
@@ -108,25 +111,33 @@ def byte_step(case: Case, name: str, array: Array) -> float:
     return BYTE if array.min(initial=0.0) >= 0.0 else SIGNED_BYTE
 
 
-def chained_budgets(case: Case, known: Arrays, seed: int) -> dict[str, Budget]:
+def chained_budgets(case: Case, known: Arrays, seed: int, *, in_halves: bool = False) -> dict[str, Budget]:
     """Return the budget of each array when every stage reads the rounded outputs of those before it.
 
-    Every other run is in float32, whose roundings within a stage are more than those of what it reads.
+    Every other run is in float32, whose roundings within a stage are more than those of what it reads. `in_halves`: all
+    that stages write is stored in half floats but for what one takes as exact.
     """
+    exact = {name for step in case.stages for name in step.exact}
+    halved = {name for step in case.stages for name in step.writes if in_halves and name not in exact}
+    rounding = {name: HALF_ROUNDING / CHANGE for name in halved}
+
     def run(number: int) -> dict[str, Array]:
         random, real = np.random.default_rng([seed, number]), np.float32 if number % 2 else np.float64
         chain = {name: stored(array) for name, array in case.given.items()}
         for step in case.stages:
             if not is_estimate(case, step):
-                changed = {name: array if name in step.exact else _rounded_at_random(name, array, random)
-                           for name, array in as_read(chain, step.reads, real).items()}
-                chain.update(_run(step, changed, real))
+                changed = {name: array if name in step.exact else _rounded_at_random(
+                    name, array, random, rounding.get(name, ROUNDING))
+                    for name, array in as_read(chain, step.reads, real).items()}
+                chain.update({name: _to_half(array) if name in halved else array
+                              for name, array in _run(step, changed, real).items()})
         return chain
 
     estimates = {name for step in case.stages if is_estimate(case, step) for name in step.writes}
     written = [name for step in case.stages for name in step.writes if name not in estimates]
     return dict.fromkeys(estimates, NO_BUDGET) | _budgets(
-        {name: Measures(known[name], ROUNDING, _large(case, name, known[name]), DECIDED) for name in written}, run)
+        {name: Measures(known[name], HALF_ROUNDING if name in halved else ROUNDING, _large(case, name, known[name]),
+                        DECIDED) for name in written}, run)
 
 
 def is_estimate(case: Case, step: Stage) -> bool:
@@ -189,7 +200,12 @@ def _bound(expected: Array, runs: list[Array], large: float) -> Bound:
         return Bound(np.zeros(expected.shape, np.float32), off > 0)
     magnitude = np.where(np.isfinite(expected), np.abs(expected), 0.0).astype(np.float64)
     masked = off > np.maximum(DECIDED * large, DECIDED * magnitude)
-    limit = SAFETY * (off + ROUNDING * (magnitude + large)) + FLUSHED
+    size = magnitude + large
+    moved = (off > 0) & ~masked & (magnitude > 0)
+    if moved.any():
+        typical = float(np.quantile(off[moved] / size[moved], TYPICAL))
+        off = np.where(moved, np.maximum(off, typical * size), off)
+    limit = SAFETY * (off + ROUNDING * size) + FLUSHED
     return Bound(np.where(masked, 0.0, limit).astype(np.float32), masked)
 
 
@@ -230,6 +246,8 @@ def _budget(measures: Measures, runs: list[Array]) -> Budget:
         usual = share[share < decided]
         budget = Budget(SAFETY * (rounding + (float(np.quantile(usual, USUAL)) if usual.size else 0.0)), large, 0.0)
     worst = max(int(np.count_nonzero(one)) for one in _beyond(expected, same, budget))
+    if not worst and budget.relative:
+        budget = budget._replace(relative=max(budget.relative, LARGEST * float(usual.max(initial=0.0))))
     return budget._replace(outliers=_allowed(worst, expected.size))
 
 

@@ -329,7 +329,10 @@ def _of_array(port: Port, name: str, arrays: Mapping[str, Array], tier: str) -> 
         return _judged_estimate(kit, case, name, arrays, expected)
     tolerance = entry.chained if asked.chained else None
     masks = {entry.masked, None if tolerance is None else tolerance.masked}
-    few_bits = {"T2": entry.half, "T2B": entry.bytes}.get(tier)
+    if name in port.halved:
+        tolerance = entry.chained_half
+        masks.add(None if tolerance is None else tolerance.masked)
+    few_bits = {"T2": None if asked.chained else entry.half, "T2B": entry.bytes}.get(tier)
     if few_bits is not None:
         outliers = max(few_bits.outliers, 0.0 if tolerance is None else tolerance.outliers)
         tolerance = few_bits.model_copy(update={"outliers": outliers})

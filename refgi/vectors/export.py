@@ -46,10 +46,6 @@ WIRING_TOLD_BY, WIRING_BESIDE = 20, 6  # the same of wrong wirings, of which the
 PARTS = 2  # of the bytes of an array that it takes with its bounds
 TOLD_IN = 3  # cases of a method that tell a likely bug: it is tried in no further ones
 WIRING_TRIED = 2  # cases of a method in which a wrong wiring is tried; in no further ones once it is told
-ISOLATED = "float32 runs and 4 float64 runs on inputs changed by up to 2 roundings of float32, x 4; plus rounding"
-CHAINED = "2 float64 and 2 float32 runs, the inputs of every stage changed by up to 2 roundings of float32, x 4"
-HALF = "4 float64 runs on inputs rounded to float16 at random, results in float16, x 4"
-BYTES = "the same in 8 bits, where numbers without unit lie in [0, 1] or [-1, 1]"
 Tell = Callable[[str, float], None]
 
 
@@ -202,7 +198,7 @@ def write_case(case: Case, folder: Path, told: _Told, tell: Tell) -> CaseManifes
     known = expected_of(case)
     arrays = {name: _entry(case, name, known[name], _save(home, f"in/{name}.npy", known[name])) for name in case.given}
     tell("", 0.0)
-    chained = chained_budgets(case, known, SEED)
+    chained, chained_half = (chained_budgets(case, known, SEED, in_halves=one) for one in (False, True))
     stages, bugs = [], BugWriter()
     for number, step in enumerate(case.stages):
         tell(step.name, number / len(case.stages))
@@ -211,8 +207,8 @@ def write_case(case: Case, folder: Path, told: _Told, tell: Tell) -> CaseManifes
         for name in step.writes:
             entry = _entry(case, name, known[name], _save(home, f"out/{name}.npy", known[name]))
             arrays[name] = entry.model_copy(update=_tolerances(home, name, entry, bounds[name], {
-                "chained": (chained[name], CHAINED), "half": (halves[name], HALF),
-                "bytes": (in_bytes[name], BYTES)}))
+                "chained": chained[name], "half": halves[name], "bytes": in_bytes[name],
+                "chained_half": chained_half[name]}))
         for bug in step.bugs:
             if not told.enough(case.method, step.name, bug.cause):
                 blind = _keep_bug(bugs, step, known, bounds, bug)
@@ -245,15 +241,15 @@ def _entry(case: Case, name: str, array: Array, saved: tuple[str, str]) -> Array
 
 
 def _tolerances(
-    home: Path, name: str, entry: ArrayEntry, bound: Bound, budgets: Mapping[str, tuple[Budget, str]]
+    home: Path, name: str, entry: ArrayEntry, bound: Bound, budgets: Mapping[str, Budget]
 ) -> Mapping[str, object]:
     """Return the fields of an array that say how far it may be off."""
     more: dict[str, object] = {}
-    for key, (budget, source) in budgets.items():
+    for key, budget in budgets.items():
         file = None if budget.masked is None else _save(home, f"mask/{name}.{key}.npy", budget.masked)[0]
-        more[key] = Tolerance(**budget._replace(masked=None)._asdict() | {"masked": file}, source=source)
+        more[key] = Tolerance(**budget._replace(masked=None)._asdict() | {"masked": file})
     if entry.dtype == "<f4":
-        more |= {"bound": _save(home, f"bound/{name}.npy", bound.limit)[0], "bound_source": ISOLATED}
+        more |= {"bound": _save(home, f"bound/{name}.npy", bound.limit)[0]}
     if bound.masked.any():
         more |= {"masked": _save(home, f"mask/{name}.npy", bound.masked)[0],
                  "masked_count": int(np.count_nonzero(bound.masked))}

@@ -8,7 +8,7 @@ import pydantic
 
 from refgi.errors import InputError, shortened
 
-VERSION = "2.0.1"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
+VERSION = "2.1.0"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
 # a case, a major changes what an array means or its name
 KIT, CASE, RESULT = "kit.json", "manifest.json", "result.json"
 
@@ -26,7 +26,6 @@ class Tolerance(_Strict):
     relative: float
     large: float
     outliers: float
-    source: str
     masked: str | None = None  # file of bool: elements that may differ at will, beside those of the array's own mask
 
 
@@ -45,12 +44,12 @@ class ArrayEntry(_Strict):
     tier: Literal["T0", "T1", "T3"]
     index_of: tuple[int, int] | None = None
     bound: str | None = None  # file of (...) absolute bounds, one an element; None: equal
-    bound_source: str = ""
     masked: str | None = None  # file of bool: elements that may differ at will
     masked_count: int = 0
     chained: Tolerance | None = None
     half: Tolerance | None = None  # tier T2
     bytes: Tolerance | None = None  # tier T2B
+    chained_half: Tolerance | None = None  # tier T2 of the array, or of one that it is made from
 
 
 class StageEntry(_Strict):

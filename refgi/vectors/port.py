@@ -40,6 +40,7 @@ class Port:
     def __init__(self, kit: Kit, case: CaseManifest, output: Path, asked: Asked) -> None:
         self.kit, self.case, self.output, self.asked = kit, case, output, asked
         self.few: dict[str, Few] = {}  # arrays that storage moves
+        self.halved: set[str] = set()  # chained: arrays in half floats, and those made from them
         self._rounding: dict[str, float] = {}  # of arrays in few bits, relative
         self._orders: dict[str, dict[str, tuple[Array, str]]] = {}  # array -> axis of a list -> its order, its stage
 
@@ -61,6 +62,9 @@ class Port:
             orders |= {} if found is None else {found[0]: (found[1], step.name)}
         self._orders.update(dict.fromkeys(step.writes, orders))
         self.note_storage(step)
+        if self.asked.chained and (self.halved & {*step.reads} or any(
+                self.asked.tier_of(step.name, name) == "T2" for name in step.writes)):
+            self.halved.update(step.writes)
         for name, array in got.arrays.items():
             own = self.in_order_of_lists(name, array, None if self.asked.chained else step.name)
             if own is not None:

@@ -1,16 +1,17 @@
 """Likely bugs of wiring: the right stage reads a wrong buffer, or the right one by another layout.
 
-Each input of a stage gives way to each array of its shape and type that is given or written before the stage, among
-them its own of another lamp, level or round; to larger ones of its own name, such as those of a finer level, read by
-rows of its own size; all fields of an input, such as both corners of a box, give way to another's at once, and two
-change places. An input of vectors or colours is read as triples side by side as well. Names in causes are without
-numbers, so that a bug has one name in all cases.
+Each input of a stage gives way to each array of its shape and type that is given or written before the stage, and to
+its own of another lamp, level or round, written when it may be; to larger ones of its own name, such as those of a
+finer level, read by rows of its own size; all fields of an input, such as both corners of a box, give way to another's
+at once, and two change places. An input of vectors or colours is read as triples side by side as well. Names in causes
+are without numbers, so that a bug has one name in all cases, but where a stage reads several of a kind.
 """
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
-from itertools import chain, combinations, product, takewhile
+from itertools import chain, combinations
 
 import numpy as np
 
@@ -31,12 +32,13 @@ def wirings(case: Case, step: Stage, known: Arrays) -> Iterator[Bug]:
         return
     form = next((one for one in step.variants if isinstance(one, Form)), None)
     run = step.run if form is None else form  # NumPy says where an index is none, a kernel reads what lies there
+    several = {kind for kind, count in Counter(map(kind_of, step.reads)).items() if count > 1}
     told = set()
 
     def fits(name: str, wrong: Array) -> bool:
         return _fits(known[name], wrong, decides=form is None and name in step.exact)
 
-    for cause, wrong in chain(_one_by_one(case, step, known, fits), _together(case, step, known, fits)):
+    for cause, wrong in chain(_one_by_one(case, step, known, fits, several), _together(case, step, known, fits)):
         if cause not in told:
             told.add(cause)
             yield Bug(cause, partial(_bound_to, run, wrong))
@@ -48,17 +50,26 @@ def wirings(case: Case, step: Stage, known: Arrays) -> Iterator[Bug]:
                 yield Bug(cause, partial(_laid_out, run, name, layout))
 
 
-def _one_by_one(case: Case, step: Stage, known: Arrays, fits: Fits) -> Iterator[tuple[str, Arrays]]:
-    """Yield causes, and the array that takes an input's place."""
-    earlier = takewhile(lambda one: one is not step, case.stages)
-    before = [*case.given, *(name for one in earlier for name in one.writes)]
-    for name, other in product(step.reads, before):
-        if other == name:
-            continue
-        read = [known[other]] if _leaf(other) != _leaf(name) else _read_by(known[other], known[name].shape)
-        for wrong, how in zip(read, ("", ", by its index"), strict=False):
-            if fits(name, wrong):
-                yield _cause(name, other) + how, {name: wrong}
+def _one_by_one(
+    case: Case, step: Stage, known: Arrays, fits: Fits, several: set[str]
+) -> Iterator[tuple[str, Arrays]]:
+    """Yield causes, and the array that takes an input's place: first its kind, also what is made later; then its field.
+
+    Of kinds that the stage reads `several` of, causes say which.
+    """
+    at = case.stages.index(step)
+    before = [*case.given, *(name for one in case.stages[:at] for name in one.writes)]
+    after = [name for one in case.stages[at + 1 :] for name in one.writes]
+    for name in step.reads:
+        kind = kind_of(name)
+        alike = [other for other in (*before, *after) if kind_of(other) == kind and other != name]
+        others = sorted((one for one in before if kind_of(one) != kind), key=lambda one: _leaf(one) != _leaf(name))
+        for other in (*alike, *others):
+            read = [known[other]] if _leaf(other) != _leaf(name) else _read_by(known[other], known[name].shape)
+            cause = f"{name} is bound to {other}" if kind in several and other in alike else _cause(name, other)
+            for wrong, how in zip(read, ("", ", by its index"), strict=False):
+                if fits(name, wrong):
+                    yield cause + how, {name: wrong}
 
 
 def _together(case: Case, step: Stage, known: Arrays, fits: Fits) -> Iterator[tuple[str, Arrays]]:

@@ -8,6 +8,7 @@ import pytest
 
 from refgi.errors import RefgiWarning
 from refgi.testing import assert_stage_close
+from refgi.vectors.bounds import ROUNDING, SAFETY, _bound
 from refgi.vectors.check import ALL_WITHIN, OUT
 from refgi.vectors.judge import judge
 from refgi.vectors.manifest import Tolerance
@@ -80,15 +81,24 @@ def test_an_array_of_which_more_is_spared_than_can_be_judged_is_not_judged(unsur
 @pytest.mark.parametrize(("more", "verdict"), [(5, "within"), (6, "not-judged")])
 def test_masks_and_outliers_are_spared_up_to_5_percent_together(more, verdict):
     masked = at(0, 1, 2) > 0
-    tolerance = Tolerance(relative=0.1, large=0.0, outliers=0.5, source="")
+    tolerance = Tolerance(relative=0.1, large=0.0, outliers=0.5)
     for allowed in ({"tolerance": tolerance}, {"few": Few(np.zeros(100), 0.5)}):
         found = judged(at(*range(more)), masked, **allowed).verdict
         assert (found.verdict, found.masked, found.outside) == (verdict, 3, more - 3), allowed
         assert judged(at(*range(3, 60)), masked, **allowed).verdict.verdict == "out", allowed
 
 
+def test_an_element_that_no_run_moves_has_the_usual_change():
+    """Three of four are moved by 1e-6 of themselves, one by a hundredth of that; a 0 stays one."""
+    expected = np.array([1.0, 2.0, 4.0, 4.0, 0.0])
+    moved = expected * (1 + np.array([1e-6, 1e-6, 1e-6, 1e-8, 0]))
+    limit = _bound(expected, [moved], 0.0).limit
+    assert limit[:4] == pytest.approx(SAFETY * (1e-6 + ROUNDING) * expected[:4], rel=1e-3)
+    assert limit[4] < 1e-37
+
+
 def test_few_bits_widen_every_bound():
-    tolerance = Tolerance(relative=0.1, large=0.0, outliers=0.0, source="")
+    tolerance = Tolerance(relative=0.1, large=0.0, outliers=0.0)
     for allowed in ({}, {"tolerance": tolerance}):
         off = at(3, value=0.15)
         assert judged(off, **allowed).verdict.verdict == "out"

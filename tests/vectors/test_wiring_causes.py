@@ -61,6 +61,22 @@ def test_a_buffer_in_the_place_of_another_is_named(kit, tmp_path, case, stage, r
     assert any(f"{kind_of(right)} is bound to" in one for one in causes), causes
 
 
+@pytest.mark.parametrize(("case", "stage", "right", "wrong"), [
+    ("hssil-default", "sssil.gather_samples0", "sssil.crown_samples0.weight", "sssil.crown_samples1.weight"),
+    ("hssil-temporal", "sssil.reprojection", "rsm.surface0.normal", "rsm.surface1.normal"),
+    ("hssil-temporal", "sssil.reprojection", "rsm.surface1.normal", "rsm.surface0.normal")])
+def test_one_of_several_of_a_kind_is_named(kit, tmp_path, case, stage, right, wrong):
+    """A level that is made later, and which of two frames' surfaces gives way to the other."""
+    port = Port(kit, case, tmp_path)
+    step = next(one for one in kit_cases("quick")[case]().stages if one.name == stage)
+    known = {name: kit.array(port.case, name) for name in port.case.arrays}
+    for name, array in outputs_of(step, known | {right: known[wrong]}, np.float32).items():
+        port.write(name, array)
+    causes = [one.cause for one in port.first().causes]
+    said = (f"{right} is bound to {wrong}", f"{kind_of(right)} is bound to that of another")
+    assert any(one.startswith(said) for one in causes), causes
+
+
 def test_an_array_of_the_stage_that_is_right_refutes_what_would_change_it(kit, tmp_path):
     """A likely bug of several arrays, put into one of them alone, is not what happened."""
     port = Port(kit, "val-single", tmp_path)

@@ -39,8 +39,9 @@ PLANS: Plans = {
     "val-csm": plan("convolution shadow maps by the defaults, maps of an odd side; two lamps, a cluster of one light, "
                     "an area light that nothing occludes", lambda: room(SPOT, BULB, matte=True, camera=CLOSE),
                     (17, 13), 16, 64, clusters=8, clamp="disc"),
-    "val-pcss": plan("blockers texel by texel, interpolated normals, glossy lights",
-                     lambda: room(SPOT, smooth=True, camera=CLOSE), (17, 13), 13, 30, clusters=4, visibility="pcss"),
+    "val-pcss": plan("blockers texel by texel, interpolated normals, glossy lights; lights change clusters still in "
+                     "the last round", lambda: room(SPOT, smooth=True, camera=CLOSE), (17, 13), 13, 30, clusters=6,
+                     rounds=3, visibility="pcss"),
     "val-single": plan("more clusters asked for than lights, coincident lights: hard shadows",
                        lambda: room(SPOT, matte=True, camera=CLOSE), (17, 13), 5, 16, clusters=30),
     "val-empty": plan("coincident lights at which clusters begin, so that some stay empty; depths in metres",

@@ -61,7 +61,8 @@ def disc_texels(arguments: Arguments) -> Described:
 
 def disc_sum(arguments: Arguments) -> Described:
     """Return the light of a map's discs."""
-    return Described(formed(gather.disc_sum, arguments), own("sum"), ("position", "surface"))
+    lists = ("sum", *(("sum/offset",) if arguments["offset"] else ()))
+    return Described(formed(gather.disc_sum, arguments), own(*lists), ("position", "surface"))
 
 
 def all_maps(arguments: Arguments) -> Described:

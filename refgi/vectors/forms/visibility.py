@@ -120,7 +120,8 @@ def depth_tests(arguments: Arguments) -> Described:
 def pcss_penumbra(arguments: Arguments) -> Described:
     """Return penumbrae texel by texel."""
     form = form_of(val_visibility.pcss_penumbra, arguments, ("shaded", "z_avg", "region"), {**PLACES, **SIZES})
-    return Described(form, own("pcss_penumbra", "penumbra", "region", *(("cone",) if by_default(arguments) else ())),
+    return Described(form, own("pcss_penumbra", "penumbra", "region", *(("cone",) if by_default(arguments) else ()),
+                                     *(("cone test",) if arguments["cone"] else ())),
                      facts=SLACK)
 
 

@@ -47,12 +47,14 @@ def dim_lights(
 ) -> DimLights | None:
     """Measure what leaving out the dimmest pixel lights would save and cost; at least `share` of the light is kept.
 
-    None for a method without pixel lights, or with more than `MOST`, and for a dark picture. `clock` in s.
+    None for a method without pixel lights, with rays for them or more than `MOST`, and for a dark picture. `clock` in
+    s.
     """
     chosen = getattr(settings, "lights", None)
-    if not isinstance(chosen, LightSettings):
+    pairs = getattr(settings, "effective_pairs", None)
+    if not isinstance(chosen, LightSettings) or pairs is None:
         return None
-    lights, pairs = choose_lights(frame, chosen), settings.effective_pairs  # type: ignore[attr-defined]
+    lights = choose_lights(frame, chosen)
     footprint = footprints(frame, chosen, pairs)
     receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
     if lights.flux.shape[1] > MOST:

@@ -119,7 +119,7 @@ def checked(
     dtype, packed = receivers.position.dtype, None
     if not isinstance(lightcuts, Lightcuts):
         packed = pack(lights, settings, footprint, dtype)
-        lightcuts = None if lightcuts is None else chosen(lightcuts, packed, receivers)
+        lightcuts = None if lightcuts is None else chosen(lightcuts, packed, receivers[:2], receivers.covered)
     if lightcuts is not None:
         packed = clustered(lights, settings, footprint, dtype, lightcuts.error)
     assert packed is not None

@@ -22,7 +22,6 @@ from refgi.stages import skip
 from refgi.types import Array
 
 if TYPE_CHECKING:
-    from refgi.pairs.irradiance import Receivers
     from refgi.pairs.packing import Packed
     from refgi.pairs.pixel_lights import PixelLights
 
@@ -43,9 +42,12 @@ def for_lights(lightcuts: AutoLightcuts | Lightcuts | None, lights: "PixelLights
     return lightcuts
 
 
-def chosen(lightcuts: AutoLightcuts, packed: "Packed", receivers: "Receivers") -> Lightcuts | None:
-    """Return bounded lightcuts where they take less time than the full sum of diffuse lights, else none."""
-    count, covered = packed.diffuse.shape[1] - 1, np.asarray(receivers.covered, np.bool_)
+def chosen(lightcuts: AutoLightcuts, packed: "Packed", planes: tuple[Array, Array], covered: Array) -> Lightcuts | None:
+    """Return bounded lightcuts where they take less time than the full sum of diffuse lights, else none.
+
+    `planes`: positions and normals (3, h, w) of the receivers.
+    """
+    count, covered = packed.diffuse.shape[1] - 1, np.asarray(covered, np.bool_)
     number = int(np.count_nonzero(covered))
     if packed.spheres is not None or not bool((packed.diffuse[6:] >= 0).all()):
         skip("pairs.lightcuts", "spheres and lights of negative flux have no bound")
@@ -56,7 +58,7 @@ def chosen(lightcuts: AutoLightcuts, packed: "Packed", receivers: "Receivers") -
     starts = strip_starts(covered)
     first = np.linspace(0, number - TILE, TILES).astype(np.int64) // TILE * TILE
     places = nth_by_block(covered, starts, (first[:, None] + np.arange(TILE)).reshape(-1))
-    position, normal = (taken(np.asarray(part, packed.diffuse.dtype), places) for part in receivers[:2])
+    position, normal = (taken(np.asarray(part, packed.diffuse.dtype), places) for part in planes)
     share = estimated_share(position, normal, packed.diffuse, packed.clamp, lightcuts.error, number)
     if share > SURE:
         skip("pairs.lightcuts", f"estimated to take {share:.2g} times the time of the full sum of {count:,} lights")

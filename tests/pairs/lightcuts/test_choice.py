@@ -82,9 +82,10 @@ def test_few_and_unbounded_lights_are_summed_in_full(monkeypatch):
     monkeypatch.setattr(choice, "estimated_share", lambda *_: math.nan)  # is not asked
     for some, clamp in ((few, None), (below, None), (lights, SphereClamp())):
         packed = pack(some, PairSettings(clamp=clamp), area[: some.flux.shape[1]], np.float32)
-        assert choice.chosen(AutoLightcuts(), packed, points) is None
+        assert choice.chosen(AutoLightcuts(), packed, points[:2], points.covered) is None
     monkeypatch.setattr(choice, "LEAST_PAIRS", SIDE * SIDE * COUNT + 1)
-    assert choice.chosen(AutoLightcuts(), pack(lights, PairSettings(clamp=None), area, np.float32), points) is None
+    packed = pack(lights, PairSettings(clamp=None), area, np.float32)
+    assert choice.chosen(AutoLightcuts(), packed, points[:2], points.covered) is None
 
 
 def test_the_choice_knows_no_threads():

@@ -27,9 +27,9 @@ STAMPS = Path("benchmarks/results/stamps.json")
 
 
 class Record(NamedTuple):
-    """Files that a command makes."""
+    """Files that commands make."""
 
-    command: tuple[str, ...]  # of Python
+    commands: tuple[tuple[str, ...], ...]  # arguments of Python, one after the other
     read_by: str
     sources: tuple[str, ...] = ("refgi/**/*.py",)  # patterns
 
@@ -43,13 +43,17 @@ class Stamp(NamedTuple):
     digest: str
 
 
+PAPERS = "sii", "multires", "val", "hssil"
 RECORDS = {
-    "accuracy": Record(("-m", "benchmarks", "accuracy", "--out", "benchmarks/results"), "docs/accuracy.md"),
-    "frames": Record(("-m", "benchmarks", "frames", "modes", "scaling", "--out", "benchmarks/results/frames"),
+    "accuracy": Record((("-m", "benchmarks", "accuracy", "--out", "benchmarks/results"),), "docs/accuracy.md"),
+    "frames": Record((("-m", "benchmarks", "frames", "modes", "scaling", "--out", "out/frames"),),
                      "docs/frames.md", ("refgi/**/*.py", "benchmarks/frames.py", "benchmarks/modes.py")),
-    "stability": Record(("-m", "benchmarks", "stability", "--out", "out/stability", "--page", "docs/precision.md"),
+    "papers": Record((*(("-m", "benchmarks", "paper", name, "--out", f"out/papers/{name}") for name in PAPERS),
+                      ("docs/papers_page.py", *(f"out/papers/{name}/results.json" for name in PAPERS))),
+                     "docs/papers.md", ("refgi/**/*.py", "benchmarks/papers/**/*.py")),
+    "stability": Record((("-m", "benchmarks", "stability", "--out", "out/stability", "--page", "docs/precision.md"),),
                         "docs/precision.md", ("refgi/**/*.py", "benchmarks/stability/*.py")),
-    "sameness": Record(("-m", "benchmarks.sameness", "--write", "benchmarks/sameness/ledger.json"), "CONTRIBUTING.md",
+    "sameness": Record((("-m", "benchmarks.sameness", "--write", "benchmarks/sameness/ledger.json"),), "CONTRIBUTING.md",
                        ("refgi/**/*.py", "benchmarks/sameness/*.py")),
 }
 
@@ -75,7 +79,8 @@ def make(root: Path, records: Mapping[str, Record]) -> list[str]:
         now = digest(root, record)
         if (known := stamps(root).get(name)) is not None and known.digest == now:
             continue
-        if subprocess.run([sys.executable, *record.command], cwd=root, check=False).returncode:
+        if any(subprocess.run([sys.executable, *command], cwd=root, check=False).returncode
+               for command in record.commands):
             failed.append(name)
             continue
         found = Stamp(_commit(root), datetime.date.today().isoformat(), llvmlite.binding.get_host_cpu_name(), now)

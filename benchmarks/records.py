@@ -53,8 +53,8 @@ RECORDS = {
                      "docs/papers.md", ("refgi/**/*.py", "benchmarks/papers/**/*.py")),
     "stability": Record((("-m", "benchmarks", "stability", "--out", "out/stability", "--page", "docs/precision.md"),),
                         "docs/precision.md", ("refgi/**/*.py", "benchmarks/stability/*.py")),
-    "sameness": Record((("-m", "benchmarks.sameness", "--write", "benchmarks/sameness/ledger.json"),), "CONTRIBUTING.md",
-                       ("refgi/**/*.py", "benchmarks/sameness/*.py")),
+    "sameness": Record((("-m", "benchmarks.sameness", "--write", "benchmarks/sameness/ledger.json"),),
+                       "CONTRIBUTING.md", ("refgi/**/*.py", "benchmarks/sameness/*.py")),
 }
 
 

@@ -26,9 +26,9 @@ HEAD = """# What the papers claim, and what comes of it
 Every number that the four papers claim of speed, counts and errors, and the same of refgi, from recorded runs of
 `python -m benchmarks paper` (`benchmarks/results/papers.json`). Met is what comes within a factor of {near} of the
 print, of a rate also what is faster, or keeps a printed bound; what was fitted to the print is called so and counts as
-neither. Scenes are stand-ins of the papers' face counts. Rates are of whole frames, at the size of the run, beside those
-of graphics processors of 2006 to 2009; ratios within a run say more. A figure's own notes, on the page of a run, say
-more of why.
+neither. Scenes are stand-ins of the papers' face counts. Rates are of whole frames, at the size of the run, beside
+those of graphics processors of 2006 to 2009; ratios within a run say more. A figure's own notes, on the page of a run,
+say more of why.
 
 This page is made by `python docs/papers_page.py`."""
 

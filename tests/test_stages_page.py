@@ -106,8 +106,9 @@ def test_a_claim_is_met_within_a_quarter_or_on_its_side(printed, ours, met):
     assert papers.verdict(printed, ours, "fitted: so") == ("fitted" if ours else met)
 
 
-@pytest.mark.parametrize(("why", "ours", "met"), [("GPU", 3.2, "yes"), ("GPU", 3.1, "no"), ("GPU", 9.0, "yes"),
-                                                  ("GPU ms", 5.0, "yes"), ("GPU ms", 5.1, "no"), ("GPU ms", 1.0, "yes")])
+@pytest.mark.parametrize(("why", "ours", "met"), [
+    ("GPU", 3.2, "yes"), ("GPU", 3.1, "no"), ("GPU", 9.0, "yes"),
+    ("GPU ms", 5.0, "yes"), ("GPU ms", 5.1, "no"), ("GPU ms", 1.0, "yes")])
 def test_what_is_faster_than_a_printed_rate_meets_it(why, ours, met):
     assert loaded("papers_page").verdict("4", ours, why) == met
 

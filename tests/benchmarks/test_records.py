@@ -35,7 +35,8 @@ def test_a_record_is_made_again_where_its_code_changed(root):
 
 
 def test_what_fails_keeps_no_stamp_and_the_rest_goes_on(root):
-    records = {"broken": Record((("-c", "raise SystemExit(3)"), ("-c", SCRIPT)), "-"), "sums": Record((("-c", SCRIPT),), "-")}
+    records = {"broken": Record((("-c", "raise SystemExit(3)"), ("-c", SCRIPT)), "-"),
+               "sums": Record((("-c", SCRIPT),), "-")}
     assert make(root, records) == ["broken"]
     assert list(stamps(root)) == ["sums"]
     assert (root / "made").read_text() == "."

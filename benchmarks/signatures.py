@@ -13,6 +13,7 @@ from pathlib import Path
 from refgi.jit import Kernel
 from refgi.jit.ahead import LIST, Specialisation
 from refgi.jit.kernelfile import text_of
+from refgi.stages import standing_for
 
 DTYPES = ("float32", "float64")
 SCENE = "cornell_box"
@@ -23,7 +24,8 @@ def called(method: str, dtype: str) -> dict[str, int]:
     from refgi.methods import render
 
     warnings.simplefilter("ignore")
-    render(SCENE, method, width=32, height=24, dtype=dtype, rsm_resolution=32)
+    with standing_for(512 * 512):
+        render(SCENE, method, width=32, height=24, dtype=dtype, rsm_resolution=32)
     found = {}
     for kernel in [thing for thing in gc.get_objects() if isinstance(thing, Kernel)]:
         name = f"{kernel.py_func.__module__}.{kernel.py_func.__name__}"

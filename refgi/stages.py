@@ -134,6 +134,7 @@ class Memory:
 
 
 _log: ContextVar[Log | None] = ContextVar("refgi_stage_log", default=None)
+_stands_for: ContextVar[int] = ContextVar("refgi_stands_for", default=0)
 
 
 def stage(
@@ -229,6 +230,21 @@ def sharing() -> Iterator[None]:
     finally:
         if own:
             log.memory = None
+
+
+@contextmanager
+def standing_for(pixels: int) -> Iterator[None]:
+    """Let pictures made inside the block run what one of so many pixels runs, so that its kernels are there."""
+    token = _stands_for.set(pixels)
+    try:
+        yield
+    finally:
+        _stands_for.reset(token)
+
+
+def counted_pixels(pixels: int) -> int:
+    """Return the pixels of a picture, or of the larger one that it stands for."""
+    return max(pixels, _stands_for.get())
 
 
 def skip(name: str, reason: str) -> None:

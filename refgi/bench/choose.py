@@ -257,7 +257,7 @@ def choose(
     smallest = small_frame(scene, frame_options)
     for number, track in enumerate(tracks):
         tell(f"loading {track.method}", number / len(tracks))
-        load_kernels(smallest, track.rungs[0])
+        load_kernels(smallest, track.rungs[0], full.frame.width * full.frame.height)
     small = Pictures(scene, truth, SMALL_ROUNDS, tell, {**frame_options, **_small_size(full.frame)})
     if wish.error is not None:
         found = for_error(tracks, wish.error, small, full)

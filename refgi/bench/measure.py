@@ -90,8 +90,8 @@ def bench_scene(
     references = {TRUTH: traced(frame, settings, tell)}
     references |= {name: traced(frame, limited(settings, name, LIMITS[name]), tell) for name in names}
     stops = [stop(settings, passes) for passes in grid.passes]
-    made, failures = _in_turn(scene, [*grid.choices, *stops], rounds, frame_options, tell)
     size = {"width": frame.width, "height": frame.height}
+    made, failures = _in_turn(scene, [*grid.choices, *stops], rounds, {**frame_options, **size}, tell)
     methods = dict.fromkeys(choice.method for choice in grid.choices)
     cold = {} if source is None else first_frames(source, list(methods), {**frame_options, **size}, tell)
     done = [(choice, made[number]) for number, choice in enumerate((*grid.choices, *stops)) if number in made]
@@ -162,7 +162,7 @@ def _in_turn(
     small = small_frame(scene, options)
     for number, choice in enumerate(choices):
         tell(f"warming up {choice.method}: {choice.label}", number / len(choices))
-        load_kernels(small, choice)
+        load_kernels(small, choice, options["width"] * options["height"])
     seeded = [choice._replace(settings=with_seed(choice.settings, 0)) for choice in choices]
     works = works_of(scene, seeded, options, tell)
     for turn in range(rounds):
@@ -220,9 +220,9 @@ def small_frame(scene: Scene, options: Mapping[str, Any]) -> Frame:
     return Frame(scene, **{**options, "width": WARM_UP_SIZE, "height": WARM_UP_SIZE})
 
 
-def load_kernels(frame: Frame, choice: Choice) -> None:
-    """Run a choice on a small frame: no time that is measured later has compiling in it."""
-    with quietly():
+def load_kernels(frame: Frame, choice: Choice, pixels: int) -> None:
+    """Run a choice on a small frame as on one of so many pixels: no time measured later has compiling in it."""
+    with quietly(), stages.standing_for(pixels):
         METHODS[choice.method].made(frame, choice.settings)
 
 

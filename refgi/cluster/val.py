@@ -26,7 +26,7 @@ from refgi.pairs.irradiance import Receivers
 from refgi.pairs.tiles import taken
 from refgi.rsm import facing_normals
 from refgi.rsm.buffers.leaving import GlossyPoints, spread_over_picture
-from refgi.stages import skip
+from refgi.stages import counted_pixels, skip
 from refgi.types import Array
 
 if TYPE_CHECKING:
@@ -193,7 +193,7 @@ def block_side(frame: "Frame", settings: ValSettings) -> int | None:
     by_maps = settings.visibility is None or isinstance(settings.visibility, BY_MAPS)
     if settings.pairs.clamp is None:
         skip("multires.error_driven", "without a clamp every pixel sums all lights")
-    elif by_maps and frame.width * frame.height <= FEW_PIXELS:
+    elif by_maps and counted_pixels(frame.width * frame.height) <= FEW_PIXELS:
         skip("multires.error_driven", f"up to {FEW_PIXELS:,} pixels each sums all lights")
     else:
         return None

@@ -169,7 +169,8 @@ class _Runner:
         return render_still(self.scene, name, settings, still, {**self.options, **size})
 
     def _warm_up(self, function: Callable[[Frame, Any], Any], settings: Any) -> None:
-        with warnings.catch_warnings(), contextlib.suppress(RefgiError):  # the real run will say it
+        with (stages.standing_for(self.frame.width * self.frame.height), warnings.catch_warnings(),
+              contextlib.suppress(RefgiError)):  # the real run will say it
             warnings.simplefilter("ignore", RefgiWarning)
             function(self._fresh_frame(WARM_UP_SIZE, WARM_UP_SIZE), settings)
 

@@ -9,12 +9,13 @@ import pytest
 from refgi.bench import measure
 from refgi.bench.error import error_of
 from refgi.bench.grid import Choice, Grid
-from refgi.bench.measure import REFERENCE_SEED, bench_scene, with_seed
+from refgi.bench.measure import REFERENCE_SEED, bench_scene, load_kernels, small_frame, with_seed
 from refgi.errors import InputError, RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import METHODS
 from refgi.scene import load_scene
 from refgi.settings import of
+from refgi.stages import observe
 from refgi.truth import TruthSettings, trace_truth
 
 SIZE = {"width": 40, "height": 36, "rsm_resolution": 64, "shadows": "exact"}
@@ -39,6 +40,13 @@ def bench(box):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)
         return bench_scene(box, GRID, rounds=ROUNDS, truth=TruthSettings(samples=96), **SIZE)
+
+
+def test_no_time_has_compiling_in_it(box):
+    """The small picture that loads a method's kernels runs what the picture that is timed runs."""
+    with observe() as log:
+        load_kernels(small_frame(box, SIZE), choice("val", lights=64), 300 * 300)
+    assert "multires.error_driven" in {run.name for run in log.runs if run.status == "ran"}
 
 
 def picture_of(frame, choice, seed):

@@ -20,7 +20,7 @@ from refgi.methods import find_method, render
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
-from refgi.stages import observe
+from refgi.stages import observe, standing_for
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
@@ -144,6 +144,13 @@ def any_size(monkeypatch):
 
 EACH_KIND = ({}, {"visibility": "pcss"}, {"visibility": "pcf", "clusters_count": 64}, {"visibility": "none"},
              {"prefilter": "brute"}, {"visibility": "rays_rectangle"}, {"behind": "dual_paraboloid"})
+
+
+def test_a_small_picture_runs_what_the_one_that_it_stands_for_runs():
+    for pixels, ran in ((1 << 16, False), ((1 << 16) + 1, True)):
+        with observe() as log, standing_for(pixels):
+            val(Frame(load_scene("cornell_box"), width=24, height=18, rsm_resolution=64), of(ValSettings, lights=64))
+        assert ("multires.error_driven" in {run.name for run in log.runs if run.status == "ran"}) is ran
 
 
 @pytest.mark.usefixtures("any_size")

@@ -21,7 +21,7 @@ from refgi.method import Method
 from refgi.methods import METHODS
 from refgi.scene import Camera, Geometry, Material, Scene, SpotLight, load_scene
 from refgi.settings import Settings, of, setting
-from refgi.stages import stage
+from refgi.stages import counted_pixels, stage
 from refgi.truth import TruthSettings
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
@@ -66,6 +66,18 @@ def truth_settings():
 @pytest.fixture(scope="module")
 def box():
     return load_scene("cornell_box")
+
+
+def test_the_small_picture_before_a_timed_one_stands_for_it(box, truth_settings, fakes):
+    seen = []
+
+    def counting(frame, settings):
+        seen.append((frame.width * frame.height, counted_pixels(frame.width * frame.height)))
+        return even(frame, settings)
+
+    fakes["seeing"] = fakes["seeing"]._replace(function=counting)
+    compare(box, ["seeing"], truth_settings=truth_settings, **SIZE | {"width": 130, "height": 100})
+    assert seen == [(module.WARM_UP_SIZE**2, 13000), (13000, 13000)]
 
 
 @pytest.mark.usefixtures("fakes")

@@ -18,7 +18,7 @@ from refgi.pairs.pair_sum import TILE, Clamp
 from refgi.pairs.settings import LEAST_LIGHTS, AutoLightcuts, Lightcuts
 from refgi.pairs.tile_counts import tiles_behind
 from refgi.pairs.tiles import nth_by_block, strip_starts, taken
-from refgi.stages import skip
+from refgi.stages import counted_pixels, skip
 from refgi.types import Array
 
 if TYPE_CHECKING:
@@ -52,9 +52,11 @@ def chosen(lightcuts: AutoLightcuts, packed: "Packed", planes: tuple[Array, Arra
     if packed.spheres is not None or not bool((packed.diffuse[6:] >= 0).all()):
         skip("pairs.lightcuts", "spheres and lights of negative flux have no bound")
         return None
-    if count < LEAST_LIGHTS or count * number < LEAST_PAIRS:
+    if count < LEAST_LIGHTS or count * counted_pixels(number) < LEAST_PAIRS:
         skip("pairs.lightcuts", f"{count:,} diffuse lights at {number:,} points are summed in full")
         return None
+    if count * number < LEAST_PAIRS:  # a small picture that stands for a large one
+        return Lightcuts(lightcuts.error)
     starts = strip_starts(covered)
     first = np.linspace(0, number - TILE, TILES).astype(np.int64) // TILE * TILE
     places = nth_by_block(covered, starts, (first[:, None] + np.arange(TILE)).reshape(-1))

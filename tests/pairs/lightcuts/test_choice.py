@@ -16,7 +16,7 @@ from refgi.pairs.packing import pack
 from refgi.pairs.settings import AutoLightcuts, Lightcuts, PairSettings, SphereClamp
 from refgi.pairs.tile_counts import tiles_behind
 from refgi.pairs.tiles import block_by_block, taken
-from refgi.stages import observe
+from refgi.stages import observe, standing_for
 from tests.pairs.lightcuts.scenes import CLAMPS, scene
 
 COUNT, SIDE = 20000, 96
@@ -86,6 +86,15 @@ def test_few_and_unbounded_lights_are_summed_in_full(monkeypatch):
     monkeypatch.setattr(choice, "LEAST_PAIRS", SIDE * SIDE * COUNT + 1)
     packed = pack(lights, PairSettings(clamp=None), area, np.float32)
     assert choice.chosen(AutoLightcuts(), packed, points[:2], points.covered) is None
+
+
+def test_a_small_picture_sums_as_the_one_that_it_stands_for():
+    lights, area, points = apart("floor", 1.0)
+    packed = pack(lights, PairSettings(clamp=None), area, np.float32)
+    enough = choice.LEAST_PAIRS // COUNT + 1
+    for pixels, clusters in ((enough - 1, None), (enough, Lightcuts(0.02))):
+        with standing_for(pixels):
+            assert choice.chosen(AutoLightcuts(), packed, points[:2], points.covered) == clusters
 
 
 def test_the_choice_knows_no_threads():

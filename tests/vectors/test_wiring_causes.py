@@ -43,6 +43,16 @@ def test_a_layout_or_format_is_named(kit, tmp_path, array, bug, said):
     assert any(said in one for one in causes), causes
 
 
+def causes_told(kit, tmp_path, case, stage, right, wrong):
+    """Return the causes told of a stage that is rightly computed with `wrong` in the place of its input `right`."""
+    port = Port(kit, case, tmp_path)
+    step = next(one for one in kit_cases("quick")[case]().stages if one.name == stage)
+    known = {name: kit.array(port.case, name) for name in port.case.arrays}
+    for name, array in outputs_of(step, known | {right: known[wrong]}, np.float32).items():
+        port.write(name, array)
+    return [one.cause for one in port.first().causes]
+
+
 @pytest.mark.parametrize(("case", "stage", "right", "wrong"), [
     ("sii-halton", "pairs.sum", "rsm.surface.normal", "rsm.surface.position"),
     ("sii-halton", "pairs.sum", "lights.pixel_lights.normal", "lights.pixel_lights.flux"),
@@ -52,12 +62,7 @@ def test_a_layout_or_format_is_named(kit, tmp_path, array, bug, said):
      "rsm.map_triangles0.projection.half")])
 def test_a_buffer_in_the_place_of_another_is_named(kit, tmp_path, case, stage, right, wrong):
     """The stage itself with one input for another, as a port binds it: rightly computed, from the wrong buffer."""
-    port = Port(kit, case, tmp_path)
-    step = next(one for one in kit_cases("quick")[case]().stages if one.name == stage)
-    known = {name: kit.array(port.case, name) for name in port.case.arrays}
-    for name, array in outputs_of(step, known | {right: known[wrong]}, np.float32).items():
-        port.write(name, array)
-    causes = [one.cause for one in port.first().causes]
+    causes = causes_told(kit, tmp_path, case, stage, right, wrong)
     assert any(f"{kind_of(right)} is bound to" in one for one in causes), causes
 
 
@@ -67,12 +72,7 @@ def test_a_buffer_in_the_place_of_another_is_named(kit, tmp_path, case, stage, r
     ("hssil-temporal", "sssil.reprojection", "rsm.surface1.normal", "rsm.surface0.normal")])
 def test_one_of_several_of_a_kind_is_named(kit, tmp_path, case, stage, right, wrong):
     """A level that is made later, and which of two frames' surfaces gives way to the other."""
-    port = Port(kit, case, tmp_path)
-    step = next(one for one in kit_cases("quick")[case]().stages if one.name == stage)
-    known = {name: kit.array(port.case, name) for name in port.case.arrays}
-    for name, array in outputs_of(step, known | {right: known[wrong]}, np.float32).items():
-        port.write(name, array)
-    causes = [one.cause for one in port.first().causes]
+    causes = causes_told(kit, tmp_path, case, stage, right, wrong)
     said = (f"{right} is bound to {wrong}", f"{kind_of(right)} is bound to that of another")
     assert any(one.startswith(said) for one in causes), causes
 

@@ -4,7 +4,7 @@ What a clustering is contribution: how much normals differ in a cluster (Fig. 6)
 """
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -34,13 +34,7 @@ class Clustering(NamedTuple):
     objective: Array  # (rounds + 1,) float64: sum of all distances, at the start and after each round
 
 
-def _steps(*args: Any, **kwargs: Any) -> dict[str, Array]:
-    from refgi.cluster.clustering.steps import kmeans_steps
-
-    return kmeans_steps(*args, **kwargs)
-
-
-@stage("cluster.kmeans", steps=_steps)
+@stage("cluster.kmeans", steps="refgi.cluster.clustering.steps.kmeans_steps")
 def clusters_of(
     position: Array, normal: Array, count: int, settings: KMeansSettings, illuminated: "Extent"
 ) -> Clustering:

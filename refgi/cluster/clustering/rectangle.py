@@ -7,7 +7,7 @@ axes.
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -94,13 +94,7 @@ class AreaLights(NamedTuple):
     of: Array  # (N,) int32: C(i), the area light of each pixel light
 
 
-def _steps(*args: Any, **kwargs: Any) -> dict[str, Array]:
-    from refgi.cluster.clustering.steps import area_steps
-
-    return area_steps(*args, **kwargs)
-
-
-@stage("cluster.area_lights", steps=_steps)
+@stage("cluster.area_lights", steps="refgi.cluster.clustering.area_steps.area_steps")
 def area_lights(
     lights: "PixelLights", clusters: Clustering, settings: AreaLightSettings, footprint: Array | None = None
 ) -> AreaLights:

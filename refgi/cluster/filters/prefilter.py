@@ -14,7 +14,8 @@ import numpy.typing as npt
 from numba import types
 
 from refgi.cluster.filters.basis import DepthScale, beyond_disc, fill_basis, fill_beyond, joined, normalise
-from refgi.cluster.filters.mip import Mip, build_mips, mip_means, mip_of, mips
+from refgi.cluster.filters.mip import Mip, build_mips, mip_of, mips
+from refgi.cluster.filters.mip import mip_means as means_of_mip
 from refgi.cluster.filters.pyramid import stack_array
 from refgi.cluster.settings import MOST_TERMS, Csm
 from refgi.jit import by_type, kernel
@@ -118,7 +119,7 @@ def _add(brute: Brute, row: int, column: int, weight: float, with_z: bool, sums:
 
 # a read between texels is a tent twice as wide as a texel of its level: half the level makes it the filter's width
 LEVEL_SHIFT = -1.0
-MEANS: dict[Any, Any] = {Mip: mip_means, Brute: brute_means}
+MEANS: dict[Any, Any] = {Mip: means_of_mip, Brute: brute_means}
 
 
 def filter_means(

@@ -6,7 +6,7 @@ visibility that is found in Python (by rays, back projection, from behind), go b
 """
 
 from inspect import signature
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -48,13 +48,7 @@ if TYPE_CHECKING:
 BEYOND_REACH = 1e15  # m: bounds of a tile that every light reaches
 
 
-def _steps(*args: Any, **kwargs: Any) -> Array:
-    from refgi.cluster.lighting.steps import irradiance_steps
-
-    return irradiance_steps(*args, **kwargs)
-
-
-@stage("cluster.irradiance", steps=_steps)
+@stage("cluster.irradiance", steps="refgi.cluster.lighting.steps.irradiance_steps")
 def clustered_irradiance(
     receivers: Receivers, facing: Array, lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps | None",
     settings: "ValSettings", footprint: Array | None = None, visibility_of: VisibilityFunction | None = None,

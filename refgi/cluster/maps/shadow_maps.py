@@ -97,13 +97,7 @@ class ShadowMaps(NamedTuple):
     left_out: int = 0  # triangles left out because they are near a centre, summed over all maps
 
 
-def _steps(*args: Any, **kwargs: Any) -> dict[str, Array]:
-    from refgi.cluster.maps.steps import map_steps
-
-    return map_steps(*args, **kwargs)
-
-
-@stage("cluster.shadow_maps", steps=_steps)
+@stage("cluster.shadow_maps", steps="refgi.cluster.maps.steps.map_steps")
 def shadow_maps(
     geometry: Geometry, areas: AreaLights, settings: ShadowMapSettings, dtype: npt.DTypeLike,
     tracer: "Tracer | None" = None, ends: Ends | None = None,

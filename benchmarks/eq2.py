@@ -21,8 +21,7 @@ from refgi.elementary import exp2, log2p1
 from refgi.jit import threads
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.pair_sum import Clamp, sum_pairs
-from refgi.sssil.crown.form_factor import term
-from refgi.sssil.crown.layout import ROWS, WIDE, add_two
+from refgi.sssil.form_factor import ROWS, WIDE, add_two, term
 
 EXPONENTS = (20.0, 1000.0)
 LINE = 3000  # texels of the crown's band

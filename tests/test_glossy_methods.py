@@ -24,9 +24,9 @@ from refgi.skips import without_skip
 from refgi.splat.multires.lobes import glossy_subsplats
 from refgi.splat.sii import SiiSettings
 from refgi.sssil import HssilSettings
-from refgi.sssil.crown.glossy import warped
-from refgi.sssil.crown.reach import chosen_radius
-from refgi.sssil.pyramid.levels import pyramid, sender_pyramid
+from refgi.sssil.glossy import warped
+from refgi.sssil.levels import pyramid, sender_pyramid
+from refgi.sssil.pattern import chosen_radius
 from refgi.sssil.temporal import Sequence
 from tests.glossy import SIZE, defined, glossy_box
 from tests.literal.whole import gather

@@ -22,8 +22,8 @@ from refgi.splat.gather.gather_sum import disc_pattern
 from refgi.splat.sii.reach.threshold import light_range
 from refgi.splat.sii.settings import SiiSettings
 from refgi.sssil import HssilSettings
-from refgi.sssil.crown.pattern import samples_at
-from refgi.sssil.visibility.slices import slice_counts, slice_offsets
+from refgi.sssil.pattern import samples_at
+from refgi.sssil.slices import slice_counts, slice_offsets
 from tests.naive.draws import draw, draw_bits, mix32
 from tests.rsm.shapes import geometry
 

@@ -4,10 +4,10 @@ import numpy as np
 
 from benchmarks.stability.numbers import directions
 from benchmarks.stability.promise import Case, Promise
-from refgi.cluster.clustering.kmeans import Clustering
-from refgi.cluster.clustering.rectangle import AreaLights, area_lights
-from refgi.cluster.maps.occluders import Ends
-from refgi.cluster.maps.shadow_maps import shadow_maps
+from refgi.cluster.kmeans import Clustering
+from refgi.cluster.maps import shadow_maps
+from refgi.cluster.occluders import Ends
+from refgi.cluster.rectangle import AreaLights, area_lights
 from refgi.cluster.settings import AreaLightSettings, ShadowMapSettings
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.rsm.buffers.extent import Extent

@@ -22,10 +22,9 @@ from refgi.literal.pairs import pair
 from refgi.pairs.pair_sum import clamped_term, geometry_term
 from refgi.pairs.sphere_sum import cone_term
 from refgi.rays.watertight import far_offset, ray_offset
-from refgi.sssil.crown.form_factor import Facing, term
-from refgi.sssil.crown.layout import length_scale
-from refgi.sssil.pyramid.view import pixel_surface
-from refgi.sssil.visibility.slices import PLANES, direction, heights, pack
+from refgi.sssil.form_factor import Facing, length_scale, term
+from refgi.sssil.slices import PLANES, direction, heights, pack
+from refgi.sssil.view import pixel_surface
 from refgi.stress.promises import Row
 from refgi.types import Array
 

@@ -31,7 +31,7 @@ from refgi.jit import threads
 from refgi.method import Method
 from refgi.methods import METHODS
 from refgi.provenance import Record, plain
-from refgi.sssil.temporal.filter import Filtered, History, first_light, history_of, temporal_filter, with_frames
+from refgi.sssil.temporal_filter import Filtered, History, first_light, history_of, temporal_filter, with_frames
 from refgi.types import Array
 
 

@@ -15,8 +15,8 @@ from refgi.image import is_from_refgi, read_exr, write_exr
 from refgi.provenance import Record, estimate_record
 from refgi.provenance.frames import same_sequence
 from refgi.scene.model import Scene
-from refgi.sssil.temporal.filter import History, history_of, with_frames
-from refgi.sssil.temporal.sequence import Sequence, SequenceFrame, seeded
+from refgi.sssil.temporal import Sequence, SequenceFrame, seeded
+from refgi.sssil.temporal_filter import History, history_of, with_frames
 from refgi.types import Array
 
 EXR, PNG = ".exr", ".png"

@@ -9,11 +9,11 @@ shadows, PCF, PCSS and convolution shadow maps, `lighting` the picture. `adaptiv
 """
 
 from refgi.cluster.approximations import APPROXIMATIONS, val_ledger
-from refgi.cluster.clustering.kmeans import Clustering, cluster
-from refgi.cluster.clustering.rectangle import AreaLights, area_lights
-from refgi.cluster.lighting.blur import blur
-from refgi.cluster.lighting.clustered import clustered_irradiance
-from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
+from refgi.cluster.clustered import clustered_irradiance
+from refgi.cluster.geometry_blur import blur
+from refgi.cluster.kmeans import Clustering, cluster
+from refgi.cluster.maps import ShadowMaps, shadow_maps
+from refgi.cluster.rectangle import AreaLights, area_lights
 from refgi.cluster.settings import PRESETS, ValSettings
 from refgi.cluster.val import extra_bytes, val, val_lobes
 from refgi.method import Method

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from refgi.cluster.clustering.kmeans import clusters_of
-from refgi.cluster.clustering.rectangle import AreaLights, area_lights
-from refgi.cluster.lighting.clustered import clustered_irradiance
-from refgi.cluster.maps.occluders import ends_of
-from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
+from refgi.cluster.clustered import clustered_irradiance
+from refgi.cluster.kmeans import clusters_of
+from refgi.cluster.maps import ShadowMaps, shadow_maps
+from refgi.cluster.occluders import ends_of
+from refgi.cluster.rectangle import AreaLights, area_lights
 from refgi.cluster.reference import reference_visibility, vpl_visibility
 from refgi.cluster.settings import WITHOUT_MAPS, AdaptiveClusters
 from refgi.errors import RefgiWarning, expect

@@ -6,15 +6,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from refgi.cluster.adaptive import MOST_TEXELS, count_for_error, group_lights
-from refgi.cluster.clustering.rectangle import AreaLights
+from refgi.cluster.clustered import clustered_irradiance, clustered_radiance
 from refgi.cluster.filters.pyramid import EIGHT
-from refgi.cluster.lighting.blur import blur
-from refgi.cluster.lighting.clustered import clustered_irradiance
-from refgi.cluster.lighting.glossy import clustered_radiance
-from refgi.cluster.lighting.shadows import MOST_KEPT, Shadows, kept_shadows
-from refgi.cluster.maps.shadow_maps import ShadowMaps
+from refgi.cluster.geometry_blur import blur
+from refgi.cluster.maps import ShadowMaps
+from refgi.cluster.rectangle import AreaLights
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import BY_MAPS, WITHOUT_MAPS, AdaptiveClusters, Clusters, Csm, ValSettings
+from refgi.cluster.visibility.shadow import MOST_KEPT, Shadows, kept_shadows
 from refgi.error_target.error_driven import error_driven
 from refgi.error_target.near import shadowed_by_clusters
 from refgi.jit import thread_count

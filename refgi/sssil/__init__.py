@@ -10,10 +10,9 @@ what lies between receiver and sample.
 
 from refgi.method import Method
 from refgi.sssil.approximations import APPROXIMATIONS, extra_bytes
-from refgi.sssil.crown.gather import gather
+from refgi.sssil.crown import gather
 from refgi.sssil.hssil import hssil, hssil_lobes
-from refgi.sssil.pyramid.levels import pyramid
-from refgi.sssil.pyramid.view import Level
+from refgi.sssil.levels import pyramid
 from refgi.sssil.settings import (
     PRESETS,
     Bilateral,
@@ -28,7 +27,8 @@ from refgi.sssil.settings import (
     SenderSettings,
     TemporalSettings,
 )
-from refgi.sssil.upsampling.upsample import Guide, upsample
+from refgi.sssil.upsampling import Guide, upsample
+from refgi.sssil.view import Level
 
 __all__ = [
     "PRESETS",

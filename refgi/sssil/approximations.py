@@ -13,8 +13,7 @@ from typing import Any
 
 from refgi.method import Approximation, Extent
 from refgi.settings import replaced
-from refgi.sssil.crown.pattern import PHASES
-from refgi.sssil.crown.reach import chosen_radius, reach
+from refgi.sssil.pattern import PHASES, chosen_radius, reach
 from refgi.sssil.settings import MOST_LEVELS, MOST_SAMPLES, Bitmask, HssilSettings, Rays
 
 MANY = 1024  # samples where not every texel can be one

@@ -16,8 +16,8 @@ import numpy as np
 
 from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
-from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import LARGEST_WINDOW, GeometryBlur
+from refgi.sssil.view import Level
 from refgi.stages import stage
 from refgi.types import Array
 

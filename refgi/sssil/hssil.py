@@ -14,21 +14,18 @@ from refgi.pairs.shadow_rays import receivers
 from refgi.rsm.buffers.leaving import GlossyPoints, glossy_points, spread_over_picture
 from refgi.rsm.raster.projection import Projection
 from refgi.settings import replaced
+from refgi.sssil.bitmask import bitmask_gather
 from refgi.sssil.blur import blur
 from refgi.sssil.cameras import join_cameras
-from refgi.sssil.crown.form_factor import form_of
-from refgi.sssil.crown.gather import gather, level_factor
-from refgi.sssil.crown.glossy import Draws, draw_samples, glossy_receivers
-from refgi.sssil.crown.loss import warn_of_few_samples
-from refgi.sssil.crown.pattern import every_texel, level_key, sample_weight
-from refgi.sssil.crown.reach import chosen_radius, warn_short_reach
-from refgi.sssil.pyramid.levels import pyramid, sender_pyramid
-from refgi.sssil.pyramid.view import Level
+from refgi.sssil.crown import gather, level_factor, warn_of_few_samples
+from refgi.sssil.form_factor import form_of
+from refgi.sssil.glossy import Draws, draw_samples, fill_glossy_rays, glossy_receivers, march_samples, slice_samples
+from refgi.sssil.levels import pyramid, sender_pyramid
+from refgi.sssil.pattern import chosen_radius, every_texel, level_key, sample_weight, warn_short_reach
+from refgi.sssil.rays import Traced, add_unoccluded, ray_gather, surfels_of
 from refgi.sssil.settings import Bitmask, HssilSettings
-from refgi.sssil.upsampling.upsample import Guide, upsample
-from refgi.sssil.visibility.bitmask import bitmask_gather
-from refgi.sssil.visibility.glossy import fill_glossy_rays, march_samples, slice_samples
-from refgi.sssil.visibility.rays import Traced, add_unoccluded, ray_gather, surfels_of
+from refgi.sssil.upsampling import Guide, upsample
+from refgi.sssil.view import Level
 from refgi.stages import report_progress, skip, stage, tally
 from refgi.types import Array
 

@@ -210,7 +210,7 @@ def asked(method: str, change: Change, scene: Scene, size: tuple[int, int] | Non
 
 def _require_whole_texels(width: int, height: int) -> None:
     """Refuse a width that texels of the coarsest level do not divide: counted from the left, they are not mirrored."""
-    from refgi.sssil.pyramid.levels import useful_levels
+    from refgi.sssil.levels import useful_levels
     from refgi.sssil.settings import HssilSettings
 
     sampling = HssilSettings().sampling

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.adaptive import Trial, _double_and_step_back, _estimate, count_for_error
-from refgi.cluster.lighting.clustered import clustered_irradiance
+from refgi.cluster.clustered import clustered_irradiance
 from refgi.cluster.settings import ValSettings
 from refgi.errors import InputError, RefgiWarning
 from refgi.frame import Frame

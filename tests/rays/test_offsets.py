@@ -81,7 +81,7 @@ def multires_by_rays(frame):
 
 def shares_of_rays(frame):
     """Share of rays from what is seen to points of the floor and a wall: what the reference modes of `val` ask for."""
-    from refgi.cluster.reference.rays import free_share
+    from refgi.cluster.reference import free_share
 
     u, v = np.random.default_rng(9).uniform(0.05, 0.95, (2, 32))
     targets = np.stack([2 * u - 1, np.zeros(32), 2 * v - 1])

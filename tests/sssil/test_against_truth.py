@@ -9,10 +9,10 @@ from scipy.integrate import dblquad
 from refgi.frame import Frame
 from refgi.scene import PointLight, load_scene
 from refgi.settings import of, replaced
-from refgi.sssil.crown.gather import gather
+from refgi.sssil.crown import gather
 from refgi.sssil.hssil import hssil
-from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import PRESETS, HssilSettings
+from refgi.sssil.view import Level
 from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.truth import accumulate
 from tests.form_factors import polygon_form_factor

@@ -5,8 +5,8 @@ import pytest
 
 from refgi.literal import upsampling as literal
 from refgi.sssil.blur import TALL, WIDE, blur
-from refgi.sssil.pyramid.view import Level
 from refgi.sssil.settings import GeometryBlur
+from refgi.sssil.view import Level
 
 # of the largest value: means of up to 17 terms
 ROUNDING = {np.float64: 1e-14, np.float32: 3e-6}

@@ -20,8 +20,7 @@ from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.settings import replaced
 from refgi.sssil import HssilSettings
-from refgi.sssil.crown.pattern import samples_at
-from refgi.sssil.crown.reach import coverage
+from refgi.sssil.pattern import coverage, samples_at
 from refgi.sssil.settings import PRESETS
 from refgi.types import Array
 

@@ -13,7 +13,7 @@ from refgi.frame import Frame
 from refgi.scene import Scene
 from refgi.sssil import HssilSettings
 from refgi.sssil.settings import TemporalSettings
-from refgi.sssil.temporal.sequence import Sequence
+from refgi.sssil.temporal import Sequence
 from refgi.stages import observe
 from refgi.types import Array
 

@@ -25,7 +25,7 @@ from benchmarks.papers.val.subjects import (
     shadowed,
 )
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of, palette, seen_by
-from refgi.cluster.clustering.kmeans import in_use, mean_angle
+from refgi.cluster.kmeans import in_use, mean_angle
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.compare.pictures import luminance

@@ -27,8 +27,8 @@ from benchmarks.papers.val.subjects import (
     shadowed,
 )
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of
-from refgi.cluster.clustering.kmeans import cluster
-from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.kmeans import cluster
+from refgi.cluster.rectangle import area_lights
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
 from refgi.compare.pictures import luminance

@@ -22,11 +22,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.papers.workbench import Subjects, Workbench, whole_frame
-from refgi.cluster.clustering.kmeans import Clustering, cluster
-from refgi.cluster.clustering.rectangle import AreaLights, area_lights
-from refgi.cluster.lighting.clustered import clustered_irradiance
-from refgi.cluster.maps.occluders import ends_of
-from refgi.cluster.maps.shadow_maps import ShadowMaps, shadow_maps
+from refgi.cluster.clustered import clustered_irradiance
+from refgi.cluster.kmeans import Clustering, cluster
+from refgi.cluster.maps import ShadowMaps, shadow_maps
+from refgi.cluster.occluders import ends_of
+from refgi.cluster.rectangle import AreaLights, area_lights
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import Clusters, RaysVpls, ValSettings
 from refgi.cluster.val import val

@@ -15,8 +15,7 @@ import numpy as np
 
 from refgi.cluster.filters.basis import DepthScale
 from refgi.cluster.settings import Pcss
-from refgi.cluster.visibility.casters import least_depth
-from refgi.cluster.visibility.pcf import SLACK, cone_tangent, disc, published_square, published_tangent
+from refgi.cluster.visibility.pcf import SLACK, cone_tangent, disc, least_depth, published_square, published_tangent
 from refgi.cluster.visibility.search_region import (
     DEPTH,
     EXTENT,

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.filters.basis import DepthScale, depth_scale
-from refgi.cluster.maps.shadow_maps import BACKWARD, ShadowMaps
+from refgi.cluster.maps import BACKWARD, ShadowMaps
 from refgi.cluster.settings import Csm, DepthScaleName, Pcss, ValSettings
 from refgi.cluster.visibility.pcf import cone_tangent, disc, farthest_tangent, published_square, solid_angle_tangent
 from refgi.jit import kernel

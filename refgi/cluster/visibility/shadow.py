@@ -1,17 +1,17 @@
 """The shadow of one area light as kernels read it, PCF, PCSS or CSM; its visibility at any points (Sec. 4.1, 5.1)."""
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from refgi.cluster.clustering.rectangle import AreaLights
-from refgi.cluster.filters.prefilter import build_filters
-from refgi.cluster.maps.shadow_maps import ShadowMaps
-from refgi.cluster.reference.rays import Ball, free_share, rectangle_points
+from refgi.cluster.filters.prefilter import allocate_mips, build_filters, build_several
+from refgi.cluster.maps import ShadowMaps
+from refgi.cluster.rectangle import AreaLights
+from refgi.cluster.reference import Ball, free_share, rectangle_points
 from refgi.cluster.settings import BY_MAPS, ConstantBias, Csm, Hard, Pcf, Pcss, ValSettings
-from refgi.cluster.visibility.casters import casters_of
 from refgi.cluster.visibility.csm import CsmShadow, csm_tile
-from refgi.cluster.visibility.pcf import PcfShadow, pcf_shadow, pcf_tile
+from refgi.cluster.visibility.pcf import PcfShadow, casters_of, pcf_shadow, pcf_tile
 from refgi.cluster.visibility.pcss import PcssShadow, blocker_test, pcss_tile
 from refgi.cluster.visibility.search_region import (
     SCRATCH_ROWS,
@@ -22,11 +22,12 @@ from refgi.cluster.visibility.search_region import (
     series,
 )
 from refgi.errors import expect
-from refgi.jit import by_type, kernel, prange
+from refgi.jit import by_type, kernel, prange, thread_count
 from refgi.stages import stage
 from refgi.types import Array
 
 if TYPE_CHECKING:
+    from refgi.cluster.settings import ValSettings
     from refgi.rays import Tracer
 
 TILES: dict[Any, Any] = {PcfShadow: pcf_tile, PcssShadow: pcss_tile, CsmShadow: csm_tile}
@@ -162,3 +163,49 @@ def _shadow_tiles(shadow: Any, channels: int, points: Array, facing: Array, visi
         shadow_tile(shadow, part, normals, size, active, here, scratch)
         for i in range(size):
             visible[first + i] = min(visible[first + i], here[i])
+
+
+MOST_KEPT = 1 << 23  # texels of all maps whose filters are kept: some 240 MB of four terms in float32
+
+Shadows = dict[int, Any]  # by area light; None for one that nothing occludes
+
+
+def kept_shadows(areas: AreaLights, maps: "ShadowMaps | None", settings: "ValSettings") -> Shadows | None:
+    """Return the shadows of all area lights; None where maps are not read by kernels, or are too many to keep."""
+    if not isinstance(settings.visibility, BY_MAPS) or (maps is not None and maps.depth.size > MOST_KEPT):
+        return None
+    every = np.flatnonzero(areas.members > 0)
+    return dict(shadows_of(maps, areas, every, settings, len(every)))
+
+
+def shadows_of(
+    maps: "ShadowMaps | None", areas: AreaLights, chosen: Array, settings: "ValSettings", at_once: int | None = None
+) -> Iterator[tuple[int, Any]]:
+    """Return some area lights with their shadows; None for those that nothing occludes.
+
+    `at_once` maps are filtered at a time, as many as there are threads where it is not given; those are overwritten by
+    the next.
+    """
+    map_of = np.full(len(areas.delta), -1) if maps is None or settings.visibility is None else maps.map_of
+    filtered = (map_of >= 0) & (areas.delta != 0) & isinstance(settings.visibility, Csm)
+    filters = _filters(maps, map_of[chosen[filtered[chosen]]], settings, at_once or thread_count())
+    for m in chosen:
+        if maps is None or map_of[m] < 0:
+            yield m, None
+        else:
+            yield m, shadow_of(maps, areas, m, settings, filters=next(filters) if filtered[m] else None)
+
+
+def _filters(maps: "ShadowMaps | None", chosen: Array, settings: "ValSettings", at_once: int) -> Iterator[Any]:
+    """Filter some maps in their order, one for each thread at a time: all at once would leave the cache."""
+    if maps is None or len(chosen) == 0:
+        return
+    csm, box = settings.visibility, "val_alpha_over_pi" in settings.as_published
+    assert isinstance(csm, Csm)
+    depth, scratch = maps.depth, None
+    if csm.prefilter == "mip":
+        scratch = allocate_mips(min(at_once, len(chosen)), depth.shape[1], depth.dtype, csm)
+    for first in range(0, len(chosen), at_once):  # what was filtered before is no longer in use
+        some = chosen[first : first + at_once]
+        scales = [scale_of(maps, k, csm.depth_scale, series(csm)) for k in some]
+        yield from build_several(depth[some], scales, csm, box, scratch)

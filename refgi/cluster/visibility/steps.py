@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from refgi.cluster.maps.shadow_maps import ShadowMaps
-from refgi.cluster.visibility.casters import casters_of
-from refgi.cluster.visibility.pcf import pcf_shadow, pcf_tile
+from refgi.cluster.maps import ShadowMaps
+from refgi.cluster.visibility.pcf import casters_of, pcf_shadow, pcf_tile
 from refgi.cluster.visibility.pcss import BlockerTest, PcssShadow, filter_texels, find_blockers
 from refgi.cluster.visibility.search_region import (
     DEPTH,

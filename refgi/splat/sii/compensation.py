@@ -13,7 +13,7 @@ import numpy as np
 
 from refgi.jit import kernel, prange
 from refgi.rsm.raster.projection import Projection
-from refgi.sssil.pyramid.levels import levels
+from refgi.sssil.levels import levels
 from refgi.stages import stage
 from refgi.types import Array
 

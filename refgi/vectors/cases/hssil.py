@@ -13,8 +13,8 @@ from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Scene, SpotLight
 from refgi.settings import of, replaced
 from refgi.sssil.settings import PRESETS, HssilSettings, TemporalSettings
-from refgi.sssil.temporal.filter import History, history_of, with_frames
-from refgi.sssil.temporal.sequence import Sequence, SequenceFrame
+from refgi.sssil.temporal import Sequence, SequenceFrame
+from refgi.sssil.temporal_filter import History, history_of, with_frames
 from refgi.vectors.cases.scenes import (
     BULB,
     DOWN,

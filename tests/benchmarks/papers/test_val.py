@@ -192,7 +192,7 @@ def test_motion_pairs_lights_of_one_texel():
 
 
 def _moved_by(shift, texels):
-    from refgi.cluster.clustering.kmeans import Clustering
+    from refgi.cluster.kmeans import Clustering
 
     place = np.array([[0.0, 1.0, 2.0], [0.0] * 3, [0.0] * 3])
     up = np.array([[0.0] * 3, [1.0] * 3, [0.0] * 3])

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from refgi.cluster.clustering.kmeans import Clustering, cluster, in_use, mean_angle
-from refgi.cluster.clustering.rounds import angle
+from refgi.cluster.kmeans import Clustering, cluster, in_use, mean_angle
+from refgi.cluster.rounds import angle
 from refgi.errors import InputError
 from refgi.literal.val_areas import kmeans_assign, kmeans_rounds, kmeans_start
 from refgi.stages import observe
@@ -126,7 +126,7 @@ def test_reruns_and_other_numbers_of_threads_give_the_same_bits(monkeypatch, evi
 
     from refgi.jit import threads
 
-    monkeypatch.setattr("refgi.cluster.clustering.kmeans.SMALL", 0)
+    monkeypatch.setattr("refgi.cluster.kmeans.SMALL", 0)
     rng = np.random.default_rng(7)
     position, normal = rng.random((3, 5000)), rng.normal(size=(3, 5000))
     runs = []

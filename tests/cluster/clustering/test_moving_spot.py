@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from refgi.cluster.clustering.kmeans import cluster, in_use
+from refgi.cluster.kmeans import cluster, in_use
 
 FRAMES, LIGHTS, AREAS = 41, 1024, 30
 ROOM = np.array([4.0, 3.0, 4.0])

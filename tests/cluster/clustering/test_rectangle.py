@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from refgi.cluster.clustering.kmeans import Clustering, cluster
-from refgi.cluster.clustering.rectangle import area_lights, map_frames
+from refgi.cluster.kmeans import Clustering, cluster
+from refgi.cluster.rectangle import area_lights, map_frames
 from refgi.cluster.settings import ValSettings
 from refgi.errors import InputError
 from refgi.lights import PixelLights

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.filters.basis import depth_scale, series_depths, series_distance
-from refgi.cluster.maps.shadow_maps import ShadowMaps
+from refgi.cluster.maps import ShadowMaps
 from refgi.cluster.settings import ConstantBias, Csm, Pcss
 from refgi.cluster.visibility.pcss import blocker_test
 from refgi.cluster.visibility.search_region import above_half, scale_of, series

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from refgi.cluster.lighting.blur import blur
+from refgi.cluster.geometry_blur import blur
 from refgi.cluster.settings import BoxBlur, GeometryBlur
 from refgi.jit import threads
 from refgi.literal import val_filters as literal

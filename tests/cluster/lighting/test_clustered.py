@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from refgi.cluster.clustering.kmeans import cluster
-from refgi.cluster.clustering.rectangle import AreaLights, area_lights
-from refgi.cluster.lighting import clustered_irradiance
-from refgi.cluster.lighting.interleave import RUNS, assigned_subsets
-from refgi.cluster.maps.shadow_maps import shadow_maps
+from refgi.cluster.interleave import RUNS, assigned_subsets
+from refgi.cluster.kmeans import cluster
+from refgi.cluster import clustered_irradiance
+from refgi.cluster.maps import shadow_maps
+from refgi.cluster.rectangle import AreaLights, area_lights
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.shadow import visibility
 from refgi.errors import InputError

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from refgi.cluster.clustering.rectangle import AreaLights
+from refgi.cluster.rectangle import AreaLights
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.shadow import visibility
 from refgi.rsm.raster.projection import paraboloid_projection

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from refgi.cluster.maps.occluders import Ends, blockers, ends_of, everywhere, occluders
+from refgi.cluster.occluders import Ends, blockers, ends_of, everywhere, occluders
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.lights.settings import LightSettings

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from refgi.cluster.clustering.rectangle import AreaLights, map_frames
+from refgi.cluster.rectangle import AreaLights, map_frames
 from refgi.cluster.settings import ValSettings
 from refgi.scene import Camera, Geometry, Material, Scene, SpotLight
 from refgi.settings import of

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from refgi.cluster.maps.shadow_maps import shadow_maps
+from refgi.cluster.maps import shadow_maps
 from refgi.cluster.visibility.shadow import visibility
 from refgi.literal import val_filters, val_maps, val_series, val_visibility
 from refgi.settings import replaced

@@ -6,12 +6,16 @@ import numba
 import numpy as np
 import pytest
 
-from refgi.cluster.clustering.kmeans import cluster
-from refgi.cluster.clustering.rectangle import area_lights
-from refgi.cluster.lighting.clustered import visibility_by
-from refgi.cluster.maps.shadow_maps import shadow_maps
-from refgi.cluster.reference import back_projection_visibility, rectangle_visibility, reference_visibility
-from refgi.cluster.reference.rays import rectangle_points
+from refgi.cluster.clustered import visibility_by
+from refgi.cluster.kmeans import cluster
+from refgi.cluster.maps import shadow_maps
+from refgi.cluster.rectangle import area_lights
+from refgi.cluster.reference import (
+    back_projection_visibility,
+    rectangle_points,
+    rectangle_visibility,
+    reference_visibility,
+)
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from refgi.cluster.maps.shadow_maps import shadow_maps
+from refgi.cluster.back_projection import CELLS
+from refgi.cluster.maps import shadow_maps
 from refgi.cluster.reference import back_projection_visibility, rectangle_visibility
-from refgi.cluster.reference.back_projection import CELLS
 from refgi.frame import Frame
 from refgi.settings import replaced
 from tests.cluster.reference.edge import SETTINGS, receivers, scene, square_light, width_of

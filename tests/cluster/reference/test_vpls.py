@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from refgi.cluster.clustering.kmeans import cluster
-from refgi.cluster.clustering.rectangle import area_lights
+from refgi.cluster.kmeans import cluster
+from refgi.cluster.rectangle import area_lights
 from refgi.cluster.reference import vpl_visibility
 from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from refgi.cluster.clustering.rectangle import AreaLights
-from refgi.cluster.maps.shadow_maps import ShadowMaps
+from refgi.cluster.maps import ShadowMaps
+from refgi.cluster.rectangle import AreaLights
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.csm import compare_filtered, find_penumbra
 from refgi.cluster.visibility.search_region import (

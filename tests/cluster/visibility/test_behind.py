@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from refgi.cluster.maps.shadow_maps import shadow_maps
+from refgi.cluster.maps import shadow_maps
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.visibility.shadow import visibility
 from refgi.errors import InputError

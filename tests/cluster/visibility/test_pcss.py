@@ -7,7 +7,7 @@ import pytest
 
 from refgi.cluster.filters.basis import DepthScale
 from refgi.cluster.settings import ConstantBias, ValSettings
-from refgi.cluster.visibility.casters import casters_of
+from refgi.cluster.visibility.pcf import casters_of
 from refgi.cluster.visibility.pcss import PcssShadow, blocker_test, compare_texels
 from refgi.cluster.visibility.search_region import (
     DEPTH,

@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from refgi.settings import replaced
-from refgi.sssil.crown.gather import gather
+from refgi.sssil.crown import gather
 from refgi.sssil.hssil import hssil
-from refgi.sssil.pyramid.view import Level
+from refgi.sssil.view import Level
 from refgi.stages import observe
 
 DRAWS = 16  # of which texels are lit, in each of three channels

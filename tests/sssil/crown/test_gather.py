@@ -9,12 +9,11 @@ from refgi.frame import Frame
 from refgi.literal import hssil_crown as literal
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
-from refgi.sssil.crown.form_factor import DISC, SampleForm
-from refgi.sssil.crown.gather import _list_emitting, gather
-from refgi.sssil.crown.layout import Emitters
-from refgi.sssil.crown.pattern import samples_at
-from refgi.sssil.pyramid.view import Level
+from refgi.sssil.crown import _list_emitting, gather
+from refgi.sssil.form_factor import DISC, Emitters, SampleForm
+from refgi.sssil.pattern import samples_at
 from refgi.sssil.settings import PRESETS, HssilSettings
+from refgi.sssil.view import Level
 from tests.sssil.crown.counting import COUNTED, reads_of_levels
 from tests.sssil.crown.shares import share_inside
 

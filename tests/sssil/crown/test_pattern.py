@@ -7,8 +7,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.settings import of, replaced
-from refgi.sssil.crown.pattern import row_offsets, samples_at
-from refgi.sssil.crown.reach import coverage, texel_weights
+from refgi.sssil.pattern import coverage, row_offsets, samples_at, texel_weights
 from refgi.sssil.settings import HssilSettings
 from tests.sssil.crown.shares import share_inside
 

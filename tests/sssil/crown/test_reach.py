@@ -7,7 +7,7 @@ import pytest
 
 from refgi.errors import RefgiWarning
 from refgi.settings import of
-from refgi.sssil.crown.reach import chosen_radius, covering_radius, reach, warn_short_reach
+from refgi.sssil.pattern import chosen_radius, covering_radius, reach, warn_short_reach
 from refgi.sssil.settings import HssilSettings
 
 # first level, levels, radius -> reach and diagonal, texels: Fig. 6 at 1280 x 720 and Fig. 5 at 720 x 720

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from refgi.settings import of, replaced
-from refgi.sssil.crown.gather import gather
-from refgi.sssil.pyramid.view import Level
+from refgi.sssil.crown import gather
 from refgi.sssil.settings import HssilSettings
+from refgi.sssil.view import Level
 
 SIDE, HEIGHT, SPACING, RADIUS = 49, 1.0, 0.25, 12.0
 SEEDS, SAMPLES = 100, 16

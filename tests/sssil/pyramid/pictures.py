@@ -6,7 +6,7 @@ import numpy as np
 
 from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Camera
-from refgi.sssil.pyramid.levels import levels
+from refgi.sssil.levels import levels
 
 FLOAT32 = 1e-6  # a few roundings of float32
 FLOAT64 = 1e-13

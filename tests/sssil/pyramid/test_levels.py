@@ -11,7 +11,7 @@ from refgi.literal import hssil_levels as literal
 from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import load_scene
 from refgi.settings import of
-from refgi.sssil.pyramid.levels import pyramid, useful_levels
+from refgi.sssil.levels import pyramid, useful_levels
 from refgi.sssil.settings import HssilSettings
 from refgi.stages import Memory, observe
 from tests.naive.crossings import LIFT, corners_of, free

@@ -8,7 +8,7 @@ import pytest
 from refgi.frame import Frame
 from refgi.scene import PointLight, load_scene
 from refgi.settings import of, replaced
-from refgi.sssil.pyramid.levels import pyramid, sender_pyramid
+from refgi.sssil.levels import pyramid, sender_pyramid
 from refgi.sssil.settings import HssilSettings
 
 SETTINGS = of(HssilSettings, levels=4, radius=2.0, start="half", downsample="resampled")

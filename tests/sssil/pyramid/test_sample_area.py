@@ -10,8 +10,8 @@ from refgi.frame import Frame
 from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Camera, Material, PointLight, Scene, merge
 from refgi.scene.builtin.surfaces import rectangle
-from refgi.sssil.pyramid.levels import levels
-from refgi.sssil.pyramid.view import GRAZING
+from refgi.sssil.levels import levels
+from refgi.sssil.view import GRAZING
 from tests.sssil.pyramid.pictures import FLOAT64, camera, random_picture
 
 SUM_720P = 1e-3  # 0.1 % is asked at 720 lines; pixels on the outline count whole or not at all

@@ -12,9 +12,9 @@ from refgi.jit import threads
 from refgi.literal.temporal import recursion
 from refgi.scene import load_scene
 from refgi.scene.motion import faces_of, moved, rotation_about
+from refgi.sssil.motion import previous_points
 from refgi.sssil.temporal import Sequence, TemporalSettings
-from refgi.sssil.temporal.filter import clamp_to_neighbourhood, first_light, history_of, temporal_filter
-from refgi.sssil.temporal.motion import previous_points
+from refgi.sssil.temporal_filter import clamp_to_neighbourhood, first_light, history_of, temporal_filter
 
 SIZE = {"width": 40, "height": 30}
 QUICK = {"rsm_resolution": 8}  # of no effect on indirect light that is made up

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from refgi.frame import Frame
 from refgi.scene import Camera, Material, PointLight, Scene, merge
+from refgi.sssil.motion import as_solids, previous_points
 from refgi.sssil.settings import TemporalSettings
-from refgi.sssil.temporal.filter import earlier_geometry, first_light, history_of, temporal_filter
-from refgi.sssil.temporal.motion import as_solids, previous_points
+from refgi.sssil.temporal_filter import earlier_geometry, first_light, history_of, temporal_filter
 from tests.truth.scenes import rectangle
 
 ROUNDING = 1e-12  # m

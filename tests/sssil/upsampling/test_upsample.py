@@ -7,7 +7,7 @@ from refgi.errors import InputError
 from refgi.literal import upsampling as literal
 from refgi.settings import of
 from refgi.sssil.settings import HssilSettings
-from refgi.sssil.upsampling.upsample import Guide, upsample
+from refgi.sssil.upsampling import Guide, upsample
 
 # a share of the result; float32: some 30 roundings of half a unit, and off, whose rounding the 16th power multiplies
 TWIN = {np.float64: 1e-11, np.float32: 3e-4}

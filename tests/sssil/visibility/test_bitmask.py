@@ -6,11 +6,11 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.settings import of, replaced
-from refgi.sssil.crown.pattern import level_key, pixel_key, row_key
-from refgi.sssil.pyramid.view import Level
+from refgi.sssil.bitmask import bitmask_gather
+from refgi.sssil.pattern import level_key, pixel_key, row_key
 from refgi.sssil.settings import HssilSettings
-from refgi.sssil.visibility.bitmask import bitmask_gather
-from refgi.sssil.visibility.slices import fill_slices, slice_counts, slice_offsets, turn_of
+from refgi.sssil.slices import fill_slices, slice_counts, slice_offsets, turn_of
+from refgi.sssil.view import Level
 from tests.naive import bitmask as naive
 
 SETTINGS = of(HssilSettings, radius=4, levels=1, samples=24, slices=5, start="full", thickness=0.1)

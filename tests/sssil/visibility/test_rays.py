@@ -9,11 +9,11 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, merge
 from refgi.settings import of, replaced
-from refgi.sssil.crown.pattern import samples_at
-from refgi.sssil.pyramid.levels import pyramid
+from refgi.sssil.bitmask import bitmask_gather
+from refgi.sssil.levels import pyramid
+from refgi.sssil.pattern import samples_at
+from refgi.sssil.rays import Traced, add_unoccluded, ray_gather
 from refgi.sssil.settings import HssilSettings
-from refgi.sssil.visibility.bitmask import bitmask_gather
-from refgi.sssil.visibility.rays import Traced, add_unoccluded, ray_gather
 from tests.naive import bitmask as naive
 
 WHITE = Material("white", (0.6, 0.6, 0.6))

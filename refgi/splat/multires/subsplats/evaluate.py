@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from refgi.cluster.lighting.shadows import kept_shadows
 from refgi.cluster.val import cluster_lights, sum_at_pixels
+from refgi.cluster.visibility.shadow import kept_shadows
 from refgi.error_target.grid import Subsplats
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import PAIRS_AT_ONCE, Receivers, add_lights, checked

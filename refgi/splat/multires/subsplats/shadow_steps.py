@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from refgi.cluster.lighting.clustered import clustered_irradiance
+from refgi.cluster.clustered import clustered_irradiance
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.val import cluster_lights
 from refgi.error_target.grid import Subsplats

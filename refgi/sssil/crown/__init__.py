@@ -1,1 +1,0 @@
-"""Crown sampling around every texel of a level (Sec. 3.2, indirect lighting shader)."""

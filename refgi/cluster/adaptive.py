@@ -1,9 +1,7 @@
 """Number of area lights by a target error of visibility, which Dong et al. leave as future work (Sec. 8).
 
-At some pixels the light of all pixel lights is summed twice: with a shadow ray for each, and under the visibility of
-their area lights. Area lights are doubled until the two are near enough to each other, and one step back is tried.
-
-`group_lights` makes area lights of pixel lights and draws their maps (Sec. 5, 6).
+At some pixels all pixel lights are summed with a shadow ray for each and under the visibility of their area lights.
+Area lights are doubled until the two are near enough to each other, and one step back is tried.
 """
 
 import dataclasses
@@ -44,10 +42,9 @@ BACK = 0.75  # of the area lights that were enough: the one step back
 def group_lights(
     frame: "Frame", lights: "PixelLights", settings: "ValSettings", count: int, footprint: Array | None = None
 ) -> tuple[AreaLights, ShadowMaps | None]:
-    """Group N pixel lights into M (`count`) area lights, one for each cluster, and draw what each sees.
+    """Group N pixel lights into M area lights and draw what each sees (Sec. 5, 6); no maps where none are read.
 
-    No maps (None) where the kind of visibility does not ask. `footprint` (N,) is each light's surface, m^2, where a
-    cluster of one light is its footprint.
+    `footprint` (N,) is each light's surface, m^2, where a cluster of one light is its footprint.
     """
     clusters = clusters_of(lights.position, lights.normal, count, settings.clusters, frame.illuminated_extent)
     areas = area_lights(lights, clusters, settings.area, footprint)

@@ -1,7 +1,7 @@
 """The light of one area light's pixel lights on all receivers, under their common visibility (Sec. 4).
 
-A tile of receivers runs past the members of its subset, as in `pair_sum`; those that receive light move together, and V
-is found for them alone. What lies in no member's reach is not even loaded.
+A tile of receivers runs past the members of its subset; those that receive light move together, and V is found for them
+alone. What lies in no member's reach is not even loaded.
 """
 
 from typing import Any, NamedTuple
@@ -44,10 +44,7 @@ def bound_tiles(receivers: ReceiverTiles) -> None:
 
 
 def members_behind(receivers: ReceiverTiles, lights: Array, start: Array) -> tuple[int, int]:
-    """Return how many pairs of tile and light of its subset are passed over for all area lights, and of how many.
-
-    `lights` (9, N + 1) as for `add_unshadowed`; `start` (M, subsets + 1) has a row for each area light.
-    """
+    """Return how many pairs of tile and light of its subset are passed over for all area lights, and of how many."""
     reached = np.zeros(receivers.tiles.shape[1], np.int64)
     _count_reached(receivers, lights, start, reached)
     pairs = int(np.diff(start, axis=1).sum(axis=0)[receivers.tiles[SUBSET]].sum())
@@ -70,10 +67,9 @@ def _count_reached(receivers: ReceiverTiles, lights: Array, start: Array, reache
 def add_unshadowed(
     receivers: ReceiverTiles, lights: Array, clamp: Clamp | None, start: Array, irradiance: Array
 ) -> None:
-    """Add the diffuse lights of one area light to every receiver, those of its subset.
+    """Add the diffuse lights of one area light to `irradiance` (3, n) of every receiver, those of its subset.
 
-    `lights` (9, N + 1) are packed and sorted, the last one black; `start` (subsets + 1,) has the first light of each
-    subset, and one past its last. Adds to `irradiance`, (3, n), W/m^2.
+    `lights` (9, N + 1) are packed and sorted, the last one black; `start` (subsets + 1,) is where each subset's begin.
     """
     tasks = min(TASKS, receivers.tiles.shape[1])
     for task in prange(tasks):
@@ -90,10 +86,7 @@ def add_shadowed(
     receivers: ReceiverTiles, lights: Array, clamp: Clamp | None, start: Array, shadow: Any, channels: int,
     irradiance: Array,
 ) -> None:
-    """Add the diffuse lights of one area light under its shadow; arguments as in `add_unshadowed`.
-
-    `shadow` is one of `visibility.shadow`, and `channels` says how many of a filtered map it reads.
-    """
+    """Add the diffuse lights of one area light under its `shadow`, which reads `channels` of a filtered map."""
     tasks = min(TASKS, receivers.tiles.shape[1])
     for task in prange(tasks):
         real = receivers.position.dtype

@@ -1,10 +1,7 @@
 """Visibility of an area light's rectangle by projecting its map back onto it (Guennebaud, Barthe and Paulin 2006).
 
-Each texel nearer than the receiver's surface is a small patch at its depth. Seen from the receiver, the patch hides
-a quadrilateral of the light's plane; V is the share of the rectangle that none of them hides. Patches that overlap
-count once: a grid over the rectangle keeps their union.
-
-Coordinates: those of the rectangle, along its two sides and its normal, from the centre of the map.
+Each texel nearer than the receiver's surface is a patch at its depth that hides a quadrilateral of the light's plane. V
+is the share of the rectangle that none hides, kept as a grid in coordinates of its sides and normal.
 """
 
 import math
@@ -40,26 +37,10 @@ def back_projection_visibility(
 ) -> VisibilityFunction:
     """Return V of an area light from its map, projected back onto its rectangle.
 
-    Parameters
-    ----------
-    areas : AreaLights
-        The area lights.
-    maps : ShadowMaps
-        What each sees.
-    rays : callable, optional
-        V of receivers behind an area light. Without, that of the maps of the hemispheres behind, or 1.
-
-    Returns
-    -------
-    callable
-        A `VisibilityFunction`, in the dtype of the points.
-
-    Notes
-    -----
-    Patches of neighbouring texels at unlike depths leave gaps or overlap, as published: V is too large behind slanted
-    surfaces by up to their share. What a map does not see from its centre cannot hide anything. An area light without
-    a map has V = 1, and so has a receiver with no part of the rectangle above its horizon. What lies above that of an
-    interpolated normal and below the face counts as hidden.
+    `rays` gives V of receivers behind an area light; without, the maps of the hemispheres behind do, or it is 1. As
+    published, patches of neighbouring texels at unlike depths leave gaps or overlap: V is too large behind slanted
+    surfaces. Without a map V = 1, as for a receiver with no part of the rectangle above its horizon. What lies above
+    that of an interpolated normal and below the face counts as hidden.
     """
     @lru_cache(maxsize=2)
     def patches_of(m: int, sign: float) -> Patches:

@@ -1,10 +1,7 @@
 """Tiles of a picture as the blur reads them, and subsets of lights that its window misses (Sec. 6).
 
-A window of n x n pixels holds each of the n^2 subsets once, so each place of it stands for one subset, and for all
-pixels n apart that sum the same lights. Beside an edge some places of the window lie on another surface. Without them
-the mean is that of some subsets alone, other ones from pixel to pixel, and their squares show. Each such place takes
-the nearest pixel of its subset on the surface instead, up to `REACH` n away: along a straight edge the window moves
-inwards as it does at the rim of the picture.
+Beside an edge some places of a window lie on another surface, and its mean is that of some subsets alone, whose squares
+show. Each such place takes the nearest pixel of its subset on the surface, up to `REACH` windows away.
 """
 
 from functools import lru_cache
@@ -28,11 +25,10 @@ def load_pixels(
     tile: Array, irradiance: Array, position: Array, normal: Array, covered: Array, top: int, left: int, wide: int,
     size: int,
 ) -> None:
-    """Copy a tile with its surroundings; outside the picture, from n pixels further inside (n = `size`).
+    """Copy a tile with its surroundings: planes of irradiance, position and normal next to each other in each row.
 
-    Fills `tile` (rows, END): planes of irradiance, position and normal, each (3, h, w), next to each other in each row.
-    Positions of pixels that are not `covered` are put FAR away. `top` and `left` may lie outside the picture; `wide` is
-    without the surroundings.
+    Outside the picture from n = `size` pixels further inside. Pixels that are not covered are put FAR away; `top` and
+    `left` may lie outside the picture; `wide` is without the surroundings.
     """
     height, width = covered.shape
     last = wide + size - 1
@@ -89,11 +85,7 @@ def _within(place: int, count: int, size: int) -> int:
 
 @kernel
 def is_one_surface(tile: Array, wide: int, square_extent: Any, cosine: Any) -> bool:
-    """Return whether all pixels around a tile of `load_pixels` surely count for each other.
-
-    By bounds: where it is False they may count all the same. `wide` is with the surroundings; `square_extent`, m^2; a
-    `cosine` of -inf asks for none.
-    """
+    """Return whether all pixels around a tile surely count for each other, by bounds; cosine -inf: any normal."""
     real = tile.dtype.type
     one = real(1.0)
     bounds = np.empty((7, COLUMNS), tile.dtype)  # least and most of x, y, z; least cosine
@@ -133,11 +125,7 @@ REACH = 1  # windows on each side that are searched
 
 @lru_cache(maxsize=8)
 def places_of_subsets(size: int) -> Array:
-    """Return where else each place of a window of n x n pixels finds its subset, from near to far.
-
-    (n, n, (2 REACH + 1)^2 - 1, 2) int64: rows and columns from the pixel that the window is of; equally far ones by
-    row, then column.
-    """
+    """Return where else each place of a window finds its subset, near to far, (n, n, places, 2) from the pixel."""
     steps = np.arange(-REACH, REACH + 1) * size
     aside = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
     aside = aside[aside.any(axis=1)]
@@ -152,11 +140,10 @@ def add_missing(
     tile: Array, row: int, size: int, square_extent: Any, cosine: Any, places: Array, planes: Any, top: int, left: int,
     wide: int, counts: Array, sums: Array,
 ) -> None:
-    """Add differences to pixels farther off for each place of a window that does not count.
+    """Add differences to pixels farther off, at `places` of `places_of_subsets`, for each place that does not count.
 
-    `sums` (4, WIDE) has the sums over the window of the pixels from (`top`, `left`) on, and how many pixels counted;
-    `planes` are irradiance, position, normal and covered of the whole picture, `places` of `places_of_subsets`.
-    `counts` (>= n,) of bool is overwritten.
+    `sums` (4, WIDE) has the sums over the window of the pixels from (`top`, `left`) on, and how many counted; `planes`
+    are of the whole picture; `counts` is scratch.
     """
     middle, one, whole = row + size // 2, tile.dtype.type(1.0), tile.dtype.type(size * size)
     irradiance, position, normal, covered = planes

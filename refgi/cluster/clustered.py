@@ -1,8 +1,8 @@
-"""All pixel lights under the visibility of their area lights (Sec. 4): E(x) = sum_i E_i(x) V_C(i)(x).
+"""All pixel lights under the visibility of their area lights (VAL Sec. 4): E(x) = sum_i E_i(x) V_C(i)(x).
 
-Area light by area light, so that what is read of one shadow map stays near the processor: the light of its members,
-then V where there is any. Diffuse lights under one map go tile by tile in one kernel. Glossy and sphere lights, and
-visibility that is found in Python (by rays, back projection, from behind), go by lists of receivers, to the same bits.
+Area light by area light, so that what is read of one shadow map stays near the processor. Diffuse lights under one map
+go tile by tile in one kernel; other lights, and visibility found in Python, by lists of receivers, to the same bits.
+Glossy receivers sum all lights, L_s(x) = sum_m V_m(x) sum_i f_s I_i cos / r^2: nothing is interleaved or blurred.
 """
 
 from inspect import signature

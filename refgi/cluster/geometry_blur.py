@@ -1,12 +1,8 @@
 """Geometry-aware blur, a joint bilateral box filter: the mean over n x n pixels of the same surface (Sec. 6).
 
 [Laine et al. 2007] A pixel q counts for p where ``|x_q - x_p| <= extent`` and ``<n_p . n_q> >= cosine``. All weights
-are 1: a window of n x n pixels sees each subset of lights once wherever it lies, and any other kernel would leave the
-pattern of the subsets in the picture. At the rim of the picture the window is moved inwards, for the same reason, and
-beside the edge of a surface subsets that it misses come from farther along the surface (`blur_tile`).
-
-Threads take tiles of TALL x WIDE pixels with their surroundings; the pixels of a row are the SIMD lanes. Where bounds
-say that all pixels around a tile count for each other, nothing is compared.
+are 1: a window of n x n pixels sees each subset of lights once wherever it lies, moved inwards at the picture's rim.
+Threads take tiles with their surroundings; where bounds say that all pixels around count, nothing is compared.
 """
 
 from typing import TYPE_CHECKING, Any

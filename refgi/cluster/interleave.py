@@ -1,9 +1,7 @@
 """Interleaved sampling: each pixel of a block of n x n sums one light of n^2 (Sec. 6; Segovia et al. 2006).
 
-Pixel (x, y) takes the lights of subset (y mod n) n + x mod n, and each of them n^2 times. Pixels of one subset are kept
-together, so that the pixels of a tile share their lights.
-
-The packed lights of each area light and each subset, next to each other.
+Pixel (x, y) takes the lights of subset (y mod n) n + x mod n, each of them n^2 times. Pixels of one subset are kept
+together, so that those of a tile share their lights; so are the packed lights of each area light and subset.
 """
 
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -36,11 +34,7 @@ class Subsets(NamedTuple):
 
 
 def subsets(covered: Array, side: int) -> Subsets:
-    """Sort covered pixels, (h, w) bool, by the subset of lights that they sum, each once.
-
-    `side` n is that of a block, 1 to 64 pixels, else `InputError`. Those of a subset come by blocks of `BLOCK` x
-    `BLOCK` of them.
-    """
+    """Sort covered pixels, (h, w) bool, by the subset of lights that they sum, in blocks of side 1 to 64 pixels."""
     expect(1 <= side <= MOST_BLOCK, "interleaving", f"1 to {MOST_BLOCK} pixels", side)
     covered = np.ascontiguousarray(covered)
     counts = np.empty(side * side, np.int64)
@@ -60,11 +54,9 @@ def subsets(covered: Array, side: int) -> Subsets:
 def assigned_subsets(area_of: Array, side: int, assignment: "Assignment") -> Array:
     """Return which subset each light belongs to, (N,) int64, 0 to n^2 - 1, for area lights C(i), (N,), and side n.
 
-    "index": light i to the subset i mod n^2; "cluster": lights sorted by area light, cut into equal runs and these
-    assigned in turn, `RUNS` to each subset, fewer where lights are few.
-    [Dong09] Sec. 6 does not say which lights a pixel takes. By index it meets a part of nearly every area light, and
-    the visibility of each costs as much as for all its lights; by cluster it meets two to four of 30. Runs that follow
-    each other lie far apart in the block, as the lights of a cluster should in any part of a window.
+    "index": i mod n^2; "cluster": lights sorted by area light, cut into equal runs, `RUNS` to each subset. [Dong09]
+    Sec. 6 does not say which. By index a pixel meets a part of nearly every area light, and pays for the visibility of
+    each; by cluster it meets two to four of 30. Runs that follow each other lie far apart in the block.
     """
     count, subset_count = len(area_of), side * side
     lights = np.arange(count)
@@ -156,10 +148,7 @@ def member_lights(packed: Packed, area_of: Array, count: int, subset: Array, sub
 def add_members(
     position: Array, normal: Array, parts: Subsets, members: MemberLights, m: int, irradiance: Array
 ) -> None:
-    """Add the lights of area light m, of any kind, to the receivers of each subset, (3, n) in the order of `parts`.
-
-    `irradiance` (3, n), W/m^2, is zeros, which are filled.
-    """
+    """Add the lights of area light m, of any kind, to each subset's receivers; `irradiance` (3, n) is 0 before."""
     for subset, (first, last) in enumerate(zip(parts.start[:-1], parts.start[1:], strict=True)):
         ends = slice(subset, subset + 2)
         some = some_lights(members.packed, members.start[m, ends], members.lobe_start[m, ends])

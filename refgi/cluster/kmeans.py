@@ -1,6 +1,8 @@
-"""Clusters of lights by k-means over position and normal (Sec. 5): the mapping C(i) from light to area light.
+"""Clusters of lights by k-means over position and normal (VAL Sec. 5): the mapping C(i) from light to area light.
 
-What a clustering is contribution: how much normals differ in a cluster (Fig. 6), how many clusters are in use (Fig. 8).
+- position (3, light): Places of the lights, m.
+- normal (3, light): Their unit normals.
+- axis (3, cluster): Their unit normals.
 """
 
 import math

@@ -1,10 +1,8 @@
-"""Paraboloid shadow maps: the distance from each area light's centre to the nearest occluder (Sec. 4.2, 6).
+"""Paraboloid shadow maps: the distance from each area light's centre to the nearest occluder (VAL Sec. 4.2, 6).
 
-A map looks along the area light's normal from its centre, lifted a little off the surface. The centre of a cluster
-may lie inside geometry, so what is near it must be ignored (Sec. 5.1, Fig. 7); the paper does not say how near.
-Here it is a share `near_distance` of the cluster's radius, and `near_geometry` says what within it is left out.
-
-`traced_maps` finds the same distances by a ray through each texel's centre.
+A map looks along the area light's normal from its centre, lifted a little off the surface. What is near the centre,
+which may lie inside geometry, must be ignored (Sec. 5.1, Fig. 7); the paper does not say how near. By steps every area
+light has a map; an empty one, inf everywhere, occludes nothing.
 """
 
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -35,12 +33,10 @@ BACKWARD = np.diag([-1.0, 1.0, -1.0])  # the frame of the hemisphere behind: rig
 def traced_maps(
     projection: Projection, drawn: Blockers, ignored: Ignored, dtype: npt.DTypeLike, tracer: "Tracer | None" = None
 ) -> tuple[Array, Array, Array]:
-    """Measure distances on k paraboloid maps of n x n texels by rays against the triangles drawn.
+    """Measure distances on k paraboloid maps by float32 rays against the triangles drawn, or of `tracer`.
 
-    Rays are float32, of `tracer` or one made of the triangles; what lies too near the centres is ignored. Returns
-    distances (k, n, n), m, inf where the map is empty and outside the disc; the smallest on each map (k,) float64, inf
-    where nothing is; and the triangles (k,) int64 that reach into each map's hemisphere and are ignored for their
-    planes or lie in its ball.
+    Returns distances (k, n, n), the smallest on each map (k,), inf where nothing is, and the triangles (k,) that are
+    ignored, as `distance_maps`.
     """
     n = projection.width
     distance, left_out = np.full((projection.maps, n, n), np.inf, dtype), np.zeros(projection.maps, np.int64)

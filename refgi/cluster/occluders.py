@@ -1,8 +1,7 @@
 """Occluders: triangles that can lie between pixel lights and receivers; those on the convex hull of both cannot.
 
-Light goes from pixel lights to what the camera sees. A triangle whose plane has all of both on one side meets a segment
-between them at an end of it at most. Floors, walls and ceilings of a closed room are of this kind, and often make up
-most of what a map shows; so is whatever lies outside of the room.
+A triangle whose plane has all of both on one side meets a segment of light at an end of it at most: floors, walls and
+ceilings of a closed room, often most of what a map shows, and whatever lies outside of the room.
 """
 
 import dataclasses
@@ -70,10 +69,7 @@ class Ends(NamedTuple):
 
 
 def ends_of(frame: "Frame", lights: "PixelLights") -> Ends:
-    """Return where the light of pixel lights begins and ends.
-
-    Vertices of the triangles that the camera sees, places of the lights, and the scene's extent.
-    """
+    """Return where light begins and ends: vertices of triangles seen, places of lights, the scene's extent."""
     vertices = seen_vertices(frame.scene.geometry, frame.gbuffer.triangle_id)
     return Ends(vertices, frame.visible_extent, frame.illuminated_extent, lights.position)
 
@@ -122,21 +118,9 @@ def occluders(geometry: Geometry, ends: Ends | None = None, touching: bool = Fal
 
 
 def blockers(geometry: Geometry, alone: bool, ends: Ends | None = None) -> Blockers:
-    """Return the triangles that maps are drawn from.
+    """Return the triangles that maps are drawn from, in mesh order.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        The triangles.
-    alone : bool
-        Leave out those that cannot block anything, the walls of a room; else those alone that lie outside of it.
-    ends : Ends, optional
-        As in `occluders`.
-
-    Returns
-    -------
-    Blockers
-        The triangles, in mesh order.
+    `alone` leaves out those that cannot block anything, the walls of a room; else those alone that lie outside of it.
     """
     return selected_blockers(geometry, occluders(geometry, ends, not alone))
 
@@ -222,8 +206,7 @@ def _hull(points: Array) -> Array:
 def _on_border(vertices: Array, faces: Array, points: Array, tolerance: float, border: Array) -> None:
     """Return which planes have all points on one side, up to a tolerance.
 
-    A batch of triangles looks at a few points in SIMD lanes, after which most have some on both sides; the others look
-    at the rest one by one.
+    A batch of triangles looks at a few points in SIMD lanes, after which most have some on both sides.
     """
     for part in prange(-(-len(faces) // AT_ONCE)):
         plane, above, below = np.empty(ROWS * BATCH), np.empty(BATCH, np.bool_), np.empty(BATCH, np.bool_)

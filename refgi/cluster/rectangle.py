@@ -1,8 +1,6 @@
 """Virtual area lights (VALs, Sec. 4, 5, 6): the bounding rectangle of each cluster's lights, projected onto its plane.
 
-A virtual area light stands for the visibility of the lights of one cluster. Its rectangle lies along fixed axes, those
-of the lights, or those of least area; the paper names none. A square turned by 45 degrees fills twice its area of fixed
-axes.
+It lies along fixed axes, those of the lights, or those of least area; the paper names none.
 """
 
 import math
@@ -30,11 +28,7 @@ FLAT = 1e-5  # of a cluster's radius: a narrower rectangle is a line, of no widt
 
 
 def turn_of(flat: Array, axes: Axes) -> float:
-    """Return the angle by which the axes are turned within the plane, from the first axis towards the second.
-
-    `flat` (2, n) are points of the plane, m. "fixed": not at all; "pca": along the greatest variance; "min_area": along
-    the sides of the rectangle of least area. 0 where no direction stands out.
-    """
+    """Return the angle of axes of points (2, n), m, from the first to the second; 0 where no direction stands out."""
     if axes == "fixed" or flat.shape[1] < 2:
         return 0.0
     return _of_spread(flat) if axes == "pca" else _of_least_area(flat)
@@ -151,10 +145,7 @@ def rectangles(
 
 
 def map_frames(normal: Array) -> Array:
-    """Return the frames of paraboloid maps along unit normals (3, M), those of `paraboloid_projection`.
-
-    (M, 3, 3), rows right, down, forward.
-    """
+    """Return the frames of paraboloid maps along unit normals (3, M): (M, 3, 3), rows right, down, forward."""
     forward = np.ascontiguousarray(normal.T)
     up = np.where(np.abs(forward[:, 1:2]) < UPRIGHT, (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))
     right = np.cross(forward, up)

@@ -1,10 +1,7 @@
 """Visibility of an area light by rays: to its rectangle, which soft shadows approximate, or to its pixel lights.
 
-Rays from receivers to points on lights, many for each receiver, and what share of them arrives.
-
 By pixel lights V_C(x) = sum over the cluster of w_i V(p_i, x) / sum of w_i. With w_i = L_i(x), what each light gives to
-x, the sum of the paper's third equation is that of its second, exactly: no error of clustering is left, and none of
-soft shadows.
+x, no error of clustering is left, and none of soft shadows.
 """
 
 from collections.abc import Callable
@@ -43,14 +40,12 @@ def free_share(
     contribution: Callable[[Array, Array], Array] | None, grain: float, ball: Ball | None = None,
     shading: Array | None = None,
 ) -> Array:
-    """Return the share of each receiver's rays that arrives, each weighted by its contribution: (n,), 1 without weight.
+    """Return the share of each receiver's rays that arrives, weighted by contribution: (n,), 1 without weight.
 
-    Receivers `points` and the unit normals of their faces, off which rays start, are (3, n), `targets` on lights (3,
-    k), m, `upward` (3, k) or (3, 1) unit normals there, on the side that rays come from. `contribution` takes vectors
-    from some receivers to the targets (n, k, 3) and the receivers' normals (n, 3) to weights (n, k), 0 or more; None:
-    all the same. Targets below the horizon of `shading` (3, n), the unit normals that cosines are taken with (the
-    faces' where absent), do not count; those above it and below the face count as hidden. `grain`: how far above their
-    surfaces rays start and end, as `ray_offset` has it, m; rays end where they enter `ball`.
+    Receivers and the unit normals of their faces are (3, n), `targets` on lights (3, k), m, `upward` (3, k) or (3, 1)
+    normals there. `contribution` takes vectors (n, k, 3) to the targets and the receivers' normals (n, 3) to weights
+    (n, k). Targets below the horizon of `shading` (3, n), the normals of cosines, do not count; those above it and
+    below the face are hidden. `grain` is that of `ray_offset`, m; rays end where they enter `ball`.
     """
     from refgi.rays import STEPS
 
@@ -98,32 +93,11 @@ def _way_to(ball: Ball | None, at: Array, toward: Array) -> Any:
 def rectangle_visibility(
     frame: "Frame", areas: AreaLights, settings: ShadowMapSettings, points: int = POINTS, ends: Ends | None = None
 ) -> VisibilityFunction:
-    """Return V of an area light as the share of its rectangle that a receiver sees.
+    """Return V of an area light as the share of its rectangle, with its own sides, that a receiver sees.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene.
-    areas : AreaLights
-        The area lights.
-    settings : ShadowMapSettings
-        What blocks near an area light, and what is seen from behind it.
-    points : int
-        Points on each rectangle, spread evenly.
-    ends : Ends, optional
-        Where light begins and ends; absent: anywhere in the scene.
-
-    Returns
-    -------
-    callable
-        A `VisibilityFunction`, in the dtype of the points.
-
-    Notes
-    -----
-    The rectangle is the bounding one with its own sides, not a disc or square of size Delta. As in the maps,
-    nothing within a share `near_distance` of the cluster's radius around the centre blocks, or no plane that passes
-    there (`near_geometry`). Points below the receiver's horizon do not count; where none is left V is 1. Behind the
-    area light V is 1 ("visible"), or what rays say in all other modes of `behind`.
+    Rays end at `points` of it, spread evenly. As in the maps, nothing within `near_distance` of the centre blocks, or
+    no plane that passes there. Points below the receiver's horizon do not count; where none is left V is 1. Behind the
+    area light V is 1 ("visible"), or what rays say in all other modes of `behind`. `ends`: where light begins and ends.
     """
     drawn = blockers(frame.scene.geometry, settings.occluders_alone, ends)
     on_square = _even(points)
@@ -158,10 +132,7 @@ def rectangle_points(areas: AreaLights, m: int, on_square: Array) -> Array:
 def tracer_without_near(
     frame: "Frame", drawn: Blockers, areas: AreaLights, m: int, settings: ShadowMapSettings
 ) -> Tracer:
-    """Return rays against what area light m's map is drawn from, of triangles that can block at all.
-
-    The frame's tracer where settings leave out no planes near the centre.
-    """
+    """Return rays against what area light m's map is drawn from; `tracer` where no planes are left out."""
     distance = settings.near_share * areas.radius[m]
     if settings.near_geometry != "planes" or distance == 0:
         return frame.tracer
@@ -185,29 +156,10 @@ def vpl_visibility(
 ) -> VisibilityFunction:
     """Return V of an area light as the share of its lights that a receiver sees.
 
-    Parameters
-    ----------
-    frame : Frame
-        The scene, whose triangles block.
-    lights : PixelLights
-        The lights.
-    areas : AreaLights
-        Their clusters.
-    weights : {"even", "flux", "light"}
-        What a light counts: the same for all; its flux; the light it would give a diffuse receiver, with both cosines
-        and the distance.
-
-    Returns
-    -------
-    callable
-        A `VisibilityFunction`, in the dtype of the points.
-
-    Notes
-    -----
-    Lights that face away from a receiver, or lie below its horizon, give it nothing and do not count; where none is
-    left V is 1. Those above the horizon of an interpolated normal and below the face count as hidden. There is no rule
-    for receivers behind the area light: each light has a normal of its own. A light's flux is the sum over its
-    channels, diffuse and glossy.
+    A light counts 1 ("even"), its "flux" in all channels, or the "light" that it would give a diffuse receiver. Lights
+    that face away from a receiver, or lie below its horizon, do not count; where none is left V is 1. Those above the
+    horizon of an interpolated normal and below the face are hidden. There is no rule for receivers behind the area
+    light.
     """
     position, normal = (np.asarray(a, np.float64) for a in (lights.position, lights.normal))
     flux = np.asarray(lights.flux, np.float64).sum(axis=0)
@@ -240,26 +192,7 @@ def reference_visibility(
     frame: "Frame", lights: "PixelLights", areas: AreaLights, maps: "ShadowMaps | None",
     settings: ValSettings,
 ) -> VisibilityFunction | None:
-    """Return the reference visibility of `settings.visibility`.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene.
-    lights : PixelLights
-        The pixel lights.
-    areas : AreaLights
-        Their area lights.
-    maps : ShadowMaps or None
-        Their shadow maps; for `BackProjection` alone.
-    settings : ValSettings
-        Says which.
-
-    Returns
-    -------
-    callable or None
-        A `VisibilityFunction`; None where it is not by reference.
-    """
+    """Return the reference visibility of `settings.visibility`; None where it is not by reference."""
     if isinstance(settings.visibility, RaysVpls):
         return vpl_visibility(frame, lights, areas)
     projected = maps if isinstance(settings.visibility, BackProjection) else None

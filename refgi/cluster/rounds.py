@@ -1,13 +1,8 @@
 """The rounds of k-means (Sec. 5.1, 6): each light to the area light that is nearest in position and normal.
 
-The distance is d = w_x |x - c| + w_a angle(n, n_c), the printed form, or w_x |x - c|^2 + w_a |n - n_c|^2. Weights
-arrive with their units taken in, and whether to square. Angles are exact to rounding everywhere: near 0 and pi the arc
-cosine of a dot product is not, and lights of one wall differ by just that.
-
-Distances (their roots, where squared) obey the triangle inequality: an area light more than twice as far from a
-light's own one as the light itself is cannot be nearer to it (Elkan 2003). Lights that share an area light are looked
-at together, against those few that may be nearer to one of them. What is left out could not have been chosen, so the
-result is that of comparing all, to the bit.
+Distances (their roots, where squared) obey the triangle inequality: an area light more than twice as far from a light's
+own one as the light itself is cannot be nearer to it (Elkan 2003). Lights that share an area light are looked at
+together, against those few that may be nearer to one of them: the result is that of comparing all, to the bit.
 """
 
 import math
@@ -25,9 +20,8 @@ HALF_PI = 0.5 * math.pi
 def angle(dot: Any, apart: Any) -> Any:
     """Return the angle between two unit vectors, 0 to pi within 1e-15, without branches.
 
-    From their dot product and the squared length of their difference, of the sum instead where `dot` is negative:
-    2 asin(apart^(1/2) / 2), or pi less that, beyond 60 degrees off the perpendicular, and pi/2 - asin(dot) within.
-    asin(s) = s + s z P(z) with z = s^2 <= 1/4; P is of degree 11.
+    From their dot product and the squared length of their difference, of the sum where `dot` is negative: an arc cosine
+    would lose the small angles of lights of one wall. asin(s) = s + s z P(z) with z = s^2 <= 1/4; P is of degree 11.
     """
     steep = abs(dot) >= 0.5
     z = min(0.25 * apart, 0.3) if steep else dot * dot
@@ -63,10 +57,7 @@ def linear(
 
 @kernel
 def fill_linear(lights: Any, count: int, other: Any, k: int, per_metre: float, per_radian: float, out: Any) -> None:
-    """Fill out[:count] with w_x |x - c| + w_a angle(n, n_c) of lights (6, r) and area light k of `other` (6, M).
-
-    Rows are position, m, and unit normal.
-    """
+    """Fill out[:count] with w_x |x - c| + w_a angle(n, n_c) of lights (6, r), and area light k of `other`."""
     x, y, z, nx, ny, nz = lights[0], lights[1], lights[2], lights[3], lights[4], lights[5]
     cx, cy, cz, ax, ay, az = other[0, k], other[1, k], other[2, k], other[3, k], other[4, k], other[5, k]
     if per_radian == 0.0:
@@ -80,10 +71,7 @@ def fill_linear(lights: Any, count: int, other: Any, k: int, per_metre: float, p
 
 @kernel
 def fill_squares(lights: Any, count: int, other: Any, k: int, per_area: float, per_square: float, out: Any) -> None:
-    """Fill out[:count] with w_x |x - c|^2 + w_a |n - n_c|^2 of lights (6, r) and area light k of `other` (6, M).
-
-    Rows are position, m, and unit normal.
-    """
+    """Fill out[:count] with w_x |x - c|^2 + w_a |n - n_c|^2, as `fill_linear`."""
     x, y, z, nx, ny, nz = lights[0], lights[1], lights[2], lights[3], lights[4], lights[5]
     cx, cy, cz, ax, ay, az = other[0, k], other[1, k], other[2, k], other[3, k], other[4, k], other[5, k]
     for i in range(count):
@@ -126,8 +114,7 @@ class Rounds(NamedTuple):
 def iterate(state: Rounds, metric: Metric, rounds: int, objective: Array) -> int:
     """Run k-means until no light changes its area light, or for a number of rounds; return the rounds of means made.
 
-    `state` becomes the result; `objective` (rounds + 1,) is filled with the sum of all distances at the start and after
-    each round.
+    `objective` (rounds + 1,) is filled with the sum of all distances at the start and after each round.
     """
     done = 0
     while True:
@@ -173,10 +160,7 @@ def sort_lights(state: Rounds) -> int:
 
 @kernel
 def move_to_means(state: Rounds) -> None:
-    """Move each area light to the mean of its lights, summed in their order; without lights it stays.
-
-    Sums are taken from the first light, so that what all have in common, a wall's coordinate, is the mean's too.
-    """
+    """Move each area light to the mean of its lights, taken from the first: what all have in common stays."""
     lights, areas, first = state.lights, state.areas, 0
     for k in range(len(state.members)):
         members = state.members[k]
@@ -227,10 +211,7 @@ def _distances(lights: Array, count: int, areas: Array, k: int, metric: Metric, 
 def _doubtful(
     state: Rounds, metric: Metric, first: int, count: int, k: int, scratch: Array, row: Array, pick: Array
 ) -> tuple[int, float]:
-    """Gather the lights of a tile that may be nearer to another area light; return how many and the farthest.
-
-    All of them are lights of area light k, and `row` holds its distances to the others.
-    """
+    """Gather a tile's lights, of area light k, that may be nearer to another; return how many and the farthest."""
     for j in range(count):
         i = state.order[first + j]
         for c in range(6):

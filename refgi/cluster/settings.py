@@ -206,10 +206,9 @@ class GeometryBlur(Settings):
 class ValSettings(Settings):
     """What `val` can be set to; the defaults are the paper's, those of docs/methods/val where it is silent.
 
-    By default subsplats are lit until `subsplats.target` is met, in place of the paper's blocks of pixels: every pixel
-    of pictures of up to 2^16 of them, unless visibility is by rays, and without a clamp.
-
-    `pairs.clamp` "auto" is the form factor of the disc that a light stands for, where lights have footprints.
+    By default subsplats are lit until `subsplats.target` is met, in place of blocks of pixels: every pixel of pictures
+    of up to 2^16 of them, unless visibility is by rays, and without a clamp. The clamp "auto" is "disc" where lights
+    have footprints.
     """
 
     lights: LightSettings = setting(LightSettings(count=1024), "pixel lights")

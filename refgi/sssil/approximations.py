@@ -1,9 +1,6 @@
 """What `hssil` approximates, in the order of its pipeline, and the memory that it takes.
 
-A level more at full resolution reaches as far as one fewer at half, so that what switches the resolution off keeps the
-reach.
-
-Mip levels of the buffers add a third to them (Sec. 4).
+A level more at full resolution reaches as far as one fewer at half: what switches the resolution off keeps the reach.
 """
 
 import dataclasses
@@ -104,15 +101,10 @@ LISTED_RAY_BYTES = 48  # of a sample of one receiver
 
 
 def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
-    """Return the bytes that the levels of one picture take; texels that its edge cuts are counted as their share.
+    """Return the bytes of the levels of one picture: n from full resolution on are (4 - 4^(1 - n)) / 3 times the first.
 
-    With n levels from full resolution on it is ``(4 - 4^(1 - n)) / 3`` times the first; from half resolution on, a
-    quarter of that. The mean of radiance alone needs the number of its pixels as well; drawn senders are levels of
-    their own.
-
-    >>> from refgi.sssil.settings import SamplingSettings
-    >>> level_bytes(HssilSettings(SamplingSettings(start="full", levels=1)), 100, 4)
-    4800
+    >>> from refgi.sssil.settings import SamplingSettings >>> level_bytes(HssilSettings(SamplingSettings(start="full",
+    levels=1)), 100, 4) 4800
     """
     sampling, downsample = settings.sampling, settings.senders.downsample
     floats = FLOATS + (downsample == "closest_average")

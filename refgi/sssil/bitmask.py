@@ -1,9 +1,7 @@
 """Visibility of samples by a bitmask of angles on the depth map (after Therrien et al. 2023).
 
-From a receiver the picture is marched in slices, nearest samples first. The surface at a sample is taken to extend from
-its point away from the eye by a thickness, and occludes the sectors of elevation whose middle it covers (`slices`).
-
-Symbols: d vector from receiver to sample (m), c = max(0, n . d), s = max(0, -m . d) with m = n_j ds_j / pi.
+From a receiver the picture is marched in slices, nearest samples first. The surface at a sample extends from its point
+away from the eye by a thickness, and occludes the sectors of elevation whose middle it covers (`slices`).
 """
 
 import math
@@ -92,10 +90,7 @@ def bitmask_gather(
 
 
 def _packed(level: Level, scale: float, phases: int) -> Array:
-    """Return the texels of a level with lengths times a scale, (rows, PLANES, columns): of one phase, then the next.
-
-    Column x is of the phase x mod `phases`, each of which has as many places.
-    """
+    """Return a level's texels with scaled lengths, (rows, PLANES, columns): columns of one phase, then of the next."""
     packed = np.zeros((level.shape[0], PLANES, phases * -(-level.shape[1] // phases)), level.position.dtype)
     pack(level.position, level.normal, level.radiance, level.area, level.position.dtype.type(scale), phases, packed)
     return packed

@@ -1,13 +1,8 @@
 """Geometry-aware blur of a level's irradiance: the mean over the texels of an interleaved tile on one surface.
 
-Interleaved sampling (Keller and Heidrich 2001) gives each texel of a tile of n x n its own part of one larger set of
-samples; the mean over a window of n x n texels then has the whole set. As in val (Dong et al. 2009, Sec. 6; Laine et
-al. 2007) a texel q counts for p where q lies on p's tangent plane, ``|n_p . (x_q - x_p)| <= plane_tolerance z_p``, and
-``n_p . n_q >= cosine``.
-
-The window is a box of n x n texels about the texel's centre. Of an even n its rim cuts texels in half, which weigh 1/2:
-every column and every row of the tile has a weight of 1 in each window, and light does not move. The box is taken along
-rows first, then along columns, each mean over the texels that count. The texels of a row are the SIMD lanes.
+A window of n x n texels has the whole set of samples that a tile's texels share out (Keller and Heidrich 2001). As in
+val, texel q counts for p where ``|n_p . (x_q - x_p)| <= plane_tolerance z_p`` and ``n_p . n_q >= cosine``. Texels that
+the rim of an even window halves weigh 1/2. The box is taken along rows, then columns; a row's texels are SIMD lanes.
 """
 
 from typing import Any
@@ -92,10 +87,7 @@ def _load(
     tile: Array, to: int, irradiance: Array, position: Array, normal: Array, depth: Array, row: int, left: int,
     tolerance: Any,
 ) -> None:
-    """Copy a row of texels and those beside it; what has no surface or is no texel gets a position that is no number.
-
-    Comparisons with that are false: such texels count for none.
-    """
+    """Copy a row of texels and those beside it; one without surface has a position that is no number: no weight."""
     rows, columns = depth.shape
     real = depth.dtype.type
     low, high = max(0, PAD - left), min(SPAN, columns - left + PAD)  # lanes that are texels

@@ -1,9 +1,7 @@
 """Light from further cameras, placed by coarse transport, joined where they show the same surface (Sec. 5, discussion).
 
-Further cameras are placed where they see directly lit surfaces that light the picture and that it does not show.
-
-Symbols: T_ij (W/m^2) is the irradiance of receiver i from sender j, Phi_j / pi cos_i cos_j / r^2 where nothing lies
-between; Phi_j (W) is the flux that the surface around the sender reflects.
+They are placed where they see directly lit surfaces that light the picture and that it does not show. T_ij (W/m^2) is
+the irradiance of receiver i from sender j, Phi_j / pi cos_i cos_j / r^2 where nothing lies between.
 """
 
 import dataclasses
@@ -39,10 +37,7 @@ class Points(NamedTuple):
 
 
 def equal_flux_points(frame: Frame, count: int = LIT_POINTS) -> tuple[Points, float]:
-    """Return points of equal reflected flux on directly lit surfaces, and the flux of each.
-
-    Points are denser where more is reflected; none where no light falls. The flux is the sum of the three channels, W.
-    """
+    """Return points of equal reflected flux on directly lit surfaces, and the flux of each, W, of all channels."""
     maps = [reflective_shadow_map(frame.scene.geometry, frame.senders, light, MAP_RESOLUTION, frame.dtype)
             for light in frame.scene.lights]  # fmt: skip
     lights = choose_pixel_lights(maps, count=None, pattern="all")
@@ -65,10 +60,7 @@ def visible_points(buffer: GBuffer, count: int = RECEIVERS) -> Points:
 
 
 def transport(tracer: Tracer, receivers: Points, senders: Points, flux: float, nearest: float) -> Array:
-    """Return the irradiance of each receiver from each sender, T_ij, (receivers, senders) float64, W/m^2.
-
-    `flux` is what each sender reflects, W; `nearest` the least distance in the denominator, m.
-    """
+    """Return T_ij, (receivers, senders), for senders of `flux`, W; `nearest`: least distance in the denominator."""
     direction = senders.position - receivers.position[:, None]
     square = (direction * direction).sum(axis=2)
     cosines = np.maximum((direction * receivers.normal[:, None]).sum(axis=2), 0)
@@ -91,10 +83,9 @@ class Views(NamedTuple):
 
 
 def sampling_quality(tracer: Tracer, views: Views, points: Points, coarsest: float) -> Array:
-    """Return how finely each picture samples each surface point, (c, n) float64.
+    """Return how finely each picture samples each point, (c, n): 1 / (1 + (length / coarsest)^2) of a pixel there, m.
 
-    0 where a point is outside the picture, faces away or is occluded; else 1 / (1 + (length / coarsest)^2) with the
-    length of a pixel on the surface there (m), which grows with distance and towards grazing views.
+    0 where a point is outside the picture, faces away or is occluded.
     """
     direction = points.position - views.eye[:, None]
     right, down, depth = np.moveaxis(np.einsum("cad,cnd->can", views.axes, direction), 1, 0)
@@ -116,10 +107,7 @@ def _off_surface(tracer: Tracer, points: Points, chosen: Array, direction: Array
 
 
 def unoccluded(tracer: Tracer, starts: Array, ends: Array) -> Array:
-    """Return between which pairs of places (n, 3), off any surface, m, nothing lies: (n,) bool.
-
-    By the bare traversal: one ray in 10^7 slips between triangles.
-    """
+    """Return between which places (n, 3), off surfaces, nothing lies; bare traversal: one ray in 10^7 slips through."""
     blocked = np.zeros(len(starts), np.bool_)
     tracer.fill_occluded(np.ascontiguousarray(starts, np.float32), np.ascontiguousarray(ends - starts, np.float32),
                          np.ones(len(starts), np.float32), blocked)
@@ -273,11 +261,7 @@ def join_cameras(frame: Frame, light: Array, settings: CameraSettings, one_view:
 
 
 def frame_through(frame: Frame, camera: Camera) -> Frame:
-    """Return a frame of the same scene, size and kind through another camera, whose own size does not count.
-
-    The camera is relative to the origin of `frame.scene`. The frame shares what `frame` has computed already and does
-    not depend on the camera: reflective shadow maps, the tracer, tables.
-    """
+    """Return a frame of the same scene, size and kind through another camera, relative to the scene's origin."""
     scene = dataclasses.replace(frame.scene, camera=camera)
     other = Frame(scene, width=frame.width, height=frame.height, dtype=frame.dtype,
                   rsm_resolution=frame.rsm_resolution, shadows=frame.shadows)  # fmt: skip

@@ -1,11 +1,7 @@
 """Levels filled with the surfaces nearest to the eye (Sec. 4): from pixels, then from four texels each.
 
-Of equally near surfaces it is that nearest to the picture's vertical centre line, then the upper, then the left one. So
-a mirror-symmetric picture of an even number of texels has mirror-symmetric levels, and the choice is the same whether
-it is made at once or level by level. The best of each column is found first, with the columns as SIMD lanes, then the
-best of neighbouring columns.
-
-The first level takes position, normal, radiance and sample area (Eq. 2) in one pass over the picture.
+Of equally near ones it is that nearest to the picture's vertical centre line, then the upper, then the left: mirrored
+pictures have mirrored levels, made at once or level by level. The best of each column is found first, as SIMD lanes.
 """
 
 import math
@@ -22,11 +18,7 @@ NO_PIXEL = 2**31 - 1  # beyond the picture's edge
 
 @kernel
 def choose_pixels(depth: Array, i: int, side: int, nearest: Array, row: Array, chosen: Array) -> None:
-    """Choose the nearest pixel for each texel of row i; `side` pixels along a texel's side.
-
-    `depth` (H, W) m, inf for no surface. Scratch: `nearest` (W + side,), least depth of each column, and `row`, its
-    row. `chosen` (w,) is filled with columns.
-    """
+    """Choose the nearest pixel for each texel of row i, `chosen` (w,) columns; scratch of (W + side,)."""
     height, width = depth.shape
     first, columns = np.int32(i * side), np.uint64(width)
     for c in range(columns):
@@ -81,11 +73,10 @@ def _best_across_centre(nearest: Array, row: Array, first: int, end: int, width:
 def choose_texels(
     depth: Array, pixel: Array, i: int, width: int, nearest: Array, best_texel: Array, chosen: Array
 ) -> None:
-    """Choose one of four texels of the finer level for each texel of row i.
+    """Choose one of four texels of the finer level, (h, w), for each texel of row i, `chosen` columns.
 
-    `depth` and `pixel` (h, w) are of the finer level, `width` of the picture. Scratch: `nearest` (w + 1,), least depth
-    of each column; `best_texel` (3, w + 1), its row, its pixel's distance from the centre line, and that pixel.
-    `chosen` (ceil(w / 2),) is filled with columns.
+    Scratch: `nearest` (w + 1,), least depth of each column; `best_texel` (3, w + 1), its row, its pixel's distance from
+    the centre line, and that pixel. `width` is the picture's.
     """
     rows, columns = depth.shape
     row, off_centre, best = best_texel[0], best_texel[1], best_texel[2]
@@ -118,10 +109,7 @@ def _off_centre(pixel: Any, width: int) -> Any:
 def is_nearer(
     depth: Any, off_centre: int, pixel: int, other_depth: Any, other_off_centre: int, other_pixel: int
 ) -> bool:
-    """Return whether a pixel goes before another: by depth, distance from the centre line in half pixels, then place.
-
-    Never true both ways round.
-    """
+    """Return whether a pixel goes before another, never both: by depth, distance from the centre line, place."""
     earlier = (off_centre < other_off_centre) | ((off_centre == other_off_centre) & (pixel < other_pixel))
     return bool((depth < other_depth) | ((depth == other_depth) & earlier))
 

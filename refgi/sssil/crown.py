@@ -1,9 +1,9 @@
-"""Sum over the samples around every texel of a level (Sec. 3.1, Eq. 1; Sec. 3.2, indirect lighting shader).
+"""Sum over the samples around every texel of a level (Eq. 1; Sec. 3.2), and the share of light that few samples lose.
 
-Threads take strips of a level so narrow that what their samples read stays in the cache of a core. Where receivers
-share samples, `add_two` reads them in place; where each has its own, they are first copied into a line. Receivers at
-either end of a strip whose samples have no radiance are skipped, which changes no bit of a sum. A sample that is dark
-for a whole strip is not listed there; which samples are summed in twos then differs, and with it the rounding.
+Threads take strips of a level so narrow that what their samples read stays in the cache of a core. Receivers at either
+end of a strip whose samples have no radiance are skipped, which changes no bit of a sum; a sample that is dark for a
+whole strip is not listed, which changes the rounding. A sample's disc is as large as what it stands for (Eq. 4), and a
+large disc near a receiver gives less than the texels that it covers: few samples lose light at every receiver.
 """
 
 import math
@@ -86,10 +86,9 @@ def sum_of_samples(
     level: Level, senders: Level, offsets: Array, weight: Array, farthest: int, form: SampleForm, factor: float, *,
     paired: bool = False,
 ) -> Array:
-    """Return `factor` / pi times the irradiance of a level's texels by samples that texels of a tile have each.
+    """Return `factor` / pi times the irradiance of texels by samples as of `shared_offsets`, `farthest` at most.
 
-    `offsets` (m, P, n, 2) and `weight` are as `shared_offsets` returns them, P a power of two, and reach `farthest`
-    texels. `paired`: mirror images follow each other.
+    `paired`: mirror images follow each other.
     """
     result = plane(level.radiance.shape, level.radiance.dtype)
     emitters = pack(senders, offsets.shape[1], farthest, WIDE)
@@ -108,10 +107,7 @@ def _reaching(offsets: Array, weight: Array, rows: int, columns: int) -> tuple[A
 
 
 def level_factor(index: int, settings: HssilSettings) -> float:
-    """Return the factor of a level's sum: 1 but for forms used as printed; index 0 is the first level.
-
-    1 / pi where Eq. 4 lacks its pi, times 4^k where areas are scaled by the level's 4^k a second time.
-    """
+    """Return the factor of a level's sum: 1 / pi where Eq. 4 lacks its pi, 4^k where areas are scaled twice."""
     factor = 1.0
     if "hss_disc_pi" in settings.as_published and settings.senders.form_factor != "point":
         factor /= math.pi
@@ -183,8 +179,8 @@ def _list_emitting(
 ) -> int:
     """List the places of a strip's samples that emit, and the lanes for which they do; all lanes unless it `trims`.
 
-    In pairs where samples are paired; one without radiance stands in for a missing partner. `left`: the strip's first
-    lane. `weights` gets the texels that samples stand for, and those of their discs.
+    In pairs where samples are paired; one without radiance stands in for a missing partner. `weights` gets the texels
+    that samples stand for, and those of their discs.
     """
     emit_from, emit_to, lanes, line = emitters.emit_from, emitters.emit_to, emitters.strip, emitters.line
     rows, phases, first = emit_to.shape[0] - 1, emit_to.shape[1], emitters.pad + left
@@ -264,7 +260,7 @@ def _expand(
 ) -> Any:
     """Copy the texels of one sample of each receiver of a strip into a line, with their relative weight.
 
-    Areas are those of the sample's disc over the texels returned; what the sample stands for besides is radiance.
+    Areas are those of the disc over the texels returned; what the sample stands for besides is radiance.
     """
     packed, line, rows, weight = emitters.packed, emitters.line, emitters.emit_to.shape[0] - 1, own.weight[j]
     real, within = packed.dtype.type, 0.0 if j < own.inner else 1.0

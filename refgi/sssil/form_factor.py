@@ -1,7 +1,8 @@
-"""Form factor of a receiver and a sample (Sec. 3.1, Eq. 3 and 4).
+"""Form factor of a receiver and a sample (Sec. 3.1, Eq. 3 and 4), and texels laid out as senders for sums of it.
 
-Symbols: d vector from receiver to sample; m = -n_j ds_j / pi of the sample; c = max(0, n . d) = r cos(theta);
-s = max(0, m . d) = r R^2, with the radius R of the disc that has the sample's projected area; |d| = r.
+d from receiver to sample, |d| = r; m = -n_j ds_j / pi; c = max(0, n . d) = r cos(theta); s = max(0, m . d) = r R^2.
+Columns of a level are split into phases, x modulo P, so that receivers that share samples are SIMD lanes and read
+contiguous places; padding of zero radiance surrounds them. Lengths are scaled by a power of two: r^4 fits float32.
 """
 
 import math
@@ -28,10 +29,9 @@ class SampleForm(NamedTuple):
 
 @kernel
 def form_factor(c: Any, s: Any, disc: Any, square: Any) -> Any:
-    """Return c s / (r^4 + d r): Eq. 4 where the disc d is all that the sample stands for, Eq. 3 where it is 0.
+    """Return c s / (r^4 + d r): Eq. 4 where the disc d is all that the sample stands for, Eq. 3 where it is 0; no pi.
 
-    That is cos(theta) R^2 / (r^2 + D^2), without pi. `s` is r R^2 of all texels that the sample stands for, `disc` d of
-    those that its disc covers, `square` r^2. 0 where c or s is 0, and where receiver and sample coincide.
+    `s` is r R^2 of all texels that the sample stands for, `disc` d of those of its disc, `square` r^2.
     """
     least = type(c)(LEAST)
     # Eq. (4): cos(theta) R^2 / (r^2 + R^2); Eq. (3): cos(theta) cos(theta') ds / r^2
@@ -41,10 +41,7 @@ def form_factor(c: Any, s: Any, disc: Any, square: Any) -> Any:
 
 @kernel
 def disc_texels(weight: float, form: SampleForm) -> float:
-    """Return how many texels the disc of a sample covers that stands for `weight`: a share, but no less than a texel.
-
-    One (TEXEL) or none (POINT) by other form factors. A sample that stands for less than a texel has all of that.
-    """
+    """Return how many texels the disc of a sample covers that stands for `weight`: a share, no less than one or all."""
     if form.kind == DISC:
         return max(form.share * weight, min(1.0, weight))
     return 1.0 if form.kind == TEXEL else 0.0
@@ -68,10 +65,7 @@ class Facing(NamedTuple):
 
 @kernel
 def term(receiver: Facing, sample: Facing, weight: Any, disc: Any) -> Any:
-    """Return the form factor of one receiver and one sample that stands for `weight` texels, its disc for `disc`.
-
-    The receiver's vector is its normal, the sample's its reversed normal times area / pi.
-    """
+    """Return the form factor of a receiver, its normal, and a sample, its reversed normal times area / pi."""
     px, py, pz, nx, ny, nz = receiver
     qx, qy, qz, mx, my, mz = sample
     zero = type(px)(0.0)
@@ -102,11 +96,7 @@ class Emitters(NamedTuple):
 
 
 def pack(level: Level, phases: int, farthest: int, most_lanes: int) -> Emitters:
-    """Pack the texels of a level, in its dtype, for sums over samples.
-
-    Columns are split into `phases` P, a power of two; `farthest` is the largest distance of a sample, columns;
-    `most_lanes` how many may be summed at once, a multiple of BLOCK.
-    """
+    """Pack a level's texels in `phases`, a power of two; samples reach `farthest` columns, sums take `most_lanes`."""
     rows, columns = level.shape
     lanes = -(-columns // phases)
     strips = -(-lanes // most_lanes)
@@ -129,10 +119,7 @@ def dark_ends(emitters: Emitters) -> tuple[int, int]:
 
 
 def length_scale(depth: Array) -> float:
-    """Return the power of two that scales the geometric middle of the depths' range to about 1.
-
-    Depths (h, w) are in m, inf where there is no surface; 1 where none is visible.
-    """
+    """Return the power of two that scales the geometric middle of the depths, m, to about 1; 1 without surface."""
     some = depth[(depth > 0) & (depth < np.inf)]
     if not some.size:
         return 1.0
@@ -235,10 +222,10 @@ def add_two(
     tile: Array, low: int, lanes: int, packed: Array, step: int, first: int, first_weight: Any, first_disc: Any,
     second: int, second_weight: Any, second_disc: Any,
 ) -> None:
-    """Add the light of two samples to each receiver of a tile; the two contributions are added to each other first.
+    """Add the light of two samples to `lanes` receivers of a tile from `low` on; the two are added to each other first.
 
-    `tile` (ROWS * WIDE,) holds receivers and their sums, of which `lanes` from `low` on receive. `packed` holds texels,
-    plane by plane, `step` elements apart; `first` and `second` are the places of the first receiver's samples in it.
+    `tile` (ROWS * WIDE,) holds receivers and their sums; `first` and `second` are the places of the first receiver's
+    samples in `packed`, whose planes are `step` elements apart.
     """
     # unsigned: no checks for places counted from the end
     by, a, b = np.uint64(step), np.uint64(first), np.uint64(second)

@@ -1,17 +1,12 @@
-"""Crown samples of glossy receivers, drawn by importance: more where lobes point on the screen (Soler 2009, Sec. 5).
+"""Samples of glossy receivers: crowns drawn by importance (Soler 2009, Sec. 5), and their visibility.
 
 Every glossy pixel is a receiver at full resolution on every level, as an upsampled highlight would be a blurred one.
-Its samples lie at the distances of `sample_points`, but around the azimuth phi at which the mirrored ray leaves the
-pixel on the picture: a ray that starts at the pixel stays on one half-line of it. From a uniform v of the unit interval
-::
+Its samples lie around the azimuth phi at which the mirrored ray leaves the pixel on the picture: from a uniform v ::
 
     angle = phi + 2 arctan(s tan(pi (v - 1/2))), weight s / (c^2 + s^2 (1 - c^2)) with c = cos(pi (v - 1/2)),
 
-a wrapped Cauchy density: half of the samples lie within 2 arctan s of phi, and none weighs more than 1 / s times what
-it would by a uniform density. s is the width of the lobe, 1 / sqrt(P + 2), over the sine of the angle between m and the
-line of sight, which widens it on the picture; at most 1, which is uniform.
-
-Symbols: d vector from receiver to sample (m), m direction to the eye mirrored, P exponent.
+a wrapped Cauchy density. s is the lobe's width, 1 / sqrt(P + 2), over the sine of the angle between mirrored ray and
+line of sight. With a bitmask samples are those of slices: what occludes has to be marched past in all directions.
 """
 
 import math
@@ -95,10 +90,7 @@ def glossy_receivers(points: GlossyPoints, projection: Projection) -> GlossyRece
 
 @kernel
 def warped(v: float, cosine: float, sine: float, spread: float) -> Any:
-    """Return cosine and sine of the angle of a point v of [0, 1), and its weight over that of a uniform density.
-
-    `cosine` and `sine` are of phi, `spread` is s.
-    """
+    """Return cosine and sine of the angle of a point v of [0, 1), and its weight over that of a uniform density."""
     c, s = math.cos(math.pi * (v - 0.5)), math.sin(math.pi * (v - 0.5))
     across = spread * s
     square = c * c + across * across
@@ -111,10 +103,9 @@ def draw_samples(
     to: GlossyReceivers, first: int, last: int, level: Level, draws: Draws, form: SampleForm, transfer: Array,
     sender: Array,
 ) -> None:
-    """Fill the samples of receivers `first` to `last` on a level of senders.
+    """Fill `sender` (pairs,), row * columns + column, and `transfer` (pairs,) of receivers `first` to `last`.
 
-    `sender` (pairs,) gets texels, row * columns + column; `transfer` (pairs,)
-    f_s times pi times the form factor: what of the sender's radiance the lobe reflects, 1; 0 where nothing.
+    Transfer is f_s times pi times the form factor: what of the sender's radiance the lobe reflects, 1.
     """
     count = len(draws.weight)
     for i in prange(last - first):
@@ -151,10 +142,7 @@ def _draw(
 
 @kernel
 def glossy_transfer(to: GlossyReceivers, i: Any, level: Level, a: Any, b: Any, weight: float, disc: float) -> Any:
-    """Return f_s times pi times the form factor of a receiver and a texel that stands for `weight`, its disc `disc`.
-
-    Over the receiver's specular reflectance; 0 where nothing is reflected.
-    """
+    """Return f_s times pi times the form factor of a receiver and a texel, over the receiver's specular reflectance."""
     dx, dy, dz = (level.position[0, a, b] - to.position[0, i], level.position[1, a, b] - to.position[1, i],
                   level.position[2, a, b] - to.position[2, i])
     c = to.normal[0, i] * dx + to.normal[1, i] * dy + to.normal[2, i] * dz
@@ -185,10 +173,7 @@ class SliceSamples(NamedTuple):
 def slice_samples(
     to: GlossyReceivers, level: Level, index: int, settings: HssilSettings, diagonal: float
 ) -> SliceSamples:
-    """Return what slices are marched with: n receivers and the texels of a level, senders and occluders, packed.
-
-    `index` is 0 for the first level; `diagonal` the scene's, m.
-    """
+    """Return what slices are marched with: receivers and a level's texels, packed; `diagonal` is the scene's, m."""
     sampling, bitmask = settings.sampling, settings.visibility
     assert isinstance(bitmask, Bitmask)
     assert sampling.radius is not None
@@ -252,8 +237,7 @@ def fill_glossy_rays(
 ) -> None:
     """Fill the shadow ray of each sample, `count` of each of the receivers `first` to `last`.
 
-    Clears the transfer where either end lies behind the plane of the other's triangle; what transfers nothing has no
-    reach.
+    Clears the transfer where either end lies behind the plane of the other's triangle.
     """
     for i in prange(last - first):
         for j in range(count):

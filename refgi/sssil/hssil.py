@@ -1,8 +1,7 @@
 """Hierarchical Screen-Space Indirect Illumination (Soler et al. 2009), for diffuse and glossy receivers.
 
-The paper assumes diffuse surfaces and names what glossy ones need: "importance-sample the BRDF" among samples of the
-picture. Receivers are the glossy pixels, at full resolution on every level (`crown.glossy`), where irradiance has a
-receiver for each texel: on level k that is 4^k times as many sums, for glossy pixels alone.
+Glossy pixels are receivers at full resolution on every level (`glossy`): on level k 4^k times as many sums as for
+irradiance, whose receivers are its texels.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -96,10 +95,7 @@ def one_view(frame: "Frame", settings: HssilSettings) -> Array:
 
 
 def gather_level(seen: Seen, index: int) -> Array:
-    """Return the irradiance of the texels of one level from samples of it, blurred where these differ by receiver.
-
-    (3, h, w), W/m^2. `index` is 0 for the first level, whose inner disc is sampled as well.
-    """
+    """Return the irradiance (3, h, w) of one level's texels by its samples, blurred where these differ by receiver."""
     level, senders, settings = seen.levels[index], seen.senders[index], seen.settings
     if settings.senders.only_level not in (None, index):
         return np.zeros_like(level.radiance)
@@ -124,10 +120,9 @@ BATCH = 1 << 18  # pairs held at a time
 
 
 def hssil_lobes(frame: "Frame", settings: HssilSettings) -> Array:
-    """Return the radiance towards the eye that receivers' lobes make of what a camera sees.
+    """Return the radiance towards the eye, (3, h, w), that receivers' lobes make of what a camera sees.
 
-    (3, h, w), W/m^2/sr, linear RGB; 0 where there is no lobe. Whatever the pattern but "all", each pixel has samples of
-    its own, and nothing is blurred.
+    Whatever the pattern but "all", each pixel has samples of its own, and nothing is blurred.
     """
     lobes = view_lobes(frame, frame.glossy_points, settings)
     if not (settings.cameras.count or settings.cameras.views):
@@ -144,10 +139,7 @@ def hssil_lobes(frame: "Frame", settings: HssilSettings) -> Array:
 
 
 def view_lobes(frame: "Frame", points: GlossyPoints, settings: HssilSettings) -> Array:
-    """Return the lobes of some pixels by what this camera alone sees, (3, h, w), W/m^2/sr.
-
-    The pixels are this camera's; their lobes may belong to another eye.
-    """
+    """Return the lobes of some pixels of this camera, perhaps of another eye, by what it alone sees, (3, h, w)."""
     seen, total = seen_by(frame, settings), np.zeros(points.position.shape)
     for index, level in enumerate(seen.senders):
         if settings.senders.only_level in (None, index):

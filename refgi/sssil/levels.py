@@ -1,4 +1,15 @@
-"""Pyramid of what a camera sees: position, normal, direct radiance and sample area (Sec. 4, hierarchical maps)."""
+"""Pyramid of what a camera sees: position, normal, direct radiance and sample area (Sec. 4, hierarchical maps).
+
+Of each texel's pixels the closest is kept, or all are averaged, or radiance alone is; by steps the first level is made
+of pixels, each further one of the finer one's texels.
+
+- depth (h, w): Depth along the view direction of the picture's pixels, m; inf without surface.
+- normal (3, h, w): Their unit normals on the side that is seen.
+- irradiance (3, h, w): Their direct irradiance, W/m^2.
+- number: Level k: a texel covers 2^k x 2^k pixels or, at the rim, those that there are.
+- as_published: "hss_tan_f": sample areas as printed.
+- size: Rows and columns of the picture.
+"""
 
 import itertools
 import math
@@ -62,10 +73,7 @@ def sender_pyramid(frame: "Frame", receivers: list[Level], settings: HssilSettin
 
 
 def useful_levels(shape: tuple[int, int], sampling: SamplingSettings) -> int:
-    """Return how many levels have texels that lie within each other's crown, for a picture of so many rows and columns.
-
-    At least 1: the first level has a disc.
-    """
+    """Return how many levels, 1 or more, have texels within each other's crown in a picture of this shape."""
     if sampling.radius is None:  # chosen so that all reach
         return sampling.levels
     for index in range(1, sampling.levels):

@@ -1,11 +1,8 @@
 """Motion of surfaces since the frame before, and pixels that the camera's motion brings in (Sec. 3.3, 4).
 
-A point is a mean of the corners of its triangle; it was the same mean of the corners as they were. This is exact for
-rigid motion and for skinned meshes alike, without a matrix for each object.
-
-"New pixels revealed by camera panning and rotations, that weren't on the screen in the previous frame, also have an a
-depending on the camera speed, to smoothly blend illumination values." The light they blend with, which the paper does
-not name, is that of the texel at the edge of the earlier picture nearest to where their point would have been in it.
+A point was the same mean of its triangle's corners as they were: exact for rigid motion and skinned meshes alike. "New
+pixels revealed by camera panning and rotations ... also have an a depending on the camera speed"; the light they blend
+with, which the paper does not name, is that of the nearest texel at the edge of the earlier picture.
 """
 
 import dataclasses
@@ -28,10 +25,7 @@ from refgi.types import Array
 
 
 def as_solids(geometry: Geometry, before: Geometry, solids: Array) -> Geometry:
-    """Return earlier triangles with those of each solid, a number (m,) of each face from 1, as a rigid body.
-
-    Their vertices now, turned and moved to fit where they were with the least sum of squares (Kabsch 1976).
-    """
+    """Return earlier triangles with those of each solid, (m,) from 1 by face, as a rigid body (Kabsch 1976)."""
     vertices, normals = np.array(before.vertices, np.float64), before.vertex_normals
     normals = None if normals is None else np.array(normals, np.float64)
     for solid in np.unique(solids[solids > 0]):
@@ -224,13 +218,10 @@ def fetch_entering(
     values: Array, source: SourceView, position: Array, covered: Array, weight: Array, origin: Vector, speed: float,
     reprojected: Array,
 ) -> Array:
-    """Fetch the light at the edge of the earlier picture for pixels whose points lay outside it.
+    """Fetch the light at the edge of the earlier picture for pixels whose points lay outside it, into `reprojected`.
 
-    The first three planes of `values` (3 or 4, h, w) are the earlier light, W/m^2; those of `reprojected` (3 or 4, h',
-    w') are filled where a point entered. `position` (3, h', w'): where each point was then, m from `origin`; `weight`
-    (h', w'): 0 where reprojection found no light; `speed`: at which the share falls to 1 / e, pixels a frame.
-    Returns exp(-v / speed), (h', w'), of pixels that entered, whose point moved across the picture by v pixels; 0 of
-    others, and of those where the edge shows no surface.
+    `position` (3, h', w'): where each point was then, m from `origin`; `weight` (h', w'): 0 where reprojection found no
+    light. Returns exp(-v / speed), (h', w'), of pixels that entered, moved by v pixels across the picture; 0 of others.
     """
     share = plane(covered.shape, reprojected.dtype)
     to = pixel_transform(source.projection, reprojected.dtype, np.subtract(source.origin, origin))

@@ -1,21 +1,12 @@
 """Low-discrepancy points of a crown, who shares them, and their offsets from the receiver (Sec. 3.2, Fig. 2).
 
-A point (u, v) of the unit square lies at the angle 2 pi v. With uniform density it lies r sqrt(1 + 3 u) from the
-receiver in the crown, r sqrt(u) in the disc within: equal areas get equally many points. With a density of the inverse
-distance it lies r (1 + u) and r u away: rings of equal width get equally many. A point takes the texel it falls into,
-and stands for as many texels as there are to a point where it lies.
-
-Offsets are whole texels (ox, oy), columns to the right and rows down from the receiver.
-
-Interleaved samples (Keller and Heidrich 2001) repeat in tiles of n x n texels. The texels of a tile, row by row, take
-consecutive stretches of one long Kronecker sequence, so that any n x n texels have the n^2 N points of one
-low-discrepancy set. All texels at one place of their tiles share samples: every n-th column of a row.
-
-With the pattern "row" tiles are two columns wide and never repeat: each row takes the stretch that follows that of the
-row above, so that rows which upsampling mixes complement each other. Sums over few sets show as streaks along rows.
-
-A shift by a hash of seed and level makes the expected weight of a texel the share of its area within the crown, for
-every receiver.
+A point (u, v) lies at the angle 2 pi v; with uniform density r sqrt(1 + 3 u) from the receiver in the crown, r sqrt(u)
+in the disc within; with a density of the inverse distance r (1 + u) and r u away. It takes the texel it falls into, and
+stands for as many texels as there are to a point where it lies. Texels of a tile of n x n (Keller and Heidrich 2001),
+row by row, take consecutive stretches of one Kronecker sequence, so that any n x n texels have the points of one set.
+With the pattern "row" tiles are two columns wide and never repeat, so that rows complement each other. A shift by a
+hash of seed and level makes the expected weight of a texel the share of its area within the crown. The crown of level k
+ends at 2 r of its texels: r 2^K texels of the first of K levels.
 """
 
 import math
@@ -34,20 +25,14 @@ TO_UNIT = 2.0**-32
 
 
 def sample_points(inner: int, crown: int) -> Array:
-    """Return the points of the unit square that all patterns shift: those of the inner disc, then those of the crown.
-
-    (inner + crown, 3) float64: u in [0, 1), cos 2 pi v and sin 2 pi v.
-    """
+    """Return the points that all patterns shift, (inner + crown, 3): u, cos 2 pi v, sin 2 pi v, the disc's first."""
     count = np.concatenate([np.arange(inner), np.arange(crown)])
     u, v = (0.5 + count * FIRST_STEP) % 1.0, (0.5 + count * SECOND_STEP) % 1.0
     return np.stack([u, np.cos(2.0 * math.pi * v), np.sin(2.0 * math.pi * v)], axis=1)
 
 
 def sample_weight(radius: float, inner: int, crown: int) -> Array:
-    """Return how many texels each sample stands for where density is uniform, (inner + crown,) float64.
-
-    pi r^2 / inner in the disc, 3 pi r^2 / crown in the crown of inner radius r (texels): the areas shared out.
-    """
+    """Return how many texels each sample stands for where density is uniform, (inner + crown,): shared areas."""
     disc = math.pi * radius**2
     return np.repeat([disc / max(inner, 1), 3.0 * disc / crown], [inner, crown])
 
@@ -97,10 +82,7 @@ def pixel_key(key: Any, column: Any) -> Any:
 
 @kernel
 def shift_of(key: Any, block: Any) -> Any:
-    """Return the shift of the common points by a key: an addend of u modulo 1, and cosine and sine of a turn.
-
-    `block` points of the sequence are skipped.
-    """
+    """Return the shift of the common points by a key, `block` skipped: addend of u, cosine and sine of a turn."""
     u = (hash_bits(key) * TO_UNIT + block * FIRST_STEP) % 1.0
     v = (hash_bits(key ^ np.uint32(0x27D4EB2F)) * TO_UNIT + block * SECOND_STEP) % 1.0
     return u, math.cos(2.0 * math.pi * v), math.sin(2.0 * math.pi * v)
@@ -112,10 +94,7 @@ def key_shift(key: Any) -> Array:
 
 
 def tile_shifts(start: Array, tile: tuple[int, int], stretch: int) -> Array:
-    """Return the shifts of the texels of a tile, row by row, each `stretch` points of the sequence after the last.
-
-    `start` (2,): shift of the first. Returns (rows, columns, 2): addends of u and v modulo 1.
-    """
+    """Return the shifts of a tile's texels, (rows, columns, 2), each `stretch` points after the last from `start`."""
     points = np.arange(tile[0] * tile[1]).reshape(*tile, 1) * stretch
     shifts: Array = (start + points * np.array([FIRST_STEP, SECOND_STEP])) % 1.0
     return shifts
@@ -131,10 +110,10 @@ def distance(share: Any, near: float, radius: float, uniform: bool) -> Any:
 
 @kernel
 def relative_weight(length: Any, near: float, radius: float, uniform: bool) -> Any:
-    """Return how many texels a point at a distance stands for, over the mean of disc (`near` 0) or crown (1).
+    """Return how many texels a point at a distance l stands for, over the mean of disc (`near` 0) or crown (1).
 
-    The area 2 pi r dr over the number of points N du there: with r the radius and l the distance, 2 pi l r / N against
-    pi r^2 / N in the disc and 3 pi r^2 / N in the crown.
+    2 pi l r / N, the area over the number of points there, against pi r^2 / N in the disc and 3 pi r^2 / N in the
+    crown.
     """
     return 1.0 if uniform else 2.0 * length / (radius * (1.0 + 2.0 * near))
 
@@ -143,10 +122,7 @@ def relative_weight(length: Any, near: float, radius: float, uniform: bool) -> A
 def shifted(
     points: Array, j: Any, near: float, radius: float, uniform: bool, u: float, cosine: float, sine: float
 ) -> Any:
-    """Return the offset (ox, oy) of shifted point j, texels from the receiver, and its relative weight.
-
-    `points` are of `sample_points`; `near` is 0 in the disc and 1 in the crown; `u, cosine, sine` of `shift_of`.
-    """
+    """Return the offset (ox, oy) of shifted point j, texels from the receiver, and its relative weight."""
     share = points[j, 0] + u
     share = share - 1.0 if share >= 1.0 else share
     length = distance(share, near, radius, uniform)
@@ -187,12 +163,10 @@ def shared_offsets(
 ) -> tuple[Array, Array]:
     """Return the samples that receivers share, by row and column of their tile, for any pattern but "pixel".
 
-    `index` is 0 for the first level, whose inner disc is sampled as well, `number` the level's in the pyramid, `rows`
-    and `columns` its size: with columns, "all" leaves out what is farther away than any texel of so small a picture.
-    `radius` is the crown's inner one, texels, else that of the settings.
-    Offsets (m, P, n, 2) int32 are texels (ox, oy) from the receiver at (x, y), at [y mod m, x mod P]: (tile, tile, n,
-    2) with "interleaved", (rows, PHASES, n, 2) with "row", (1, 1, n, 2) with "fixed" and "all". Weights (m, P, n) or
-    (1, 1, n) float64 are the texels of the level that each sample stands for.
+    `index` is 0 for the first level, `number` the level's in the pyramid; with `columns`, "all" leaves out what is
+    farther away than any texel. Offsets (m, P, n, 2) int32 are texels (ox, oy) from the receiver at (x, y), at [y mod
+    m, x mod P]: tiles with "interleaved", (rows, PHASES) with "row", else (1, 1). Weights (m, P, n) or (1, 1, n)
+    float64 are the texels of the level that each sample stands for.
     """
     radius = known_radius(sampling, radius)
     inner, crown = sampling.counts(index)
@@ -210,12 +184,7 @@ def shared_offsets(
 
 
 def tile_offsets(points: Array, inner: int, shifts: Array, radius: float, density: Density) -> tuple[Array, Array]:
-    """Return the samples of the texels of a tile, offsets and weights as those of `shared_offsets`.
-
-    `points` (n, 3) are of `sample_points`, the first `inner` lie in the disc; `shifts` (m, P, 2) is what each texel of
-    the tile adds to u and v, modulo 1; `radius` the crown's inner one, texels; `density` samples per texel, by the
-    distance.
-    """
+    """Return the samples of a tile's texels, as `shared_offsets`, of points (n, 3) and shifts (m, P, 2) modulo 1."""
     offsets, uniform = np.empty((*shifts.shape[:2], len(points), 2), np.int32), density == "uniform"
     relative = np.empty((1, 1, 1) if uniform else offsets.shape[:3])
     _fill_tile(points, inner, radius, uniform, shifts, offsets, relative)
@@ -225,10 +194,7 @@ def tile_offsets(points: Array, inner: int, shifts: Array, radius: float, densit
 def samples_at(
     sampling: SamplingSettings, index: int, number: int, row: int, column: int, radius: float | None = None
 ) -> tuple[Array, Array]:
-    """Return the samples of one receiver and their weights, whatever the pattern: (n, 2) int32 and (n,) float64.
-
-    Arguments as in `shared_offsets`. Texels (ox, oy) from the receiver, and texels of the level that each stands for.
-    """
+    """Return the samples of one receiver and their weights, whatever the pattern: (n, 2) int32 and (n,) float64."""
     if sampling.pattern != "pixel":
         offsets, weight = row_offsets(sampling, index, number, row + 1, radius, column)
         return offsets[row % len(offsets)], weight[row % len(weight)]
@@ -271,10 +237,7 @@ def every_texel(low: float, high: float, within: tuple[int, int] | None = None) 
 def mirrored_offsets(
     inner: int, crown: int, shift: Array, radius: float, density: Density
 ) -> tuple[Array, Array]:
-    """Return a mirror-symmetric set and its weights: half of the points on the right, an odd one above or below.
-
-    `shift` (2,): added to the points' u and v, modulo 1. Pairs come first, odd ones last.
-    """
+    """Return a mirror-symmetric set and its weights: pairs, then odd ones above or below; `shift` (2,) of u and v."""
     weight, uniform = sample_weight(radius, inner, crown), density == "uniform"
     pairs, middles = [], []
     for first, count, near in ((0, inner, 0.0), (inner, crown, 1.0)):
@@ -296,10 +259,7 @@ RECEIVERS = 256  # rows of receivers, or receivers, whose samples are counted
 
 
 def chosen_radius(shape: tuple[int, int], sampling: SamplingSettings) -> float:
-    """Return the inner radius of the crowns: that of the settings, else the smallest that covers the picture.
-
-    Texels of the first level, whose rows and columns are `shape`; 1 or more.
-    """
+    """Return the inner radius of the crowns, texels of the first level: as set, or what covers the picture."""
     return covering_radius(shape, sampling.levels) if sampling.radius is None else float(sampling.radius)
 
 
@@ -330,10 +290,9 @@ def warn_short_reach(shape: tuple[int, int], sampling: SamplingSettings) -> None
 def coverage(sampling: SamplingSettings, shape: tuple[int, int], receivers: int = RECEIVERS) -> Array:
     """Count how many texels' worth of samples fall on each texel around a receiver, over all levels.
 
-    (2 h - 1, 2 w - 1) float64: mean weight of offset (row - h + 1, column - w + 1), texels of the first level, of
-    `shape`; 1 where an offset is covered once. `receivers` says how many rows of them are averaged, or receivers with
-    samples of their own. A receiver is equally likely to lie anywhere in its texel of level k, so that a crown's rims
-    are blurred by 2^k.
+    (2 h - 1, 2 w - 1) float64: mean weight of offset (row - h + 1, column - w + 1), texels of the first level; 1 where
+    an offset is covered once. `receivers` rows are averaged. A receiver is equally likely to lie anywhere in its texel
+    of level k, so that a crown's rims are blurred by 2^k.
     """
     radius = chosen_radius(shape, sampling)
     rows, columns = (np.arange(1 - size, size) for size in shape)
@@ -348,11 +307,7 @@ def coverage(sampling: SamplingSettings, shape: tuple[int, int], receivers: int 
 def texel_weights(
     sampling: SamplingSettings, index: int, number: int, receivers: int = RECEIVERS, radius: float | None = None
 ) -> Array:
-    """Count how many texels' worth of samples fall on each texel of one level around a receiver.
-
-    (2 n + 1, 2 n + 1) float64: mean weight of offset (row - n, column - n), texels of the level; samples on the
-    receiver itself count. `receivers` as in `coverage`, the others as in `pattern.shared_offsets`.
-    """
+    """Count how many texels' worth of samples fall on each texel of one level around a receiver, (2 n + 1, 2 n + 1)."""
     if sampling.pattern == "pixel":
         found = [samples_at(sampling, index, number, 0, column, radius) for column in range(receivers)]
         offsets, weight = (np.stack(parts) for parts in zip(*found, strict=True))

@@ -1,9 +1,7 @@
 """Visibility of samples by shadow rays: the limit against which every cheaper visibility of samples is measured.
 
-The estimator is that of `gather`, each term times V in {0, 1}. Rays run between the surface points that texels hold,
+The estimator is that of `crown`, each term times V in {0, 1}. Rays run between the surface points that texels hold,
 lifted off their triangles: interpolated normals would send them through the surface.
-
-Symbols: d vector from receiver to sample (m), c = max(0, n . d), s = max(0, -m . d) with m = n_j ds_j / pi.
 """
 
 import math
@@ -185,10 +183,9 @@ def _transfer(surfels: Surfels, senders: Surfels, i: int, j: int, weight: float,
 @kernel(parallel=True)
 def add_unoccluded(radiance: Array, first: int, last: int, count: int, blocked: Array, transfer: Array, sender: Array,
               total: Array) -> None:
-    """Add the light along each receiver's unoccluded rays, two by two: mirror images are added to each other first.
+    """Add the light along each receiver's unoccluded rays, `count` each, two by two: mirror images are added first.
 
-    `radiance` (3, t) of every texel, W/m^2/sr; receivers `first` to `last` have `count` rays each; for each ray
-    `blocked`, `transfer` (the factor of radiance) and the texel `sender` at its end. Added to `total` (3, t), W/m^2.
+    `radiance` and `total` (3, texels); for each ray `blocked`, `transfer` and the texel `sender` at its end.
     """
     for i in prange(last - first):
         starts = np.int64(i)

@@ -1,11 +1,8 @@
 """Senders that keep the light: a coarse texel stands where one of four does, drawn in proportion to its flux.
 
-A drawn texel sends the flux of all, sum of radiance times area. The chance of each is its share of that flux, the mean
-of red, green and blue, so that every sum that is linear in flux (Eq. 3) has the expectation of the sum over pixels:
-resampled importance sampling of one out of four. Receivers are the closest texels still (Sec. 4).
-
-Candidates are in the order of rows. The last one that sends, of those before which less than the share u of the flux is
-sent, is drawn.
+It sends the flux of all. The chance of each is its share of that flux, the mean of red, green and blue, so that every
+sum that is linear in flux (Eq. 3) has the expectation of the sum over pixels. Receivers are the closest texels still
+(Sec. 4). Of candidates in the order of rows the last that sends with less than the share u before it is drawn.
 """
 
 import math
@@ -77,10 +74,7 @@ def _copy_pixels(picture: Picture, view: View, i: int, side: int, place: Array, 
 
 @kernel
 def _copy_of_four(picture: Picture, view: View, i: int, place: Array, closest: Level, drawn: Level) -> int:
-    """Copy those of texels that cover 2 x 2 pixels, as `_copy_pixels` does, and return how many there are.
-
-    All four are read and one is kept: loads are contiguous in SIMD lanes.
-    """
+    """Copy those of texels that cover 2 x 2 pixels, all four read for SIMD lanes; return how many there are."""
     (ax, ay, az), (dx, dy, dz), (fx, fy, fz) = three(view.across), three(view.down), three(view.ahead)
     depth, normal, position, pixel = picture.depth, picture.normal, drawn.position, drawn.pixel
     to_normal, first, second, row = drawn.normal, closest.position, closest.normal, np.uint64(i)
@@ -171,10 +165,7 @@ def _weigh_texels(fine: Level, row: int, area: Array, flux: Array, light: Array)
 def _draw(
     area: Array, flux: Array, light: Array, rows: int, side: int, seed: int, i: int, place: Array, drawn: Level
 ) -> None:
-    """Draw one of `rows` x `side` candidates for each texel of row i: its place among them, -1 where none sends.
-
-    Area and radiance of the texels are filled: their product is the flux of all candidates.
-    """
+    """Draw one of `rows` x `side` candidates for each texel of row i: its place among them, -1 where none sends."""
     key = row_key(level_key(seed, drawn.number), i)
     if side == 2 and rows == 2:  # a constant stride is loaded in SIMD lanes
         _draw_of_four(area, flux, light, key, i, place, drawn)

@@ -1,22 +1,14 @@
 """Slices of the picture marched from a receiver, and elevations of samples in 32 sectors (Therrien et al. 2023).
 
-A slice holds the samples of its share of crown and disc, and occluders: samples of weight 0 that only occlude. Offsets
-are whole texels (ox, oy) as in `crown.pattern`, nearest first.
-
-With interleaved samples each texel of a tile turns its slices and shifts the samples along them by another point of one
-sequence of low discrepancy; with other patterns all receivers of a row share both.
-
-Front and back of the surface at a sample lie in the plane of the eye, the receiver and the sample. Their elevation
-there counts in sectors from the receiver's horizon on the sample's side over its normal to the other horizon. Sectors
-are steps of ::
+A slice holds samples of crown and disc, and occluders of weight 0, nearest first. Texels of an interleaved tile turn
+and shift them by points of one sequence; else all receivers of a row share both. Elevations of front and back, in the
+plane of eye, receiver and sample, count from the horizon on the sample's side over the normal in steps of ::
 
     q(a, b) = a / (a + |b|), 2 - that where b < 0, 0 where a < 0
 
-for a direction with a along the normal and b along the horizon: they have 0.64 to 1.27 of equal angles, and need no
-arctangent. The visibility of a sample is that of the two sectors whose middles are next to it, interpolated; and 1
-where it is as high as all before it, which keeps receding surfaces from occluding themselves.
-
-Symbols: d vector from receiver to sample (m), c = n . d, l distance of the receiver from the eye (m).
+for a along the normal and b along the horizon: 0.64 to 1.27 of equal angles, without an arctangent. Visibility is that
+of the two sectors next to a sample, interpolated; 1 where it is as high as all before: no receding surface hides
+itself.
 """
 
 import math
@@ -52,11 +44,7 @@ class SliceCounts(NamedTuple):
 
 
 def slice_counts(sampling: SamplingSettings, bitmask: Bitmask, index: int, radius: float) -> SliceCounts:
-    """Return how densely the slices of a level are sampled, with half as many occluders as the crown has samples.
-
-    Samples of crown and, at index 0, disc are distributed over slices, at least one a slice; `radius` is the crown's
-    inner one, texels.
-    """
+    """Return how densely the slices of a level are sampled, with half as many occluders as the crown has samples."""
     slices = bitmask.count(sampling.samples)
     inner, outer = sampling.counts(index)
     crown = max(1, round(outer / slices))
@@ -65,12 +53,10 @@ def slice_counts(sampling: SamplingSettings, bitmask: Bitmask, index: int, radiu
 
 
 def slice_offsets(sampling: SamplingSettings, steps: SliceCounts, number: int, rows: int) -> tuple[Array, Array]:
-    """Return the samples that receivers share, slice by slice; `steps` are of `slice_counts`.
+    """Return the samples that receivers share, slice by slice, nearest first: offsets (m, P, slices, n, 2) and weights.
 
-    Offsets (m, P, slices, n, 2) int32 are texels (ox, oy) from the receiver at (x, y), at [y mod m, x mod P], nearest
-    first: (tile, tile, ...) with "interleaved", (1, 1, ...) with "fixed", where each slice with an even index is
-    followed by its mirror image, an odd last one is vertical, else (rows, 1, ...). Weights (m, P, slices, n) float64
-    are the texels of the level that each sample stands for; 0 for a blocker.
+    (m, P) is the tile with "interleaved", (1, 1) with "fixed", where a slice with an even index is followed by its
+    mirror image and an odd last one is vertical, else (rows, 1). A weight is texels of the level, 0 for a blocker.
     """
     fixed, tiled, key = sampling.pattern == "fixed", sampling.pattern == "interleaved", level_key(sampling.seed, number)
     tile = (sampling.tile, sampling.tile) if tiled else (1 if fixed else rows, 1)
@@ -102,10 +88,7 @@ def turn_of(key: Any) -> Any:
 def fill_slices(
     steps: SliceCounts, turn: float, shift: float, mirrored: bool, length: Array, offsets: Array, weight: Array
 ) -> None:
-    """Write the samples around one receiver: `offsets` (slices, n, 2) and `weight` (slices, n).
-
-    `turn` and `shift` are of `turn_of`; `mirrored`: slices come in pairs of mirror images; `length` (n,) is scratch.
-    """
+    """Write the samples around one receiver, (slices, n, 2) and weights; `mirrored`: in pairs; `length`: scratch."""
     pairs = steps.slices // 2
     for k in range(steps.slices):
         part = (shift + (k // 2 if mirrored else k) * GOLDEN) % 1.0

@@ -1,10 +1,7 @@
-"""Temporal filter F_i = a W(F_{i-1}) + (1 - a) I_i (Sec. 3.3), with a clamp to new light around a pixel.
+"""Temporal filter F_i = a W(F_{i-1}) + (1 - a) I_i (HSS Sec. 3.3), with a clamp to new light around a pixel; by steps.
 
-The clamp is variance clipping of temporal anti-aliasing (Salvi 2016; Karis 2014 clamps to the extremes): the bounds are
-the mean of the new light in a square of pixels, plus and minus some standard deviations, in each channel.
-
-Symbols: I_i light of frame i as computed, F_i as filtered, W reprojection, a share of the frame before, n frames in
-which a surface was found before.
+The clamp is variance clipping of temporal anti-aliasing (Salvi 2016; Karis 2014 clamps to the extremes): the mean of
+the new light in a square of pixels, plus and minus some standard deviations. W reprojects; n frames found a surface.
 """
 
 import dataclasses
@@ -29,11 +26,7 @@ if TYPE_CHECKING:
     from refgi.frame import Frame
 
 def clamp_to_neighbourhood(new: Array, covered: Array, deviations: float, radius: int, earlier: Array) -> None:
-    """Clamp earlier light to so many standard deviations about the mean of the new light around each pixel.
-
-    Light is in W/m^2; the first three planes of `earlier` (3 or 4, h, w) are clamped. A neighbourhood is a square of 2
-    radius + 1 pixels, less what is outside the picture and pixels that are not covered.
-    """
+    """Clamp `earlier` light (3 or 4, h, w) to the mean of the new light in a square of pixels, by deviations."""
     _clamp(new, covered, new.dtype.type(deviations), radius, earlier)
 
 
@@ -104,11 +97,10 @@ class Filtered(NamedTuple):
 
 
 def history_of(frame: "Frame", geometry: Geometry, light: Array) -> History:
-    """Return the state that the next frame needs of this one: depths, normals, light, frames; eight numbers a pixel.
+    """Return the state that the next frame needs of this one: depths, normals, light, frames.
 
-    `geometry` is the scene's as the scene holds it: the very object of the next scene if nothing moves. `light` (3 or
-    4, h, w) is F or I by the form of the filter, W/m^2, and in a fourth plane the number of frames in which each
-    pixel's surface was found; as many as a asks for where absent.
+    `geometry` is the very object of the next scene if nothing moves; `light` (3 or 4, h, w) is F or I, W/m^2, and
+    frames.
     """
     buffer = frame.gbuffer
     depth, normal = buffer.resolve("depth", "normal")
@@ -116,10 +108,7 @@ def history_of(frame: "Frame", geometry: Geometry, light: Array) -> History:
 
 
 def first_light(irradiance: Array, settings: TemporalSettings) -> Array:
-    """Return the light of a frame that none goes before, with a number of frames of 1 where frames are counted.
-
-    `irradiance` (3, h, w): its light, W/m^2. `settings`: say whether frames are counted. Returns (3 or 4, h, w).
-    """
+    """Return the light (3 or 4, h, w) of a frame that none goes before, with frames of 1 where they are counted."""
     return with_frames(irradiance, np.ones(irradiance.shape[1:], irradiance.dtype) if settings.counts_frames else None)
 
 
@@ -176,12 +165,10 @@ def blended(
     irradiance: Array, reprojected: Array, weight: Array, settings: TemporalSettings, speed: Array | None = None,
     entering: Array | None = None,
 ) -> int:
-    """Turn light of the frame before into F_i = a W(F_{i-1}) + (1 - a) I_i; return how many surfaces that frame shows.
+    """Turn `reprojected`, W(F_{i-1}) and frames, into F_i and frames with this; return how many surfaces were found.
 
-    `irradiance` is I_i, W/m^2. `reprojected` (3 or 4, h, w) is W(F_{i-1}) and the frames in which the surface was
-    found; it becomes F_i and the frames with this one. `weight` (h, w), the share of the texels that show the same
-    surface, 0 where none does, becomes a. `speed` (h, w) is the surfaces', pixels a frame; `entering` (h, w) the share
-    of a of the pixels that entered the picture.
+    `weight` (h, w), 0 where the frame before does not show the surface, becomes a. `speed` (h, w) is the surfaces',
+    pixels a frame; `entering` (h, w) the share of a of pixels that entered.
     """
     real = irradiance.dtype.type
     reused = np.empty(len(weight), np.int64)  # pixels of each row
@@ -201,10 +188,7 @@ def expect_same_triangles(geometry: Geometry, before: Geometry) -> None:
 
 
 def earlier_geometry(scene: Scene, origin: Vector, history: History) -> Geometry:
-    """Return the triangles of the frame before relative to a frame's origin, solid objects in the pose of its scene.
-
-    By HSS Sec. 4 "supposing that their pose hasn't changed": the rigid motion that fits an object's vertices best.
-    """
+    """Return the frame before's triangles relative to a frame's origin, solid objects in its pose (HSS Sec. 4)."""
     before, now = history.geometry, scene.geometry
     if any(origin):
         before = dataclasses.replace(before, vertices=np.asarray(before.vertices, np.float64) - origin)
@@ -217,10 +201,7 @@ def _blend(
     irradiance: Array, speed: Array | None, entering: Array | None, a: float, falloff: float, weight: Array,
     blended: Array, reused: Array,
 ) -> None:
-    """Turn W(F_{i-1}) into F_i and its weight into a; differences, so that equal light stays as it is, to the bit.
-
-    A fourth plane of `blended` is n, and becomes n + 1.
-    """
+    """Turn W(F_{i-1}) into F_i, its weight into a, by differences: equal light stays; a fourth plane is n."""
     none, one = weight.dtype.type(0), weight.dtype.type(1)
     for row in prange(weight.shape[0]):
         count = 0

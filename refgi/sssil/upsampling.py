@@ -1,8 +1,6 @@
 """Upsampling of a level's irradiance to the next finer level (Sec. 3.2; Kopf, Cohen, Lischinski and Uyttendaele 2007).
 
-Threads take blocks of WIDE pixels by BAND rows of texels.
-
-Bilinear and nearest upsampling ignore surfaces: bilinear light bleeds across edges.
+Threads take blocks of WIDE pixels by BAND rows of texels. Bilinear and nearest upsampling bleed across edges.
 """
 
 import math
@@ -44,10 +42,7 @@ class Falloff(NamedTuple):
 def fill_bilateral(
     light: Array, coarse: Guide, fine: Guide, factor: int, falloff: Falloff, added: Array, adds: bool, result: Array
 ) -> None:
-    """Upsample irradiance of texels to pixels of the same surface, and add `added` if `adds`.
-
-    `light` (3, hc, wc), W/m^2, of texels of `factor` pixels along a side; `result` (3, h, w) is filled, W/m^2.
-    """
+    """Upsample irradiance of texels of `factor` pixels to pixels of the same surface, and add `added` if `adds`."""
     tents = np.empty(TENTS, fine.depth.dtype)
     write_tents(factor, falloff.corner, tents)
     across = (fine.depth.shape[1] + WIDE - 1) // WIDE
@@ -149,11 +144,7 @@ def fill_plain(
     light: Array, coarse_depth: Array, depth: Array, factor: int, nearest: bool, added: Array, adds: bool,
     result: Array,
 ) -> None:
-    """Upsample irradiance of texels to pixels by the bilinear mean of four texels, or by the `nearest` one.
-
-    Texels without a surface (`coarse_depth` = inf) have no weight, pixels without one receive nothing. `added` (3, h,
-    w) is added if `adds`; `result` (3, h, w) is filled, W/m^2.
-    """
+    """Upsample by the bilinear mean of four texels with surface, or by the `nearest` one; add `added` if `adds`."""
     width = depth.shape[1]
     real = depth.dtype.type
     infinite, zero = real(np.inf), real(0.0)

@@ -1,14 +1,8 @@
 """Rows of texels around a block of pixels, and rows of pixels that irradiance is upsampled to.
 
-Whatever a pixel's place in its texel, its texel's neighbours are as many places away as a texel has pixels, so that a
-row of pixels reads contiguous values. Depth is stored as its inverse, the nearness: it is linear in the picture along
-every plane, and 0 at infinity.
-
-So differences of nearness between neighbouring pixels give its value on a plane at the texels around, without rays or
-normals: of the two differences along each axis the smaller one counts, and none where they disagree in sign, which
-avoids silhouettes.
-
-Symbols: g_x, g_y slope of the nearness (1/m a texel).
+A texel's neighbours are as many places away as it has pixels, so that a row of pixels reads contiguous values. Depth is
+stored as its inverse, the nearness, linear in the picture along every plane: differences between neighbouring pixels
+give its value at the texels around, the smaller one along each axis, none where signs disagree, as at silhouettes.
 """
 
 from typing import Any
@@ -30,11 +24,9 @@ def load_texels(
     light: Array, depth: Array, normal: Array, row: int, left: int, wide: int, factor: int, scratch: Array,
     texels: Array,
 ) -> None:
-    """Write a row of texels around a block of pixels into `texels` (LINES,).
+    """Write a row of texels around a block of pixels into `texels` (LINES,); beyond the picture they see no surface.
 
-    `light` (3, hc, wc), W/m^2; `depth` (hc, wc), m, inf for no surface; `normal` (3, hc, wc). Beyond the picture there
-    are no surfaces, light and normals are those of its edge. The block begins at pixel `left`, the first of a texel,
-    and has `wide` pixels, whole texels of `factor`. `scratch` is (2, SPAN).
+    The block begins at pixel `left`, the first of a texel, and has `wide` pixels, whole texels of `factor`.
     """
     nowhere = scratch.dtype.type(NOWHERE)
     texel = scratch[0]
@@ -57,10 +49,7 @@ def load_texels(
 
 @kernel
 def load_bounds(light: Array, row: int, left: int, wide: int, factor: int, scratch: Array, bounds: Array) -> None:
-    """Write the minimum and the maximum light of the 3 x 3 texels around each one of a row into `bounds` (BOUNDS,).
-
-    Arguments as those of `load_texels`; lines begin a texel left of the block.
-    """
+    """Write least and most light of the 3 x 3 texels around each of a row into `bounds`, a texel left on."""
     low, high, end = _inside(left, wide, factor, light.shape[2])
     above, below, shift = max(row - 1, 0), min(row + 1, light.shape[1] - 1), np.uint64(left // factor - 1)
     least, most = scratch[0], scratch[1]
@@ -129,10 +118,7 @@ ACROSS, DOWN, HERE = 5 * SPAN, 6 * SPAN, 7 * SPAN
 
 @kernel
 def load_nearness(depth: Array, row: int, left: int, wide: int, line: Array) -> None:
-    """Write 1/z of a row of pixels, and of one more at either end, into `line` (SPAN,); 0 for no surface.
-
-    Place 0 is pixel `left` - 1. One pixel beyond the picture's edge (row -1 or h), the slope is that at the edge.
-    """
+    """Write 1/z of a row of pixels from `left` - 1 on into `line`; 0: no surface. Beyond the edge its slope goes on."""
     zero, one = line.dtype.type(0.0), line.dtype.type(1.0)
     height, width = depth.shape
     if row < 0 or row >= height:
@@ -172,10 +158,8 @@ def load_receivers(
 ) -> None:
     """Write normals of a row of pixels, and the nearness of their planes at texels, into `pixels` (HERE,).
 
-    `sharpness` = 1 / (4 sqrt(2) sigma), sigma the standard deviation of depths as a share of the depth; `corner`:
-    offset of the point that a texel stands for from its centre, toward the nearer side along either axis, texels;
-    `above`, `nearness`, `below`: of `load_nearness`; `tents`: of `write_tents`. Filled: normal; sharpness z, 0 for no
-    surface; nearness at the own texel's point; its change from texel to texel.
+    `sharpness` = 1 / (4 sqrt(2) sigma), sigma the standard deviation of depths as a share; `corner`: offset of the
+    point that a texel stands for from its centre, toward the nearer side along either axis, texels.
     """
     real = pixels.dtype.type
     zero, side = real(0.0), real(factor)

@@ -1,15 +1,9 @@
 """Joint bilateral weights and weighted means of 3 x 3 texels for a row of pixels; the pixels are the SIMD lanes.
 
-A texel weighs tent * exp(-u) * max(0, <n . n'>)^p for a pixel, u = delta^2 / (2 sigma^2), delta = z (1/z' - d) with d
-the nearness of the plane through the pixel at the texel's place. The exponential is taken as (1 - u / 16)^16, 0
-from u = 16 (5.7 sigma) on, so that with p = 8 the product is the eighth power of cosine * (1 - u / 16)^2.
-
-Left and right texels are added to each other first: pictures that mirror each other get sums that do, to the bit.
-
-Tent: about a place t texels (up to 1/2) from the middle one its half width is (4 + |t|) / 3; brought to a sum of 1 its
-weights are (1 - 2 |t|) / 6, (2 - |t|) / 3 and (1 + 4 |t|) / 6 for the far, the own and the near texel. Of all tents
-it is the one that leaves linear functions linear, as the bilinear weights of two texels do, which it equals at
-|t| = 1/2 and which replace it beyond.
+A texel weighs tent * exp(-u) * max(0, <n . n'>)^p, u = delta^2 / (2 sigma^2), delta = z (1/z' - d) with d the nearness
+of the pixel's plane there. The exponential is (1 - u / 16)^16, so that with p = 8 the product is an eighth power. Left
+and right are added to each other first: mirrored pictures get mirrored sums. The tent t texels from the middle weighs
+(1 - 2 |t|) / 6, (2 - |t|) / 3, (1 + 4 |t|) / 6: the one that leaves linear functions linear.
 """
 
 from typing import Any
@@ -30,10 +24,7 @@ SIXTH, THIRD = 1 / 6, 1 / 3
 
 @kernel
 def bilateral_weight(cosine: Any, off: Any, power: Any) -> Any:
-    """Return the range weight max(0, cosine)^p (1 - off^2)^16 of a texel, 0 to 1.
-
-    `cosine` between the normals; `off` = delta / (4 sqrt(2) sigma), whose square is u / 16; `power` p, None for 8.
-    """
+    """Return the range weight max(0, cosine)^p (1 - off^2)^16, off = delta / (4 sqrt(2) sigma); `power` None: 8."""
     zero, one = type(off)(0.0), type(off)(1.0)
     q = one - off * off
     if power is None:
@@ -53,14 +44,9 @@ def average(
     above: Array, middle: Array, below: Array, pixels: Array, bounds: Array, tents: Array, place: int, wide: int,
     factor: int, power: Any, means: Array,
 ) -> None:
-    """Average the light of 3 x 3 texels for each of `wide` pixels of a row.
+    """Average the light of 3 x 3 texels for each of `wide` pixels of a row; `means` gets light and the sum of weights.
 
-    `above`, `middle`, `below` (lines.LINES,): rows of texels, the middle one with the pixels. `pixels` (HERE,),
-    `bounds` (lines.BOUNDS,) of the means, `tents` (TENTS,) of `write_tents`, `place` of the row in its texels. `means`
-    (MEANS,) is filled with three lines of light and the sum of the weights, 0 where that is too small.
-
-    Bounds cut off rounding: equal light stays equal to the bit. Dividing keeps light of 1 exact beside any other
-    surface.
+    Bounds cut off rounding: equal light stays equal to the bit. Dividing keeps light of 1 exact beside other surfaces.
     """
     real = means.dtype.type
     zero, one, least, side = real(0.0), real(1.0), real(LEAST), np.uint64(factor)
@@ -146,10 +132,7 @@ def _bounded(value: Any, bounds: Array, channel: int, i: Any) -> Any:
 
 @kernel
 def _tent_at(t: Any) -> Any:
-    """Return the weights of the texel before, the own and the one after; their sum is 1.
-
-    `t`: place of the receiver from the point that the middle texel stands for, texels, -1 to 1.
-    """
+    """Return the weights of the texel before, the own and the one after, of sum 1, `t` from the middle one's point."""
     real = type(t)
     zero, one, two, four = real(0.0), real(1.0), real(2.0), real(4.0)
     away = abs(t)
@@ -162,11 +145,7 @@ def _tent_at(t: Any) -> Any:
 
 @kernel
 def write_tents(factor: int, corner: Any, tents: Array) -> None:
-    """Write the offsets of a row's pixels from the centres of their texels, and the weights of the texels beside.
-
-    `tents` (TENTS,) is filled: offsets, texels, -1/2 to 1/2; weights of the texel before and of the one after as shares
-    of the own texel's, three lines each, for points `corner` texels after the centre, in it, and before it.
-    """
+    """Write offsets of a row's pixels from their texels' centres, -1/2 to 1/2, and weights beside over the own."""
     for i in range(WIDE):
         t = _offset(i % factor, factor, tents)
         tents[i] = t

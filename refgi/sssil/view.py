@@ -1,11 +1,10 @@
-"""Mip levels as arrays, the view rays of pixels, and sample area (Soler et al. 2009, Sec. 3.1, Eq. 2; Sec. 4).
+"""Mip levels as arrays, the view rays of pixels, sample area (HSS Sec. 3.1, Eq. 2; Sec. 4), and averaged texels.
 
-``ds = z^2 4 tan(f_h / 2) tan(f_v / 2) dP / (W H) cos(alpha) / cos(beta)`` with z the depth, alpha the angle of the
-pixel's ray with the view direction and beta that with the surface's normal. For the ray d of length 1 along the view
-direction cos(alpha) is ``1 / |d|`` and cos(beta) is ``-n.d / |d|``: their ratio is 1 / -n.d, without a root.
-
-The paper calls beta the angle at the "receiving" surface; it is that at the sample's own. At silhouettes cos(beta)
-goes to 0 and the area has no bound: a ratio below a millionth, which is rounding, counts as a millionth.
+``ds = z^2 4 tan(f_h / 2) tan(f_v / 2) dP / (W H) cos(alpha) / cos(beta)``; for the ray d of length 1 along the view
+direction the ratio of the cosines is 1 / -n.d. At silhouettes one below a millionth, rounding, counts as that. The
+paper calls beta the angle at the "receiving" surface; it is the sample's own. Averages weigh by area, so that the flux
+of texels is that of pixels, or radiance alone by pixels; neighbours are added pairwise: mirrored pictures, mirrored
+sums.
 """
 
 import math
@@ -69,12 +68,7 @@ class View(NamedTuple):
 
 
 def view_of(projection: Projection, as_published: frozenset[str] = frozenset()) -> View:
-    """Return the view rays of a camera, one perspective map, and the area of a pixel.
-
-    `as_published` with "hss_tan_f": fields of view as Eq. 3 prints them, 4 tan f_h tan f_v / (W H), 9 times as much at
-    60 degrees as Eq. 2's 4 tan(f_h / 2) tan(f_v / 2) / (W H). `InputError` if it meets a field of view of 90 degrees or
-    more, whose tangent is not positive.
-    """
+    """Return a camera's view rays and the area of a pixel; "hss_tan_f": by fields of view as Eq. 3 prints them."""
     right, down, ahead = projection.frame[0]
     horizontal, vertical = (float(half) for half in projection.half)
     tangents = horizontal * vertical
@@ -97,10 +91,7 @@ def centre(index: Any, count: int) -> float:
 
 @kernel
 def pixel_surface(depth: float, facing: float, pixel_area: float) -> float:
-    """Return the surface area that one pixel shows, ds of Eq. 2 with dP = 1, m^2; 0 without a surface or facing away.
-
-    `facing` is cos(beta) / cos(alpha) = -n.d for the ray d of length 1 along the view direction.
-    """
+    """Return the surface that a pixel shows, ds of Eq. 2 with dP = 1, m^2; `facing` is -n.d; 0 where it is not."""
     covered = (depth < np.inf) & (facing > 0.0)
     z = depth if covered else 0.0
     # Eq. (2)
@@ -120,11 +111,7 @@ TASKS = 16  # blocks of rows that threads take, whatever their number
 
 @kernel(parallel=True)
 def average_pixels(picture: Picture, view: View, by_surface: bool, level: Level, weight: Array) -> None:
-    """Put means of pixels into the first level, which holds the closest ones.
-
-    `by_surface`: area weighs and every quantity is a mean; else pixels count equally and radiance alone is one.
-    `weight` (h, w) is filled with the sum of weights, m^2 or pixels.
-    """
+    """Put means of pixels into the first level, of all quantities `by_surface`, else radiance; weights' sums."""
     rows = level.area.shape[0]
     for task in prange(TASKS):
         _average_pixels(picture, view, by_surface, level, weight, task * rows // TASKS, (task + 1) * rows // TASKS)

@@ -1,29 +1,10 @@
 """The basis of the series: sines and cosines of each texel's depth, and the scale of depths (Sec. 4.1, 6).
 
-The series' bias is a share of its range, so the scale says how near a blocker may come to a receiver and still cast a
-shadow. The paper takes depths of [0, 1] and does not say of what. What a map holds are its occluders alone: on a scale
-stretched from the nearest to the farthest of them, and even in ratios of distances instead of metres, the same few
-terms tell more of them from what they shade.
-
-Symbols: z distance from the map's centre, m; t depth of the series, 0 to `most`; near and far what the map holds, m.
-
-S_k = sin(c_k t), C_k = cos(c_k t), c_k = (2k - 1) pi, from the first pair by turning it on by 2 pi t:
-
-    S_k+1 = S_k cos(2 pi t) + C_k sin(2 pi t),   C_k+1 = C_k cos(2 pi t) - S_k sin(2 pi t).
-
-t is the depth over the range of the series, 0 to less than 1 (the rest keeps the far end from wrapping around to the
-near one); where the map is empty it is the far end. The paper's channels are the 2 M of the basis and the 2 M of the
-"basis-z"; the mean of (1 - f) t needs the plain t as well.
-
-The published textures have 8 bits for sines and cosines, 16 for those times z (Sec. 6). 8 bits store [-1, 1] as 0 ..
-255; the paper does not say how, this is the mapping of normalised textures. Each number is off by 1/255 at most, so V
-is off by sum_k 2 sqrt(2) / (255 c_k) at most: 0.0059 with 4 terms. 16 bits are the IEEE format of 11 significant ones,
-rounded to nearest, ties to even.
-
-Some filters cannot leave out the square beyond the unit disc, which is the hemisphere before the light: a fifth of a
-map's texels lie there. Holding nothing they would let light leak in over the rim. `mirrored` texels hold what lies in
-the direction mirrored at the light's plane, (s, t) / (s^2 + t^2): the filter then sees nothing but the hemisphere, as
-the sum over the texels of the disc does.
+On a scale from the nearest to the farthest of what a map holds, even in ratios of distances, the same few terms tell
+more of occluders from what they shade. S_k = sin(c_k t), C_k = cos(c_k t), c_k = (2k - 1) pi come by turning on by 2 pi
+t. The published textures keep 8 bits of them, which puts V off by 0.0059 at most with 4 terms, and 16 of the products
+with t. `mirrored` texels beyond the unit disc hold what lies in the direction mirrored at the light's plane, (s, t) /
+(s^2 + t^2): holding nothing they would let light leak in over the rim.
 """
 
 import functools
@@ -57,12 +38,11 @@ def joined(scales: Sequence[DepthScale]) -> DepthScale:
 
 
 def depth_scale(kind: str, near: float, far: float, scene_far: float, most: float) -> DepthScale:
-    """Return the scale of one map, whose nearest and farthest distances are 0 < near <= far, m, as Python floats.
+    """Return the scale of one map of distances 0 < near <= far, m; `most` is the far end of the series' range.
 
-    "log_map": the logarithm of distances between these; "map": distances between them; "scene": distances up to
-    `scene_far`, the farthest place of the scene's extent, m. `most` is the far end of the series' range. What the map
-    holds ends 1 - `most` below that, both biases, so that its farthest blocker still hides wholly what lies beyond; or
-    in the middle where so few terms leave less than that.
+    "log_map" and "map" lie between these, "scene" ends at `scene_far`, m. What the map holds ends both biases below
+    `most`, so that its farthest blocker still hides wholly what lies beyond; or in the middle where so few terms leave
+    less.
     """
     if kind == "scene":
         return DepthScale(False, 0.0, most / scene_far, most)
@@ -122,8 +102,8 @@ def eight_bits(value: Any) -> Any:
 def half_precision(value: Any) -> Any:
     """Return the nearest float of 16 bits, of two equally near ones the even, of a number within 65504 in size.
 
-    By the bits of the number, so that loops over it run in SIMD lanes: half of what is cut off is added, less one
-    where what stays is even; below 2^-14, where spacing is 2^-24, by adding a number of that spacing.
+    By its bits, in SIMD lanes: half of what is cut off is added, less one where what stays is even; below 2^-14 by
+    adding a number of that spacing, 2^-24.
     """
     if isinstance(value, np.float32):
         bits = np.float32(value).view(np.int32)
@@ -159,10 +139,7 @@ def normalise(depth: Array, scale: DepthScale, out: Array) -> None:
 
 @kernel
 def sine_cosine(t: Any) -> tuple[Any, Any]:
-    """Return sin(pi t) and cos(pi t) for t from -1/4 (a depth less the largest bias) to 1.
-
-    Within 2.4e-7 (float64: 4e-16) from 0 on, 4.5e-7 (8e-16) below.
-    """
+    """Return sin(pi t), cos(pi t), t from -1/4 to 1, within 2.4e-7 (float64: 4e-16) from 0 on, else 4.5e-7 (8e-16)."""
     real = type(t)
     u = t - real(0.5)
     q = u * u
@@ -187,11 +164,7 @@ def turned(sine: Any, cosine: Any, by_sine: Any, by_cosine: Any) -> tuple[Any, A
 
 @kernel
 def fill_basis(depth: Array, terms: int, quantised: bool, basis: Array, basis_z: Array) -> None:
-    """Fill basis and basis-z of every texel of a map of t, (n, n).
-
-    `basis` (n, n, 2 M): S_1 .. S_M, C_1 .. C_M; `basis_z` (n, n, 2 M + 1): t S_1 .. t S_M, t C_1 .. t C_M, t.
-    `quantised` rounds to 8 bits and 16.
-    """
+    """Fill `basis` (n, n, 2 M) and `basis_z` (n, n, 2 M + 1) of a map of t, (n, n); quantised: 8 bits and 16."""
     for i in range(depth.shape[0]):
         for j in range(depth.shape[1]):
             t = depth[i, j]
@@ -211,10 +184,7 @@ def fill_basis(depth: Array, terms: int, quantised: bool, basis: Array, basis_z:
 
 @functools.lru_cache(maxsize=8)
 def beyond_disc(size: int, mirrored: bool) -> Array:
-    """Pair the texels beyond the unit disc of an n x n map with those they mirror, if any, row by row.
-
-    (count, 2) int32: a texel beyond and the one it copies.
-    """
+    """Pair the texels beyond the unit disc of an n x n map with those they mirror, if any: (count, 2) int32."""
     if not mirrored:
         return np.zeros((0, 2), np.int32)
     centres = (np.arange(size) + 0.5) * 2 / size - 1

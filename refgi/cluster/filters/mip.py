@@ -1,10 +1,7 @@
 """Read a mip map for the receivers of a tile: the filter of the paper (Sec. 6).
 
-A disc is read at level log2 of its diameter in texels, at least 0, between the two levels around it and the 2 x 2
-nearest texels of each: 8 texels with 8 weights. Beyond the edge of the map the edge goes on.
-
-Where levels, texels and weights are worked out, receivers are the SIMD lanes; where texels are summed up, their
-channels are; then sums of 8 receivers and 8 channels are transposed in registers.
+A disc is read at level log2 of its diameter in texels, between the two levels around it and the 2 x 2 nearest texels of
+each. Receivers are the SIMD lanes for levels, texels and weights, channels for sums, which are transposed in registers.
 """
 
 from typing import Any
@@ -49,8 +46,7 @@ def mip_means(
 ) -> None:
     """Fill out (channels, lanes) with the means over the disc of each active lane among the first `count`.
 
-    `s`, `t` and `radius` (lanes,) are centres and radii in units of the map's half side; `with_z` reads all 4 M + 1
-    channels instead of the first 2 M. What the first `count` lanes held elsewhere is lost.
+    Centres and radii are in units of the map's half side; `with_z` reads all 4 M + 1 channels instead of the first 2 M.
     """
     whole, weights, sums = WHOLE(s), WEIGHTS(s), SUMS(s)
     n, top, channels = len(mip.depth), len(mip.first) - 1, 2 * mip.terms
@@ -81,10 +77,7 @@ def _find_levels(
     shift: float, size: int, coarsest: int, s: Array, t: Array, radius: Array, active: Array, whole: Array,
     weights: Array,
 ) -> None:
-    """Find each lane's finer level and the coarser one's share, and its place in texels of the map.
-
-    A lane that is not active reads the coarsest level.
-    """
+    """Find each lane's finer level, the coarser one's share, and its place; inactive lanes read the coarsest."""
     real = s.dtype.type
     n, top, none, half, one = real(size), real(coarsest), real(0.0), real(0.5), real(1.0)
     for lane in range(len(s)):  # three loops: one would be too long for the compiler to join into SIMD lanes
@@ -101,10 +94,7 @@ def _find_levels(
 
 @kernel
 def _find_texels(size: int, coarsest: int, lanes: int, which: int, whole: Array, weights: Array) -> None:
-    """Find the first of 2 x 2 texels on the finer (`which` 0) or coarser (1) level, and weights that sum to its share.
-
-    Beyond the last centres the weights of what is not there are 0.
-    """
+    """Find the first of 2 x 2 texels on the finer (`which` 0) or coarser level, and weights that sum to its share."""
     real = weights.dtype.type
     n, top, one = np.int32(size), np.int32(coarsest), np.int32(1)
     none, half, full = real(0.0), real(0.5), real(1.0)

@@ -1,7 +1,6 @@
-"""Build the mip maps of one map or of several: level 1 from the depths, then each level from the one before.
+"""Build mip maps: level 1 from the depths, with texels as the SIMD lanes, then each level from the one before.
 
-Texels are the SIMD lanes of level 1, in groups of 8 that lie anywhere on it: where the map is empty around 8 texels,
-as it is nearly everywhere on many, they are all alike and copied. Channels are the lanes of the levels above.
+Where a map is empty around 8 texels, as it is nearly everywhere on many, they are all alike and copied.
 """
 
 from typing import Any
@@ -31,10 +30,7 @@ STARTS = stack_array(1, GROUPS, types.int64)
 
 @kernel(parallel=True)
 def build_mips(depth: Array, scales: DepthScale, several: Mip) -> None:
-    """Fill the pyramids of several maps of radial distances (K, n, n), m; inf where they are empty.
-
-    `scales.origin` and `scales.slope` are (K,) arrays; `several` has a leading axis of K at least.
-    """
+    """Fill the pyramids, K at least, of several maps of distances (K, n, n), m; inf where they are empty."""
     for k in prange(len(depth)):
         scale = DepthScale(scales.logarithmic, scales.origin[k], scales.slope[k], scales.most)
         build_mip(depth[k], scale, mip_of(several, np.int64(k)))
@@ -59,10 +55,7 @@ def build_mip(depth: Array, scale: DepthScale, mip: Mip) -> None:
 
 @kernel
 def _fill_first(mip: Mip, most: Any) -> None:
-    """Fill level 1 with the means of 2 x 2 texels of the map, whose basis is kept no longer than that takes.
-
-    `most` is the depth of nothing: the means of four equal numbers, to the bit those of any empty texel.
-    """
+    """Fill level 1 with the means of 2 x 2 texels; `most` is the depth of nothing, its own mean to the bit."""
     side, width = (len(mip.depth) + 1) // 2, mip.basis.shape[1]
     depths, starts = DEPTHS(mip.depth), STARTS(mip.depth)
     # rows of S, C, t S, t C and t; padding stays 0

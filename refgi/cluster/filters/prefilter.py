@@ -1,9 +1,12 @@
-"""Prefilters of convolution shadow maps (Sec. 6): mip maps, or means texel by texel at a cost that grows with the disc.
+"""Prefilters of convolution shadow maps (Sec. 6): mip maps, or means texel by texel; then each as a step (Sec. 4.1, 6).
 
-By brute force the disc takes the texels whose centres it holds, within the unit disc, or the one it lies in. The box is
-the square around the disc, at least a texel wide; texels count by the area of them that it holds, those beyond the unit
-disc too, and what of it lies beyond the map is cut off. A box with its middle beyond the map is moved to its edge. Sums
-are float64 for any map.
+By brute force a disc takes the texels whose centres it holds, within the unit disc, or the one it lies in. The box is
+the square around it, at least a texel wide, whose texels count by area; one beyond the map moves to its edge.
+
+- terms: M.
+- pending (area light, h, w) bool: Who asks.
+- region (area light, s t radius, h, w): Discs of the map, in units of half its side.
+- weighed: All channels, else the first 2 M.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,12 +43,7 @@ class Brute(NamedTuple):
 def brutes(
     size: int, terms: int, dtype: npt.DTypeLike, *, box: bool = False, quantised: bool = False, mirrored: bool = False
 ) -> Brute:
-    """Allocate the filters of one map of n x n texels with M terms, not yet filled.
-
-    `box` filters over the square around the disc instead of the disc; `quantised` keeps 8 bits of the basis and 16 of
-    the basis-z; `mirrored` mirrors the disc in the square beyond it, which otherwise holds the far end; boxes alone
-    look there.
-    """
+    """Allocate the filters of one map of n x n texels, M terms; `mirrored` counts for a `box`, which looks there."""
     return Brute(np.zeros((size, size), dtype), np.zeros((size, size, 2 * terms), dtype),
                  np.zeros((size, size, 2 * terms + 1), dtype), box, quantised, beyond_disc(size, mirrored))
 
@@ -127,10 +125,9 @@ MEANS: dict[Any, Any] = {Mip: means_of_mip, Brute: brute_means}
 def filter_means(
     filters: Any, s: Array, t: Array, radius: Array, active: Array, count: int, with_z: bool, out: Array
 ) -> None:
-    """Read the means of the channels over a disc for each active lane of the `count` in use of a tile.
+    """Read the means over a disc, in units of the map's half side, for each active lane of the `count` in use.
 
-    Centres (s, t) and radii are in units of the map's half side; `out` (channels, lanes) is filled where active: all 4
-    M + 1 channels with `with_z`, else the first 2 M.
+    `out` (channels, lanes) is filled where active: all 4 M + 1 channels with `with_z`, else the first 2 M.
     """
     MEANS[type(filters)](filters, s, t, radius, active, count, with_z, out)
 
@@ -150,22 +147,14 @@ def _by_type(
 
 
 def build_filters(depth: Array, scale: DepthScale, settings: Csm, box: bool) -> Any:
-    """Filter one map (n, n), radial distances in m, inf where it is empty, as settings ask for; in its dtype.
-
-    `scale` takes metres to the series' scale. `box`: brute force filters over squares instead of discs.
-    """
+    """Filter one map (n, n), distances in m, as settings ask for; `box`: brute force over squares, not discs."""
     return build_several(depth[None], (scale,), settings, box)[0]
 
 
 def build_several(
     depth: Array, scales: Sequence[DepthScale], settings: Csm, box: bool, scratch: Mip | None = None
 ) -> list[Any]:
-    """Filter several maps (k, n, n) at once, one on each thread, as `build_filters` does one.
-
-    `scratch`, of `allocate_mips` for k maps or more with the same settings, is overwritten. Sec. 6 filters square maps.
-    The square beyond the unit disc, which the hemisphere does not reach, mirrors what lies within: holding nothing, it
-    would let light leak in over the rim. Texel by texel, it is left out.
-    """
+    """Filter several maps (k, n, n), one on each thread; `scratch` of `allocate_mips`, k or more, is overwritten."""
     size, dtype = depth.shape[1], depth.dtype
     if settings.prefilter == "mip":
         several = allocate_mips(len(depth), size, dtype, settings) if scratch is None else scratch

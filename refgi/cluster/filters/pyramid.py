@@ -1,17 +1,9 @@
 """Mip maps of the basis (Sec. 6) as they lie in memory: 8 lanes hold a texel's channels.
 
-The compiler joins loops over pixels into SIMD lanes by itself. Sums over a few texels of 8 channels each are too short
-for that: it would check anew for every texel whether what is written overlaps what is read. Here a kernel says it:
-`load`, `add`, `scale`, `store` and `transpose` work on 8 neighbours at once, in plain IEEE arithmetic. `stack_array` is
-memory of the kernel's own stack, which needs no allocation and overlaps nothing. None of it checks bounds.
-
-Level l halves level l - 1 by the mean of 2 x 2 texels; where the side is odd, the last row and column count twice.
-Texel i of level l covers the texels i 2^l .. (i + 1) 2^l - 1 of the map, so no size drifts. The square beyond the
-unit disc holds the far end, or mirrors the disc (`fill_beyond`).
-
-Level 0 is not stored but computed from the depths where it is read, by receivers whose discs are a few texels wide. It
-would be three quarters of a pyramid and more than a core's cache, and four depths give what four of its texels hold, to
-the same bits.
+Sums over a few texels are too short for the compiler to join into SIMD lanes: `load`, `add`, `scale`, `store` and
+`transpose` work on 8 neighbours at once, in plain IEEE arithmetic, without checks of bounds. Level l halves level l - 1
+by the mean of 2 x 2 texels; of an odd side the last row and column count twice. Level 0, three quarters of a pyramid,
+is computed from the depths where it is read, to the same bits.
 """
 
 from collections.abc import Callable
@@ -136,10 +128,7 @@ def _transpose(_: Any, rows: Any) -> Emitted:
 
 
 def stack_array(rows: int, lanes: int, kind: Any = None) -> Any:
-    """Return a function for kernels that gives scratch on their stack, the same scratch for every call in one kernel.
-
-    ``scratch(like)`` is a (rows, lanes) array that holds anything, of numbers of `kind`, else of the type of `like`'s.
-    """
+    """Return a function for kernels: ``scratch(like)`` is (rows, lanes) on their stack, the same in every call."""
 
     def scratch(_: Any, like: Any) -> Emitted:
         array_type = types.Array(kind or like.dtype, 2, "C")
@@ -192,11 +181,7 @@ class Mip(NamedTuple):
 
 
 def level_offsets(size: int) -> tuple[Array, int]:
-    """Return where each level of a pyramid starts, (levels,) int64, and the texels of levels 1 and up, laid end to end.
-
-    Each level has half of the texels along a side of the one before, rounded up, from `size` on. Level 0 is not among
-    them and starts at 0, as level 1.
-    """
+    """Return where each level starts, (levels,), and the texels of levels 1 and up, which lie end to end."""
     sides = [size]
     while sides[-1] > 1:
         sides.append((sides[-1] + 1) // 2)
@@ -208,11 +193,9 @@ def mips(
     count: int, size: int, terms: int, dtype: npt.DTypeLike, *, shift: float = 0.0, quantised: bool = False,
     mirrored: bool = False,
 ) -> Mip:
-    """Allocate the filters of the pyramids of `count` maps of n x n texels with M terms, not yet filled; padding is 0.
+    """Allocate the pyramids of `count` maps of n x n texels with M terms, not yet filled; padding is 0.
 
-    The leading axis is `count`. `shift` is added to the level of every read; 0 as published, negative for a narrower
-    filter. `quantised` keeps 8 bits of the basis and 16 of the basis-z on every level; `mirrored` mirrors the disc in
-    the square beyond it, which otherwise holds the far end.
+    `shift` is added to the level of every read: 0 as published, negative for a narrower filter.
     """
     first, total = level_offsets(size)
     shape, width = (count, total + SLACK), -(-2 * terms // EIGHT) * EIGHT
@@ -229,11 +212,7 @@ def mip_of(several: Mip, k: Any) -> Mip:
 
 @kernel
 def add_level_0(mip: Mip, with_z: bool, lanes: int, whole: Array, weights: Array, out: Array, start: int) -> None:
-    """Add what lanes read of the map itself; those that read none of it have weights of 0.
-
-    Rows LEVEL and DIRECT of `whole` (6, CHUNK) and MAP to MAP + 3 of `weights` (15, CHUNK), of texels left and right,
-    above and below, count. Adds to `out` (channels, tile) from lane `start` on.
-    """
+    """Add what lanes read of the map itself to `out` from lane `start` on; those that read none weigh 0."""
     if mip.quantised:
         _add_rounded(mip.depth, mip.terms, with_z, lanes, whole, weights, out, start)
     else:

@@ -1,10 +1,8 @@
-"""Convolution shadow maps (CSM): the soft shadow of one area light by a filtered series (Sec. 4.1, 4.2).
+"""Convolution shadow maps (CSM): the soft shadow of one area light by a filtered series (VAL Sec. 4.1, 4.2).
 
-Receivers are the SIMD lanes. Three passes over a tile surround two reads of the filtered map: where each receiver
-looks for blockers; their mean depth, and the penumbra's filter; the filtered comparison.
-
-Symbols: d distance of the receiver from the area light's centre (m); d' = t(d) - b on the series' scale; S_k, C_k,
-SZ_k, CZ_k, Z means of sin(c_k z), cos(c_k z), of their products with z, and of z; w_k weights of the series.
+Receivers are the SIMD lanes. Three passes over a tile surround two reads of the filtered map: where each receiver looks
+for blockers; their mean depth, and the penumbra's filter; the filtered comparison. d' = t(d) - b is the receiver's
+depth on the series' scale; S_k, C_k, SZ_k, CZ_k, Z are means of the channels, w_k weights of the series.
 """
 
 from typing import Any, NamedTuple
@@ -70,8 +68,7 @@ def csm_tile(
 ) -> None:
     """Fill V of the active ones of `size` receivers, (>= 3, >= size), world space, m; 1 elsewhere.
 
-    Each receiver's V depends on nothing but its own position, whatever tile it is in. The second read is half of the
-    cost; where few have blockers, these move together for it. `active` is overwritten, with nothing but True.
+    The second read is half of the cost; where few have blockers, these move together for it. `active` is overwritten.
     """
     constants, weight, pending, rows, means = (shadow.constants, shadow.weight, scratch.pending, scratch.rows,
                                                scratch.means)
@@ -96,10 +93,8 @@ def find_penumbra(
 ) -> int:
     """Find the mean depth of blockers and the filter whose size follows from it; return how many have blockers.
 
-    z_avg is the distance at (Z/2 - sum_k w_k (cos(c_k d') SZ_k - sin(c_k d') CZ_k)) / (1 - V) of the series' scale,
-    where V is that of the search disc: on a logarithmic scale, the blockers' geometric mean. `means`
-    (>= 4 M + 1, >= size) holds S, C, SZ, CZ for each k, then Z. Fills `rows` S to RADIUS, ON_SERIES, and DEPTH with
-    z_avg (m), d where there is no blocker; those receivers leave `pending`.
+    z_avg is the distance at (Z/2 - sum_k w_k (cos(c_k d') SZ_k - sin(c_k d') CZ_k)) / (1 - V) of the series' scale.
+    Fills `rows` S to RADIUS, ON_SERIES, and DEPTH with z_avg (m), d without a blocker; those receivers leave `pending`.
     """
     real = rows.dtype.type
     half, near = real(0.5), constants[NEAREST]
@@ -134,11 +129,7 @@ def find_penumbra(
 def compare_filtered(
     constants: Array, weight: Array, means: Array, size: int, pending: Array, visible: Array, rows: Array
 ) -> None:
-    """Compare depths under the penumbra's filter (Sec. 4.1).
-
-    V = 1/2 + sum_k w_k (cos(c_k d') S_k - sin(c_k d') C_k), in [0, 1], where `pending`; `means` (>= 2 M, >= size)
-    holds S, then C, for each k.
-    """
+    """Compare depths: V = 1/2 + sum_k w_k (cos(c_k d') S_k - sin(c_k d') C_k) under the penumbra's filter."""
     real = rows.dtype.type
     zero, one, half, gain, terms = real(0.0), real(1.0), real(0.5), constants[GAIN], len(weight)
     start_series(constants[BIAS], size, rows)

@@ -1,18 +1,10 @@
 """Filter sizes, hard shadows and percentage closer filtering (PCF): binary depth tests of the texels around a receiver.
 
-A cone of half-angle a around a direction at polar angle theta is a disc on a stereographic map: centre
-sin(theta) / (cos(theta) + cos(a)) and radius sin(a) / (cos(theta) + cos(a)), exactly. No angle is ever computed: only
-tan(a) and the vector to the receiver.
-
-A receiver falls into one texel of an area light's map. The hard test compares that texel alone; PCF compares all of a
-square of fixed width around it and returns the share that does not hide the receiver (Reeves, Salesin and Cook 1987).
-
-A texel holds the distance along its own centre's direction, not along the receiver's. So the receiver is moved there as
-well, on its tangent plane: of a surface that the map itself holds, no texel is nearer than its own plane, and sloping
-surfaces need no bias.
-
-Symbols: d distance from the area light's centre to the receiver (m), z that of blockers, p cos(beta) the penumbra
-perpendicular to the view, Delta the size of the area light (m), alpha the penumbra's angle.
+A cone of half-angle a around a direction at polar angle theta is a disc on a stereographic map: centre sin(theta) /
+(cos(theta) + cos(a)) and radius sin(a) / (cos(theta) + cos(a)), exactly. PCF compares a square of fixed width (Reeves,
+Salesin and Cook 1987). A texel holds the distance along its own centre's direction, so the receiver is moved there as
+well, on its tangent plane: sloping surfaces need no bias. The least depth of each block of texels tells exactly which
+regions cannot hide a receiver. d, z: distances of receiver and blockers, m.
 """
 
 import math
@@ -61,11 +53,9 @@ STEEPEST = math.tan(math.radians(80.0))  # of a cone; nearer blockers would ask 
 
 @kernel
 def cone_tangent(delta: Any, d: Any, z: Any) -> Any:
-    """Return tan(a) = Delta (d - z) / (2 d z), 0 for z >= d, at most tan(80 deg).
+    """Return tan(a) = Delta (d - z) / (2 d z), 0 for z >= d, <= tan(80 deg): the light seen through z > 0.
 
-    The cone that the light's extent, seen through z > 0, is on the map: of the search with z the nearest depth, of the
-    final filter with z_avg. 2 tan(a) = p cos(beta) / d with p cos(beta) = (d - z_avg) Delta / z_avg of Sec. 4.2,
-    centred on the axis.
+    The search takes the nearest depth for z, the final filter z_avg: 2 tan(a) = p cos(beta) / d of Sec. 4.2, centred.
     """
     zero, cap = type(d)(0.0), type(d)(STEEPEST)
     # Sec. 4.2: p cos(beta) = (d - z_avg) Delta / z_avg, Fig. 3
@@ -75,20 +65,14 @@ def cone_tangent(delta: Any, d: Any, z: Any) -> Any:
 
 @kernel
 def published_tangent(delta: Any, d: Any, z: Any) -> Any:
-    """Return tan(alpha / 2) with alpha = arctan(p cos(beta) / d) as printed in Sec. 4.2; at most 1.
-
-    The printed angle starts at the axis, and so ends at 90 degrees.
-    """
+    """Return tan(alpha / 2), alpha = arctan(p cos(beta) / d) as printed in Sec. 4.2, from the axis on; at most 1."""
     ratio = type(d)(2.0) * cone_tangent(delta, d, z)
     return ratio / (type(d)(1.0) + math.sqrt(type(d)(1.0) + ratio * ratio))
 
 
 @kernel
 def solid_angle_tangent(delta: Any, d: Any) -> Any:
-    """Return tan(a) = Delta / (2 d), at most tan(80 deg): half the angle under which the receiver sees the light.
-
-    The published search. It is that of blockers half-way; nearer ones beside this cone are missed.
-    """
+    """Return tan(a) = Delta / (2 d), <= tan(80 deg): the published search, which misses blockers near the light."""
     tangent = delta / (type(d)(2.0) * d)
     return tangent if tangent < type(d)(STEEPEST) else type(d)(STEEPEST)
 
@@ -97,8 +81,8 @@ def solid_angle_tangent(delta: Any, d: Any) -> Any:
 def farthest_tangent(delta: Any, d: Any, r: Any) -> Any:
     """Return tan(theta) of the directions in which a point at the distance r may lie before the light, <= tan(80 deg).
 
-    It does where r sin(theta) <= (Delta / 2)(1 - r cos(theta) / d), that is theta <= arcsin(Delta cos(phi) / 2 r) - phi
-    with tan(phi) = Delta / 2 d; in all directions where r <= (Delta / 2) cos(phi). 0 for r >= d.
+    r sin(theta) <= (Delta / 2)(1 - r cos(theta) / d), so theta <= arcsin(Delta cos(phi) / 2 r) - phi, tan(phi) = Delta
+    / 2 d.
     """
     zero, one, cap = type(d)(0.0), type(d)(1.0), type(d)(STEEPEST)
     phi = delta / (type(d)(2.0) * d)
@@ -113,11 +97,7 @@ def farthest_tangent(delta: Any, d: Any, r: Any) -> Any:
 
 @kernel
 def disc(x: Any, y: Any, z: Any, d: Any, tangent: Any) -> tuple[Any, Any, Any]:
-    """Return centre s, t and radius, in [-1, 1] units, of the disc that a cone around the receiver is on the map.
-
-    The receiver (x, y, z; z >= 0, m) is in the map's frame at the distance d > 0; `tangent` is of the cone's
-    half-angle.
-    """
+    """Return centre s, t and radius, [-1, 1] units, of the disc of a cone around a receiver in the map's frame, m."""
     one = type(d)(1.0)
     cosine = one / math.sqrt(one + tangent * tangent)
     scale = one / (z + d * cosine)
@@ -126,10 +106,9 @@ def disc(x: Any, y: Any, z: Any, d: Any, tangent: Any) -> tuple[Any, Any, Any]:
 
 @kernel
 def published_square(x: Any, y: Any, z: Any, d: Any, tangent: Any) -> tuple[Any, Any, Any]:
-    """Return s, t and half the side of the square of side alpha / pi of the texture around the receiver (Sec. 4.2).
+    """Return s, t and half the side, [-1, 1] units, of the square of side alpha / pi around the receiver (Sec. 4.2).
 
-    In [-1, 1] units; `tangent` is of alpha / 2. (2 / pi)(1 + cos(theta)) times the width of the exact disc: 1.27 on the
-    axis, 0.64 at the rim.
+    (2 / pi)(1 + cos(theta)) times the width of the exact disc: 1.27 on the axis, 0.64 at the rim.
     """
     scale = type(d)(1.0) / (z + d)
     return x * scale, y * scale, math.atan(tangent) * type(d)(2.0 / math.pi)
@@ -160,11 +139,7 @@ def pcf_shadow(maps: ShadowMaps, k: int, texels: int, behind: bool = False) -> P
 def pcf_tile(
     shadow: PcfShadow, points: Array, facing: Array, size: int, active: Array, visible: Array, scratch: Any  # noqa: ARG001
 ) -> None:
-    """Fill V = 1 - blocked / tested for the active ones of `size` receivers; 1 behind the map's plane.
-
-    The receiver's own texel counts always, others where they lie in the hemisphere. `points` and `facing` are
-    (3, >= size), world space, m, and normals on either side.
-    """
+    """Fill V = 1 - blocked / tested for the active ones of `size` receivers, m; 1 behind the map's plane."""
     depth, center, frame, reach = shadow.depth, shadow.center, shadow.frame, shadow.reach
     real = points.dtype.type
     one, half = real(1), real(0.5)

@@ -1,11 +1,8 @@
 """Percentage closer soft shadows (PCSS): the blocker search, then percentage closer filtering, texel by texel.
 
-[Fernando 2005] What convolution shadow maps approximate, with two rules that [Dong09] lacks. A texel hides the receiver
-if its depth lies before the receiver's tangent plane along the texel's own direction (receiver plane), since on a
-radial map a flat receiver is nearer to the centre at neighbouring texels; and it counts as a blocker in the search only
-within the cone from the receiver to the light (cone), as the search disc is sized for the nearest depth of the map.
-
-Symbols: d distance of the receiver (m), z stored depth, s depth along the axis towards the receiver, Delta the light.
+[Fernando 2005] with two rules that [Dong09] lacks. A texel hides the receiver if its depth lies before the receiver's
+tangent plane along the texel's own direction, since on a radial map a flat receiver is nearer to the centre at
+neighbouring texels; and it counts in the search only within the cone from the receiver to the light.
 """
 
 import math
@@ -68,10 +65,7 @@ def blocker_test(settings: Pcss, scale: DepthScale) -> BlockerTest:
 def pcss_tile(
     shadow: PcssShadow, points: Array, facing: Array, size: int, active: Array, visible: Array, scratch: Scratch
 ) -> None:
-    """Fill V = 1 - blocked share of the penumbra's disc, of active receivers; 1 elsewhere.
-
-    `points` and `facing` are (>= 3, >= size), world space, m, and normals on either side.
-    """
+    """Fill V = 1 - blocked share of the penumbra's disc, of active receivers (>= 3, >= size), m; 1 elsewhere."""
     pending, rows = scratch.pending, scratch.rows
     if find_search_regions(shadow.constants, shadow.sizing, points, size, active, pending, visible, rows) > 0:
         compare_texels(shadow, facing, size, pending, visible, rows)
@@ -92,10 +86,7 @@ def compare_texels(
 
 @kernel
 def find_blockers(shadow: PcssShadow, facing: Array, size: int, pending: Array, rows: Array) -> None:
-    """Find the blockers in each pending receiver's search disc; those without leave `pending`.
-
-    Fills row DEPTH with z_avg (m), and S to RADIUS with the penumbra's disc.
-    """
+    """Find the blockers in each pending receiver's search disc; fill DEPTH and S to RADIUS, or leave `pending`."""
     constants, sizing, near = shadow.constants, shadow.sizing, shadow.constants[NEAREST]
     for i in range(size):
         if not pending[i]:
@@ -161,10 +152,8 @@ def count_blockers(
 ) -> tuple[int, int, Any]:
     """Return how many texels a disc has, how many of them hide a receiver, and the sum of the depths of those, m.
 
-    Depths are distances, or, if `axial`, those along the axis to the receiver.
-
-    `where` is (s, t, radius) in [-1, 1] units, `receiver` (x, y, z, d) and `normal` in the map's frame; the cone counts
-    in the `search` alone. Texels have their centre in the disc, at least the nearest one, and within the hemisphere.
+    `where` is (s, t, radius), `receiver` (x, y, z, d) and `normal` in the map's frame; the cone counts in the `search`
+    alone; `axial` depths are along the axis. Texels have their centre in the disc, at least the nearest one.
     """
     cs, ct, radius = where
     n = depth.shape[0]
@@ -234,10 +223,7 @@ def _nearest(middle: Any, n: int) -> Any:
 
 @kernel
 def is_blocker(z: Any, w: Any, test: BlockerTest, receiver: Any, normal: Any) -> Any:
-    """Return z < d_plane(w) (1 - slack): whether depth z in a texel's direction w lies before a receiver.
-
-    Where the receiver's plane is not met, its own distance stands in.
-    """
+    """Return z < d_plane(w) (1 - slack): whether depth z in direction w lies before a receiver's plane."""
     x, y, depth, d = receiver
     limit = d * type(d)(test.share) - type(d)(test.bias)
     if test.receiver_plane:
@@ -251,8 +237,7 @@ def is_blocker(z: Any, w: Any, test: BlockerTest, receiver: Any, normal: Any) ->
 def is_outside_cone(z: Any, w: Any, width: Any, receiver: Any, extent: Any) -> Any:
     """Return whether all that a texel stands for lies outside the cone from the receiver to the light.
 
-    It lies beyond the receiver, or its offset from the axis exceeds (Delta / 2)(1 - s / d) by more than half its
-    diagonal, `width` being half its side as an angle: near the receiver the cone is narrower than a texel.
+    Its offset exceeds (Delta / 2)(1 - s / d) by more than half its diagonal, `width` being half its side as an angle.
     """
     x, y, depth, d = receiver
     along = (x * w[0] + y * w[1] + depth * w[2]) * z / d

@@ -1,12 +1,8 @@
 """Search regions of the blocker search (Sec. 4.1, 4.2), and the depth comparison as a Fourier series.
 
-step(z - d) becomes f_M(d, z) = 1/2 + 2 sum_k (L_k / c_k) sin(c_k (z - d)), a product of what the receiver
-knows (d) and what the map stores (z): its mean over a filter needs the means of sin(c_k z) and cos(c_k z) alone.
-
-Symbols: c_k = (2k - 1) pi, k = 1 .. M; L_k = exp(-A (k / M)^2) the attenuation; w_k = 2 L_k / c_k; b bias; d, z depths
-on the series' own scale, whose period is 2 and on which f_M(1 - u) = f_M(u).
-
-Receivers are the SIMD lanes. The rows of a tile's scratch hold what one pass leaves to the next.
+step(z - d) becomes f_M(d, z) = 1/2 + 2 sum_k (L_k / c_k) sin(c_k (z - d)), whose mean over a filter needs the means of
+sin(c_k z) and cos(c_k z) alone; c_k = (2k - 1) pi, L_k = exp(-A (k / M)^2), w_k = 2 L_k / c_k, b bias. Receivers are
+the SIMD lanes; the rows of a tile's scratch hold what one pass leaves to the next.
 """
 
 import functools
@@ -44,39 +40,26 @@ def frequencies(terms: int) -> Array:
 
 
 def weights(terms: int, attenuation: float = 0.0) -> Array:
-    """Return w_k = 2 L_k / c_k with L_k = exp(-A (k / M)^2), (M,): factors of sin(c_k (z - d)).
-
-    A attenuates; 0 keeps the plain series and its overshoot of 9 %.
-    """
+    """Return w_k = 2 L_k / c_k, L_k = exp(-A (k / M)^2), (M,); A = 0 is the plain series, which overshoots 9 %."""
     damping = np.exp(-attenuation * (np.arange(1, terms + 1) / terms) ** 2)
     # Sec. 4.1: f(d, z) = 1/2 + 2 sum_k (1 / c_k) sin(c_k (z - d)), c_k = (2k - 1) pi
     return np.asarray(2.0 * damping / frequencies(terms))
 
 
 def above_half(difference: npt.ArrayLike, weight: Array) -> Array:
-    """Return f_M - 1/2 = sum_k w_k sin(c_k (z - d)) of differences z - d on the series' scale (> 0 is lit).
-
-    About 1/2 where lit, about -1/2 where shadowed, 0 at 0.
-    """
+    """Return f_M - 1/2 = sum_k w_k sin(c_k (z - d)) of differences z - d on the series' scale (> 0 is lit)."""
     return np.asarray(np.sin(np.multiply.outer(difference, frequencies(len(weight)))) @ weight)
 
 
 def plateau(weight: Array) -> float:
-    """Return what a damped series makes of fully lit: its mean from where it is nearly at its top, to its mirror image.
-
-    f_M - 1/2: about 1/2 for a plain series, 0.47 for A = 1 and M = 4.
-    """
+    """Return the f_M - 1/2 that a damped series makes of fully lit: its mean from near its top to the mirror image."""
     c, start = frequencies(len(weight)), first_lit(weight)
     # the integral of w sin(c u) over [b, 1 - b], as cos(c (1 - b)) = -cos(c b)
     return float((2.0 * weight / c * np.cos(c * start)).sum() / (1.0 - 2.0 * start))
 
 
 def first_lit(weight: Array) -> float:
-    """Return b*, the first z - d at which the series is 1: about 0.305 / M; below 0.41.
-
-    For a series that stays below 1: where it has come 95 % of the way to its top, the highest of 64 values for each
-    term.
-    """
+    """Return b*, the first z - d at which the series is 1, about 0.305 / M; below 1: 95 % of the way to its top."""
     from scipy.optimize import brentq  # here, as methods that cast no such shadows need none of it
 
     u = np.linspace(0.0, 0.5, SCAN * len(weight) + 1)
@@ -101,11 +84,9 @@ def _known(terms: int, attenuation: float, rescale: str, bias: float | None) -> 
 def series(settings: Csm) -> Series:
     """Return the series that settings ask for: weights, biases and the range of depths.
 
-    The range is [0, 1 - 2 b*], so that no difference of two depths, biased, comes nearer to the series' other crossing
-    at 1 than b*; a `bias` above b* narrows it. Sec. 4.1 says nothing of a bias; without one, every lit receiver would
-    be half shadowed (f_M(0) = 1/2). The default b* is the least that makes it fully lit. "scale2" compares without bias
-    and doubles; its search keeps b*, as an unbiased mean of blockers would count the receiver. "plateau" stretches a
-    damped series about 1/2 until its plateau is 1.
+    The range [0, 1 - 2 b*] keeps biased differences b* away from the series' other crossing at 1. Sec. 4.1 says nothing
+    of a bias; b* is the least that makes lit receivers fully lit. "scale2" compares without bias and doubles; its
+    search keeps b*. "plateau" stretches a damped series about 1/2 until its plateau is 1.
     """
     return _known(settings.terms, settings.attenuation, settings.rescale, settings.bias)
 
@@ -151,11 +132,7 @@ def filter_sizing(settings: ValSettings) -> FilterSizing:
 def light_constants(
     maps: ShadowMaps, k: int, delta: float, chain: Series | None = None, behind: bool = False
 ) -> Array:
-    """Return the constants of one area light and its map that kernels read, (CONSTANTS,), in the dtype of the maps.
-
-    See the places named above. `delta` is the light's size, m; `chain` gives biases and gain, for convolution shadow
-    maps; `behind`: of the map of the hemisphere behind.
-    """
+    """Return the constants of one area light and its map, ahead or `behind`, that kernels read."""
     constants = np.zeros(CONSTANTS, maps.depth.dtype)
     near = maps.near if maps.near_behind is None or not behind else maps.near_behind
     constants[CENTER : CENTER + 3] = maps.center[k]
@@ -167,10 +144,7 @@ def light_constants(
 
 
 def scale_of(maps: ShadowMaps, k: int, kind: DepthScaleName, chain: Series, behind: bool = False) -> DepthScale:
-    """Return the scale, from metres to the series', on which depths of one map that holds something are compared.
-
-    `kind` as in `depth_scale`; `chain` gives the range of depths; `behind`: of the map of the hemisphere behind.
-    """
+    """Return the scale on which depths of one map that holds something, ahead or `behind`, are compared."""
     near, far = (maps.near_behind, maps.far_behind) if behind else (maps.near, maps.far)
     assert near is not None
     assert far is not None
@@ -184,8 +158,7 @@ def find_search_regions(
 ) -> int:
     """Find the disc in which each active receiver searches for blockers; return how many may be shadowed.
 
-    Receivers behind the area light's plane see it whole (Sec. 5.1), those nearer than the nearest depth as well: the
-    others are flagged `pending`. Fills `rows` X to RADIUS, and `visible` with 1.
+    Receivers behind the area light's plane see it whole (Sec. 5.1), those nearer than the nearest depth as well.
     """
     real = points.dtype.type
     zero, one, near, delta = real(0.0), real(1.0), constants[NEAREST], constants[DELTA]

@@ -1,4 +1,8 @@
-"""The shadow of one area light as kernels read it, PCF, PCSS or CSM; its visibility at any points (Sec. 4.1, 5.1)."""
+"""The shadow of area lights as kernels read it, PCF, PCSS or CSM; its visibility at any points (Sec. 4.1, 5.1).
+
+One pass over all receivers filters few maps at a time, while they are in the cache. Receivers that come in lists would
+filter every map again for each: their filtered maps are kept, as far as they fit into `MOST_KEPT`.
+"""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -36,11 +40,7 @@ TILES: dict[Any, Any] = {PcfShadow: pcf_tile, PcssShadow: pcss_tile, CsmShadow: 
 def shadow_of(
     maps: ShadowMaps, areas: AreaLights, m: int, settings: "ValSettings", behind: bool = False, filters: Any = None
 ) -> Any:
-    """Return the shadow of area light m, which has a map and, without extent, casts a hard shadow, for `shadow_tile`.
-
-    `visibility` is one of `BY_MAPS`; `behind`: of the map of the hemisphere behind; `filters`, the filtered map of
-    `Csm`, is made where absent.
-    """
+    """Return the shadow of area light m, by its map ahead or `behind`; hard where the light has no extent."""
     k, delta, kind = int(maps.map_of[m]), float(areas.delta[m]), settings.visibility
     if isinstance(kind, Hard) or delta == 0.0:
         return pcf_shadow(maps, k, 1, behind)
@@ -70,10 +70,9 @@ def filter_channels(shadow: Any) -> int:
 def shadow_tile(
     shadow: Any, points: Array, facing: Array, size: int, active: Array, visible: Array, scratch: Any
 ) -> None:
-    """Fill V, 0 to 1, of the active ones of `size` receivers; `active` is overwritten with nothing but True.
+    """Fill V, 0 to 1, of the active ones of `size` receivers; `active` and `scratch` are overwritten.
 
-    Points and the normals of their surfaces, on either side, are (>= 3, >= size), world space, m; the normals may be
-    empty for CSM. `scratch` is overwritten.
+    Points and the normals of their surfaces are (>= 3, >= size), world space, m; normals may be empty for CSM.
     """
     TILES[type(shadow)](shadow, points, facing, size, active, visible, scratch)
 
@@ -181,11 +180,7 @@ def kept_shadows(areas: AreaLights, maps: "ShadowMaps | None", settings: "ValSet
 def shadows_of(
     maps: "ShadowMaps | None", areas: AreaLights, chosen: Array, settings: "ValSettings", at_once: int | None = None
 ) -> Iterator[tuple[int, Any]]:
-    """Return some area lights with their shadows; None for those that nothing occludes.
-
-    `at_once` maps are filtered at a time, as many as there are threads where it is not given; those are overwritten by
-    the next.
-    """
+    """Return some area lights with their shadows, None where nothing occludes; `at_once` maps are filtered together."""
     map_of = np.full(len(areas.delta), -1) if maps is None or settings.visibility is None else maps.map_of
     filtered = (map_of >= 0) & (areas.delta != 0) & isinstance(settings.visibility, Csm)
     filters = _filters(maps, map_of[chosen[filtered[chosen]]], settings, at_once or thread_count())

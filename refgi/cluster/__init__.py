@@ -8,14 +8,13 @@ shadows, PCF, PCSS and convolution shadow maps, `lighting` the picture. `adaptiv
 `reference` holds the references of these steps and the error of each.
 """
 
-from refgi.cluster.approximations import APPROXIMATIONS, val_ledger
 from refgi.cluster.clustered import clustered_irradiance
 from refgi.cluster.geometry_blur import blur
 from refgi.cluster.kmeans import Clustering, cluster
 from refgi.cluster.maps import ShadowMaps, shadow_maps
 from refgi.cluster.rectangle import AreaLights, area_lights
 from refgi.cluster.settings import PRESETS, ValSettings
-from refgi.cluster.val import extra_bytes, val, val_lobes
+from refgi.cluster.val import APPROXIMATIONS, extra_bytes, val, val_ledger, val_lobes
 from refgi.method import Method
 
 __all__ = [

@@ -123,8 +123,12 @@ def count_for_error(
     total = lights.position.shape[1]
 
     def attempt(count: int) -> Attempt:
-        areas, maps, made = _light_samples(frame, lights, settings, footprint, samples, count)
-        return Attempt(_estimate(made, samples, count), areas, maps)
+        areas, maps = group_lights(frame, lights, settings, count, footprint)
+        light = clustered_irradiance(
+            samples.receivers, samples.facing, lights, areas, maps, settings, samples.footprint,
+            reference_visibility(frame, lights, areas, maps, settings),
+            rays=frame.tracer if settings.maps.behind == "raytrace" else None)
+        return Attempt(_estimate(light[:, 0], samples, count), areas, maps)
 
     most = max(1, min(total, MOST_TEXELS // settings.maps.resolution**2))
     best, trail = _double_and_step_back(attempt, most, kind.target_error)
@@ -152,19 +156,6 @@ def _double_and_step_back(attempt: Callable[[int], Attempt], most: int, target: 
     return best, trail
 
 
-def _light_samples(
-    frame: "Frame", lights: "PixelLights", settings: "ValSettings", footprint: Array | None, samples: PixelSamples,
-    count: int,
-) -> tuple[AreaLights, ShadowMaps | None, Array]:
-    """Return area lights, their maps and the light at the samples."""
-    areas, maps = group_lights(frame, lights, settings, count, footprint)
-    visibility_of = reference_visibility(frame, lights, areas, maps, settings)
-    rays = frame.tracer if settings.maps.behind == "raytrace" else None
-    light = clustered_irradiance(samples.receivers, samples.facing, lights, areas, maps, settings,
-                                 footprint=samples.footprint, visibility_of=visibility_of, rays=rays)
-    return areas, maps, light[:, 0]
-
-
 def _samples(frame: "Frame", lights: "PixelLights", settings: "ValSettings") -> PixelSamples:
     """Draw pixels, one from each of as many equal parts of the surface seen, and light them by rays."""
     position, normal, triangle_id, covered = frame.gbuffer.resolve("position", "normal", "triangle_id", "covered")
@@ -175,8 +166,13 @@ def _samples(frame: "Frame", lights: "PixelLights", settings: "ValSettings") -> 
     receivers = Receivers(points, normals, np.ones((1, count), np.bool_))
     facing = facing_normals(frame.scene.geometry, seen, normals)
     area = footprints(frame, settings.lights, settings.pairs)
-    exact = _by_rays(frame, lights, settings, receivers, facing, area)
-    return PixelSamples(receivers, facing, exact, area, count / max(1, surface))
+    alone = clusters_of(lights.position, lights.normal, max(1, lights.position.shape[1]), settings.clusters,
+                        frame.illuminated_extent)  # every light is its own cluster
+    areas = area_lights(lights, alone, dataclasses.replace(settings.area, single_light="point"))
+    with threads(1):  # a thousand clusters of one light each: waking threads would cost more than their work
+        exact = clustered_irradiance(receivers, facing, lights, areas, None, settings, area,
+                                     vpl_visibility(frame.tracer, lights, areas, "even"))
+    return PixelSamples(receivers, facing, exact[:, 0], area, count / max(1, surface))
 
 
 @stage("cluster.sampled_pixels", kept=False)
@@ -195,20 +191,6 @@ def sampled_pixels(position: Array, normal: Array, triangle_id: Array, shifts: A
     at = surface[drawn]
     points, normals = (np.ascontiguousarray(plane.reshape(3, -1)[:, None, at]) for plane in (position, normal))
     return points, normals, np.ascontiguousarray(triangle_id.reshape(-1)[None, at])
-
-
-def _by_rays(
-    frame: "Frame", lights: "PixelLights", settings: "ValSettings", receivers: Receivers, facing: Array,
-    footprint: Array | None,
-) -> Array:
-    """Return the light of all lights with a ray for each: every light is its own cluster."""
-    alone = clusters_of(lights.position, lights.normal, max(1, lights.position.shape[1]), settings.clusters,
-                        frame.illuminated_extent)
-    areas = area_lights(lights, alone, dataclasses.replace(settings.area, single_light="point"))
-    with threads(1):  # a thousand clusters of one light each: waking threads would cost more than their work
-        light = clustered_irradiance(receivers, facing, lights, areas, None, settings, footprint=footprint,
-                                     visibility_of=vpl_visibility(frame, lights, areas, "even"))
-    return light[:, 0]
 
 
 def _estimate(made: Array, samples: PixelSamples, count: int) -> Trial:

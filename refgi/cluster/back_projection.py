@@ -75,11 +75,11 @@ def _axes(areas: AreaLights, m: int) -> Array:
     return np.vstack([areas.axes[m], areas.normal[:, m]])
 
 
-def _patches(depth: Array, frame: Array, axes: Array) -> Patches:
-    """Return the patches of a map (n, n) with its frame, in the coordinates of `axes`."""
+def _patches(depth: Array, own: Array, axes: Array) -> Patches:
+    """Return the patches of a map (n, n) with its `own` axes, in the coordinates of `axes`."""
     n = len(depth)
     row, column = np.nonzero(np.isfinite(depth))
-    turn = frame @ axes.T
+    turn = own @ axes.T
     z = depth[row, column].astype(np.float64)
     corners = [_direction(row + i, column + j, n) @ turn * z[:, None] for i, j in ((0, 0), (0, 1), (1, 1), (1, 0))]
     return Patches(np.ascontiguousarray(np.stack(corners, axis=1)), _direction(row + 0.5, column + 0.5, n) @ turn, z)

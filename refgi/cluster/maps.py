@@ -289,8 +289,8 @@ def map_steps(
     center, ball, scene_far = map_views(ends.visible, ends.illuminated, areas.center, areas.normal, areas.radius,
                                         settings.near_share)
 
-    def drawn(frame: Array) -> tuple[Array, Array, Array]:
-        depth = depth_maps(geometry, blocks, center, frame, ball, areas.members, settings.resolution,
+    def drawn(axes: Array) -> tuple[Array, Array, Array]:
+        depth = depth_maps(geometry, blocks, center, axes, ball, areas.members, settings.resolution,
                            settings.renderer, settings.near_geometry, tracer)
         return depth, *map_ranges(depth)
 

@@ -16,6 +16,7 @@ from refgi.cluster.rectangle import AreaLights, VisibilityFunction
 from refgi.cluster.settings import BackProjection, RaysRectangle, RaysVpls, ShadowMapSettings, ValSettings
 from refgi.rays import Tracer
 from refgi.sampling import halton
+from refgi.scene.model import Geometry
 from refgi.types import Array
 
 if TYPE_CHECKING:
@@ -91,7 +92,8 @@ def _way_to(ball: Ball | None, at: Array, toward: Array) -> Any:
 
 
 def rectangle_visibility(
-    frame: "Frame", areas: AreaLights, settings: ShadowMapSettings, points: int = POINTS, ends: Ends | None = None
+    tracer: Tracer, geometry: Geometry, areas: AreaLights, settings: ShadowMapSettings, points: int = POINTS,
+    ends: Ends | None = None,
 ) -> VisibilityFunction:
     """Return V of an area light as the share of its rectangle, with its own sides, that a receiver sees.
 
@@ -99,23 +101,23 @@ def rectangle_visibility(
     no plane that passes there. Points below the receiver's horizon do not count; where none is left V is 1. Behind the
     area light V is 1 ("visible"), or what rays say in all other modes of `behind`. `ends`: where light begins and ends.
     """
-    drawn = blockers(frame.scene.geometry, settings.occluders_alone, ends)
+    drawn = blockers(geometry, settings.occluders_alone, ends)
     on_square = _even(points)
 
     @lru_cache(maxsize=1)
     def tracer_of(m: int) -> Tracer:
-        return tracer_without_near(frame, drawn, areas, m, settings)
+        return tracer_without_near(tracer, drawn, areas, m, settings)
 
     def visibility_of(m: int, points: Array, facing: Array, shading: Array | None = None) -> Array:
-        tracer, visible = tracer_of(m), np.ones(points.shape[1], points.dtype)
+        visible = np.ones(points.shape[1], points.dtype)
         radius = settings.near_share * float(areas.radius[m])
         ball = Ball(areas.center[:, m], radius) if settings.near_geometry == "ball" else None
         height = areas.normal[:, m] @ (points - areas.center[:, m, None])
         within = np.where(height > 0, True, settings.behind != "visible")
         for side in (1.0, -1.0):
             on = within & (height * side > 0)
-            visible[on] = free_share(tracer, points[:, on], facing[:, on], rectangle_points(areas, m, on_square),
-                                     side * areas.normal[:, m, None], None, frame.tracer.grain, ball,
+            visible[on] = free_share(tracer_of(m), points[:, on], facing[:, on], rectangle_points(areas, m, on_square),
+                                     side * areas.normal[:, m, None], None, tracer.grain, ball,
                                      None if shading is None else shading[:, on])
         return visible
 
@@ -130,12 +132,12 @@ def rectangle_points(areas: AreaLights, m: int, on_square: Array) -> Array:
 
 
 def tracer_without_near(
-    frame: "Frame", drawn: Blockers, areas: AreaLights, m: int, settings: ShadowMapSettings
+    tracer: Tracer, drawn: Blockers, areas: AreaLights, m: int, settings: ShadowMapSettings
 ) -> Tracer:
     """Return rays against what area light m's map is drawn from; `tracer` where no planes are left out."""
     distance = settings.near_share * areas.radius[m]
     if settings.near_geometry != "planes" or distance == 0:
-        return frame.tracer
+        return tracer
     corner = drawn.vertices[drawn.faces] - areas.center[:, m]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     height = np.abs((normal * corner[:, 0]).sum(axis=1))
@@ -152,7 +154,7 @@ Weights = Literal["even", "flux", "light"]
 
 
 def vpl_visibility(
-    frame: "Frame", lights: "PixelLights", areas: AreaLights, weights: Weights = "flux"
+    tracer: Tracer, lights: "PixelLights", areas: AreaLights, weights: Weights = "flux"
 ) -> VisibilityFunction:
     """Return V of an area light as the share of its lights that a receiver sees.
 
@@ -182,8 +184,8 @@ def vpl_visibility(
             light: Array = np.divide(flux[of] * away * above, square**2, out=np.zeros_like(square), where=faced)
             return light
 
-        return free_share(frame.tracer, points, facing, position[:, of], normal[:, of], contribution,
-                          frame.tracer.grain, shading=shading)
+        return free_share(tracer, points, facing, position[:, of], normal[:, of], contribution, tracer.grain,
+                          shading=shading)
 
     return visibility_of
 
@@ -194,9 +196,10 @@ def reference_visibility(
 ) -> VisibilityFunction | None:
     """Return the reference visibility of `settings.visibility`; None where it is not by reference."""
     if isinstance(settings.visibility, RaysVpls):
-        return vpl_visibility(frame, lights, areas)
+        return vpl_visibility(frame.tracer, lights, areas)
     projected = maps if isinstance(settings.visibility, BackProjection) else None
     rectangle = None
     if isinstance(settings.visibility, RaysRectangle) or (projected is not None and settings.maps.behind == "raytrace"):
-        rectangle = rectangle_visibility(frame, areas, settings.drawn_maps, ends=ends_of(frame, lights))
+        rectangle = rectangle_visibility(frame.tracer, frame.scene.geometry, areas, settings.drawn_maps,
+                                         ends=ends_of(frame, lights))
     return rectangle if projected is None else back_projection_visibility(areas, projected, rectangle)

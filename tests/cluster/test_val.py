@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from refgi.cluster import PRESETS, ValSettings, extra_bytes, val
-from refgi.cluster.visibility import shadow as shadows
 from refgi.cluster.settings import GeometryBlur
 from refgi.cluster.val import cluster_lights, sum_at_pixels
+from refgi.cluster.visibility import shadow as shadows
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads

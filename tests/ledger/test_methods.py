@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster import ValSettings, val
-from refgi.cluster.approximations import val_ledger
+from refgi.cluster.val import val_ledger
 from refgi.frame import Frame
 from refgi.ledger import pixel_areas
 from refgi.lights.selection import choose_lights

@@ -6,7 +6,7 @@ import pytest
 from refgi.frame import Frame
 from refgi.scene import load_scene
 from refgi.settings import of
-from refgi.sssil.approximations import level_bytes
+from refgi.sssil.hssil import level_bytes
 from refgi.sssil.levels import pyramid, sender_pyramid
 from refgi.sssil.settings import HssilSettings
 from tests.sssil.pyramid.pictures import camera, made, random_picture

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from refgi.cluster import clustered_irradiance
 from refgi.cluster.interleave import RUNS, assigned_subsets
 from refgi.cluster.kmeans import cluster
-from refgi.cluster import clustered_irradiance
 from refgi.cluster.maps import shadow_maps
 from refgi.cluster.rectangle import AreaLights, area_lights
 from refgi.cluster.settings import ValSettings

@@ -51,6 +51,10 @@ def box():
         :, buffer.covered]  # fmt: skip
 
 
+def rectangle_rays(frame, areas, settings, **options):
+    return rectangle_visibility(frame.tracer, frame.scene.geometry, areas, settings, **options)
+
+
 def height_above(areas, m, points):
     return areas.normal[:, m] @ (points - areas.center[:, m, None])
 
@@ -59,7 +63,7 @@ def height_above(areas, m, points):
 def test_one_point_of_the_rectangle_is_a_ray_against_every_triangle(box, evidence):
     frame, _, areas, points, facing = box
     settings = replaced(SETTINGS, {"near_geometry": "keep", "behind": "raytrace"})
-    given, geometry = rectangle_visibility(frame, areas, settings.maps, points=1), frame.scene.geometry
+    given, geometry = rectangle_rays(frame, areas, settings.maps, points=1), frame.scene.geometry
     rng = np.random.default_rng(2)
     wrong, blocked = 0, 0
     for _ in range(PAIRS):
@@ -105,7 +109,7 @@ def test_the_map_projected_back_hides_the_points_that_the_literal_text_hides(box
 def test_the_map_projected_back_agrees_with_rays(box, evidence):
     frame, _, areas, points, facing = box
     maps = shadow_maps(frame.scene.geometry, areas, SETTINGS.maps, np.float64)
-    traced, projected = rectangle_visibility(frame, areas, SETTINGS.maps), back_projection_visibility(areas, maps)
+    traced, projected = rectangle_rays(frame, areas, SETTINGS.maps), back_projection_visibility(areas, maps)
     off = []
     for m in range(6):
         a, b = traced(m, points, facing), projected(m, points, facing)
@@ -123,12 +127,12 @@ def test_behind_the_area_light(box, evidence):
     frame, _, areas, points, facing = box
     for m in range(6):
         back = height_above(areas, m, points) <= 0
-        published = rectangle_visibility(frame, areas, SETTINGS.maps)(m, points, facing)
-        traced = rectangle_visibility(frame, areas, replaced(SETTINGS, {"behind": "raytrace"}).maps)(m, points, facing)
+        published = rectangle_rays(frame, areas, SETTINGS.maps)(m, points, facing)
+        traced = rectangle_rays(frame, areas, replaced(SETTINGS, {"behind": "raytrace"}).maps)(m, points, facing)
         assert (published[back] == 1).all()
         assert np.array_equal(published[~back], traced[~back])
     both = replaced(SETTINGS, {"behind": "dual_paraboloid"})
-    rays = rectangle_visibility(frame, areas, replaced(both, {"behind": "raytrace"}).maps)
+    rays = rectangle_rays(frame, areas, replaced(both, {"behind": "raytrace"}).maps)
     maps = shadow_maps(frame.scene.geometry, areas, both.maps, np.float64)
     off, wide = [], 0
     for m in range(6):
@@ -149,7 +153,7 @@ def test_near_geometry_is_left_out_or_kept(box, evidence):
     frame, _, areas, points, facing = box
     mean = {}
     for rule in ("keep", "ball", "planes"):
-        given = rectangle_visibility(frame, areas, replaced(SETTINGS, {"near_geometry": rule}).maps)
+        given = rectangle_rays(frame, areas, replaced(SETTINGS, {"near_geometry": rule}).maps)
         mean[rule] = [given(m, points, facing).mean() for m in range(6)]
     evidence("mean V of a rectangle, near geometry kept, cut by a ball, left out by planes: "
              + ", ".join(f"{np.mean(mean[rule]):.3f}" for rule in ("keep", "ball", "planes")))
@@ -183,9 +187,9 @@ def test_what_cosines_let_through_and_the_face_hides_counts_as_hidden(box):
     behind = replaced(SETTINGS, {"behind": "raytrace"})
     maps = shadow_maps(frame.scene.geometry, areas, SETTINGS.maps, np.float64)
     given = {
-        1: (rectangle_visibility(frame, areas, SETTINGS.maps), back_projection_visibility(areas, maps)),
+        1: (rectangle_rays(frame, areas, SETTINGS.maps), back_projection_visibility(areas, maps)),
         -1: (visibility_by(areas, maps, behind, None, frame.tracer),
-             back_projection_visibility(areas, maps, rectangle_visibility(frame, areas, behind.maps))),
+             back_projection_visibility(areas, maps, rectangle_rays(frame, areas, behind.maps))),
     }
     tried = {side: 0 for side in given}
     for m in np.flatnonzero(maps.map_of >= 0):
@@ -210,6 +214,6 @@ def test_a_face_that_cuts_the_rectangle_hides_what_lies_behind_it():
     maps = shadow_maps(frame.scene.geometry, areas, EDGE.maps, np.float64)
     look = areas.center[:, :1] - lit
     face = areas.axes[0, 0][:, None] - (areas.axes[0, 0] @ look) * look / (look**2).sum(axis=0)  # through the centre
-    for visibility_of in rectangle_visibility(frame, areas, EDGE.maps), back_projection_visibility(areas, maps):
+    for visibility_of in rectangle_rays(frame, areas, EDGE.maps), back_projection_visibility(areas, maps):
         half = visibility_of(0, lit, face / np.linalg.norm(face, axis=0), shading=look)
         np.testing.assert_allclose(half, 0.5, atol=0.05)

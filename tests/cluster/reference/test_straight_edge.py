@@ -25,7 +25,7 @@ GAPS = 0.012  # of V; where patches of unlike depth leave gaps
 def test_rays_and_the_map_projected_back_give_the_ramp(delta, evidence):
     frame, areas = Frame(scene(), dtype=np.float64), square_light(delta)
     points, facing, exact, width = receivers(delta)
-    traced = rectangle_visibility(frame, areas, SETTINGS.maps)(0, points, facing)
+    traced = rectangle_visibility(frame.tracer, frame.scene.geometry, areas, SETTINGS.maps)(0, points, facing)
     maps = shadow_maps(frame.scene.geometry, areas, SETTINGS.maps, np.float64)
     projected = back_projection_visibility(areas, maps)(0, points, facing)
     off = np.abs(traced - exact).max(), np.abs(projected - exact).max()

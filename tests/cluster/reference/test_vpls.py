@@ -59,7 +59,7 @@ def test_visibility_of_each_light_is_that_of_vpl(box, evidence):
     count = lights.flux.shape[1]
     areas = areas_of(frame, lights, count)
     assert (areas.members == 1).all()
-    off = np.abs(with_visibility(to, lights, areas, vpl_visibility(frame, lights, areas)) - reference[0]).max()
+    off = np.abs(with_visibility(to, lights, areas, vpl_visibility(frame.tracer, lights, areas)) - reference[0]).max()
     evidence(f"{count} lights, {count} clusters, {len(reference[0])} receivers: sum with V off by "
              f"{off / reference[0].max():.1e} of the maximum of vpl's")
     assert off < ROUNDING * reference[0].max()
@@ -69,7 +69,7 @@ def test_visibility_of_each_light_is_that_of_vpl(box, evidence):
 def test_visibility_of_pairs_is_that_of_a_ray_against_every_triangle(box, evidence):
     frame, lights, to, _ = box
     areas, geometry = areas_of(frame, lights, lights.flux.shape[1]), frame.scene.geometry
-    given = vpl_visibility(frame, lights, areas)
+    given = vpl_visibility(frame.tracer, lights, areas)
     rng = np.random.default_rng(1)
     wrong, blocked, tried = 0, 0, 0
     for _ in range(PAIRS):
@@ -94,7 +94,7 @@ def test_weighted_by_their_light_the_lights_of_a_cluster_give_the_exact_sum(box,
     for count in (1, 4, 16):
         areas = areas_of(frame, lights, count)
         for weights in ("light", "flux", "even"):
-            light = with_visibility(to, lights, areas, vpl_visibility(frame, lights, areas, weights))
+            light = with_visibility(to, lights, areas, vpl_visibility(frame.tracer, lights, areas, weights))
             errors[count, weights] = np.sqrt(np.mean((light - reference[0]) ** 2)) / reference[0].mean()
     evidence("rmse / mean of vpl for 1, 4, 16 clusters: " + "; ".join(
         f"by {weights} {', '.join(f'{errors[count, weights]:.1e}' for count in (1, 4, 16))}"
@@ -107,7 +107,7 @@ def test_weighted_by_their_light_the_lights_of_a_cluster_give_the_exact_sum(box,
 def test_any_dtype_and_any_place(box):
     frame, lights, to, _ = box
     areas = areas_of(frame, lights, 8)
-    given = vpl_visibility(frame, lights, areas, "light")
+    given = vpl_visibility(frame.tracer, lights, areas, "light")
     for dtype in (np.float32, np.float64):
         points = np.ascontiguousarray(np.concatenate([lights.position, to.position[:, :5]], axis=1), dtype)
         facing = np.ascontiguousarray(np.concatenate([lights.normal, to.facing[:, :5]], axis=1), dtype)

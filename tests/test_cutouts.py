@@ -25,7 +25,7 @@ from refgi.stress.changes import CHANGES
 from refgi.truth import TruthSettings, VplSettings, vpl
 from refgi.truth.imperfect import Imperfect, imperfect_maps
 from refgi.truth.truth import trace_truth
-from tests.cluster.maps.lights import area_lights
+from tests.cluster.lights import area_lights
 from tests.cutouts import half_plate, heap, opaque, pierced
 from tests.ledger.test_ledger import WHOLE, balance
 from tests.naive import cutouts as naive

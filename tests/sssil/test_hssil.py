@@ -1,6 +1,5 @@
 """The method as a whole: what it is made of, what each setting does, what it leaves out."""
 
-
 import numpy as np
 import pytest
 
@@ -10,9 +9,11 @@ from refgi.method import Extent
 from refgi.methods import find_method, render
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
-from refgi.sssil import HssilSettings
-from refgi.sssil.hssil import hssil
+from refgi.sssil.hssil import hssil, level_bytes
+from refgi.sssil.levels import pyramid, sender_pyramid
+from refgi.sssil.settings import HssilSettings
 from refgi.stages import observe
+from tests.sssil.pictures import camera, made, random_picture
 
 SMALL = of(HssilSettings, radius=None, levels=3, samples=24)
 SUM = {np.float32: 2e-6, np.float64: 1e-14}  # another order of summation, relative to the brightest pixel
@@ -115,3 +116,43 @@ def test_all_texels_of_a_huge_radius_are_those_of_the_picture():
     near, far = (of(HssilSettings, pattern="all", start="full", levels=1, radius=radius) for radius in (10.0, 65536.0))
     np.testing.assert_array_equal(hssil(small, far), hssil(small, near))
     assert find_method("hssil").extra_bytes(far, Extent((12, 9))) < 1 << 20
+
+
+BUFFER_BYTES = 11 * 4 + 4  # a pixel: position, depth, normal, direct light, area, and which it is
+
+
+@pytest.mark.feature("HSS-20")
+def test_mip_levels_add_a_third(evidence):
+    """What arrays hold is what is foretold; all levels of a picture of 2^7 x 2^7 take 4/3 of the first."""
+    picture, view, figures = random_picture(128, 128), camera(128, 128), []
+    for start, first in (("full", 0), ("half", 1), ("quarter", 2)):
+        settings = of(HssilSettings, start=start, levels=5, downsample="closest")
+        held = sum(plane.nbytes for level in made(picture, view, first, 5, dtype=np.float32) for plane in level[1:])
+        assert held == level_bytes(settings, 128 * 128, 4)
+        ratio = held / (BUFFER_BYTES * 128 * 128)
+        assert ratio == pytest.approx((4 - 4.0**-4) / 3 / 4**first, rel=1e-12)
+        figures.append(f"{start} {ratio:.4f}")
+    evidence(f"bytes of 5 levels over those of full-resolution buffers: {', '.join(figures)}")
+
+
+@pytest.mark.feature("HSS-20")
+def test_doubles_and_means_of_radiance_take_more():
+    pixels = 1280 * 720
+    assert level_bytes(of(HssilSettings, start="full", levels=1), pixels, 8) == pixels * 92
+    mean = of(HssilSettings, start="full", levels=1, downsample="closest_average")
+    assert level_bytes(mean, pixels, 4) == pixels * 52
+    assert level_bytes(of(HssilSettings, start="half", levels=1, downsample="closest"), 1, 4) == 48
+
+
+@pytest.mark.feature("HSS-20")
+def test_drawn_senders_are_levels_of_their_own():
+    """All but the depth, which is the receivers'; pixels are senders as they are."""
+    frame = Frame(load_scene("cornell_box"), width=32, height=32, rsm_resolution=8)
+    for start in ("full", "half"):
+        settings = of(HssilSettings, start=start, levels=3, radius=2.0)
+        receivers = pyramid(frame, settings)
+        senders = sender_pyramid(frame, receivers, settings)
+        own = [plane for one, other in zip(senders, receivers, strict=True)
+               for plane, there in zip(one[1:], other[1:], strict=True) if plane is not there]
+        held = sum(plane.nbytes for plane in own) + sum(plane.nbytes for level in receivers for plane in level[1:])
+        assert held == level_bytes(settings, 32 * 32, 4)

@@ -18,7 +18,7 @@ from refgi.frame import Frame
 from refgi.scene import Camera, DirectionalLight, Material, Mesh, PointLight, Scene, SpotLight, merge
 from refgi.settings import of
 from refgi.settings.fields import choices_of, hints, is_choice, may_be_none, members
-from tests.sssil.cameras.hidden_side import hidden_side
+from tests.sssil.hidden_side import hidden_side
 from tests.truth.scenes import rectangle
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})

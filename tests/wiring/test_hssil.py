@@ -10,7 +10,7 @@ from refgi.sssil.cameras import place_cameras
 from refgi.sssil.hssil import hssil
 from refgi.sssil.settings import HssilSettings
 from tests.literal.whole.hssil import picture as by_hand
-from tests.sssil.cameras.hidden_side import SIDE_VIEW
+from tests.sssil.hidden_side import SIDE_VIEW
 from tests.wiring.cases import Case, uncovered
 from tests.wiring.features import HSSIL, featured
 from tests.wiring.fold import fold

@@ -32,7 +32,7 @@ from refgi.settings import of, replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.settings import PRESETS, TemporalSettings
 from tests.benchmarks.papers.conftest import table
-from tests.sssil.crown.counting import COUNTED, reads_of_levels
+from tests.sssil.counting import COUNTED, reads_of_levels
 
 pytestmark = pytest.mark.slow  # the whole paper is made
 

@@ -1,12 +1,131 @@
 """Maps and discs that the tests of the filters read."""
 
-import numpy as np
+from typing import Any, NamedTuple
 
-from refgi.cluster.filters.basis import DepthScale
+import numpy as np
+import numpy.typing as npt
+
+from refgi.cluster.filters.basis import DepthScale, beyond_disc, fill_basis, fill_beyond, normalise
 from refgi.cluster.filters.mip import build_mip, mip_means, mip_of, mips
 from refgi.cluster.filters.prefilter import brute_means, brutes, build_brute
+from refgi.jit import kernel
 from refgi.literal.val_maps import basis, series_depth
-from tests.cluster.filters.sat import build_sat, sat_means, sats
+
+Array = npt.NDArray[Any]
+
+
+class Sat(NamedTuple):
+    """Summed areas of all channels of a map."""
+
+    depth: Array  # (n, n): t
+    sums: Array  # (n + 1, n + 1, 4 M + 1) float64
+    quantised: bool  # 8 bits for the basis, 16 for basis-z
+    beyond: Array  # (count, 2) int32: texels beyond the unit disc and what they copy
+
+
+def sats(size: int, terms: int, dtype: npt.DTypeLike, *, quantised: bool = False, mirrored: bool = False) -> Sat:
+    """Make scratch for one map.
+
+    Parameters
+    ----------
+    size : int
+        Texels along a side of the map, n.
+    terms : int
+        M.
+    dtype : dtype
+        Float32 or float64, of the map.
+    quantised : bool
+        Keep 8 bits of the basis and 16 of the basis-z of each texel.
+    mirrored : bool
+        Mirror the disc in the square beyond it, which otherwise holds the far end.
+
+    Returns
+    -------
+    Sat
+        Arrays not yet filled.
+    """
+    return Sat(np.zeros((size, size), dtype), np.zeros((size + 1, size + 1, 4 * terms + 1)), quantised,
+               beyond_disc(size, mirrored))
+
+
+@kernel
+def build_sat(depth: Array, scale: DepthScale, sat: Sat) -> None:
+    """Fill the table of one map.
+
+    Parameters
+    ----------
+    depth : (n, n) ndarray
+        Radial distance, m; inf where nothing is seen.
+    scale : DepthScale
+        As in `basis.normalise`.
+    sat : Sat
+        Filled.
+    """
+    normalise(depth, scale, sat.depth)
+    fill_beyond(sat.beyond, sat.depth)
+    n, terms = len(depth), sat.sums.shape[2] // 4
+    basis, basis_z = np.empty((1, n, 2 * terms), depth.dtype), np.empty((1, n, 2 * terms + 1), depth.dtype)
+    along = np.empty(4 * terms + 1)
+    for i in range(n):
+        fill_basis(sat.depth[i : i + 1], terms, sat.quantised, basis, basis_z)
+        along[:] = 0.0
+        for j in range(n):
+            for c in range(2 * terms):
+                along[c] += basis[0, j, c]
+            for c in range(2 * terms + 1):
+                along[2 * terms + c] += basis_z[0, j, c]
+            for c in range(4 * terms + 1):
+                sat.sums[i + 1, j + 1, c] = sat.sums[i, j + 1, c] + along[c]
+
+
+@kernel
+def sat_means(
+    sat: Sat, s: Array, t: Array, radius: Array, active: Array, count: int, with_z: bool, out: Array
+) -> None:
+    """Read the means of the channels over the box around a disc for each lane of a tile.
+
+    Parameters
+    ----------
+    sat : Sat
+        One map's table.
+    s, t, radius : (lanes,) ndarray
+        Centre and radius of the discs, in units of the map's half side.
+    active : (lanes,) ndarray
+        Lanes to read.
+    count : int
+        Lanes in use.
+    with_z : bool
+        All 4 M + 1 channels instead of the first 2 M.
+    out : (channels, lanes) ndarray
+        Filled where active.
+    """
+    n, terms = len(sat.depth), sat.sums.shape[2] // 4
+    real = s.dtype.type
+    channels = 4 * terms + 1 if with_z else 2 * terms
+    for i in range(count):
+        if not active[i]:
+            continue
+        half = max(0.5, 0.5 * radius[i] * n)
+        x, y = min(max(0.0, 0.5 * n * (s[i] + 1.0)), 1.0 * n), min(max(0.0, 0.5 * n * (t[i] + 1.0)), 1.0 * n)
+        left, right = max(x - half, 0.0), min(x + half, 1.0 * n)
+        top, bottom = max(y - half, 0.0), min(y + half, 1.0 * n)
+        area = (right - left) * (bottom - top)
+        for c in range(channels):
+            above = _read(sat.sums, top, right, c) - _read(sat.sums, top, left, c)
+            below = _read(sat.sums, bottom, right, c) - _read(sat.sums, bottom, left, c)
+            out[c, i] = real((below - above) / area)
+
+
+@kernel
+def _read(sums: Array, y: float, x: float, c: int) -> Any:
+    """Return the sum above and to the left of a point, in texels."""
+    last = sums.shape[0] - 2
+    i, j = min(int(y), last), min(int(x), last)
+    fy, fx = y - i, x - j
+    above = sums[i, j, c] + fx * (sums[i, j + 1, c] - sums[i, j, c])
+    below = sums[i + 1, j, c] + fx * (sums[i + 1, j + 1, c] - sums[i + 1, j, c])
+    return above + fy * (below - above)
+
 
 MOST = 0.85  # far end of the range of depths
 

@@ -19,7 +19,7 @@ from refgi.cluster.visibility.search_region import (
     series,
 )
 from refgi.settings import of
-from tests.cluster.filters.sat import build_sat, sat_means, sats
+from tests.cluster.filters.reads import build_sat, sat_means, sats
 
 
 def directions(n):

@@ -13,7 +13,7 @@ from refgi.sssil import CameraSettings, HssilSettings
 from refgi.sssil.cameras import frame_through, join_cameras, place_cameras
 from refgi.sssil.hssil import hssil
 from refgi.stages import observe
-from tests.sssil.cameras.hidden_side import SIDE_VIEW, from_the_lit_side, hidden_side
+from tests.sssil.hidden_side import SIDE_VIEW, from_the_lit_side, hidden_side
 
 # every pixel sends to every other: what is left is the pixels' size. Depth changes by up to 5 % from one pixel of so
 # small a picture to the next, where it looks along a surface.

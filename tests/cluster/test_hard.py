@@ -14,7 +14,7 @@ from refgi.literal.val_visibility import depth_tests
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
 from refgi.settings import of
-from tests.cluster.maps.lights import area_lights, hard_visibility, surface_points
+from tests.cluster.lights import area_lights, hard_visibility, surface_points
 from tests.rsm.shapes import geometry, soup
 
 CLOSE_CALLS = 2  # of 2700: where receivers and maps are float32, one may fall beside its texel or its blocker's edge

@@ -12,7 +12,7 @@ from refgi.scene import Camera, Material, PointLight, Scene, merge
 from refgi.scene.builtin.surfaces import rectangle
 from refgi.sssil.levels import levels
 from refgi.sssil.view import GRAZING
-from tests.sssil.pyramid.pictures import FLOAT64, camera, random_picture
+from tests.sssil.pictures import FLOAT64, camera, random_picture
 
 SUM_720P = 1e-3  # 0.1 % is asked at 720 lines; pixels on the outline count whole or not at all
 # one pixel's area by its centre's ray: the midpoint rule, off by about the square of its angle, 3 mrad

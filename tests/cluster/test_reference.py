@@ -24,9 +24,9 @@ from refgi.literal.val_back_projection import CELLS
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
-from tests.cluster.reference.edge import SETTINGS as EDGE
-from tests.cluster.reference.edge import receivers, square_light
-from tests.cluster.reference.edge import scene as edge_scene
+from tests.cluster.edge import SETTINGS as EDGE
+from tests.cluster.edge import receivers, square_light
+from tests.cluster.edge import scene as edge_scene
 from tests.naive import truth
 
 # nothing near six large clusters, so that rays to a rectangle and one view from its centre meet the same surfaces

@@ -40,3 +40,10 @@ def samples_counted(settings, index):
                      np.ones((side, side)), np.zeros((side, side), np.int32)), index, settings)[:, middle, middle]
         for _ in range(DRAWS)])
     return float((found.mean(axis=0) ** 2).mean() / found.var(axis=0, ddof=1).mean())
+
+
+def share_inside(ox, oy, low, high, n=64):
+    """Return the share of texel (ox, oy) whose points lie [low, high) from the middle of texel (0, 0), by n x n."""
+    at = (np.arange(n) + 0.5) / n - 0.5
+    length = np.hypot(ox + at[None, :], oy + at[:, None])
+    return ((length >= low) & (length < high)).mean()

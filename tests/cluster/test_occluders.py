@@ -14,7 +14,7 @@ from refgi.lights.settings import LightSettings
 from refgi.rsm.buffers.extent import Extent
 from refgi.scene import load_scene
 from refgi.stages import Memory, observe
-from tests.cluster.maps.lights import surface_points
+from tests.cluster.lights import surface_points
 from tests.rsm.shapes import geometry
 
 # An end of a segment this near a plane, as a share of the scene's diagonal, lies in it: the stated 1e-6, and rounding.

@@ -15,7 +15,7 @@ from refgi.sssil.levels import pyramid, useful_levels
 from refgi.sssil.settings import HssilSettings
 from refgi.stages import Memory, observe
 from tests.naive.crossings import LIFT, corners_of, free
-from tests.sssil.pyramid.pictures import FLOAT32, FLOAT64, camera, made, random_picture, same
+from tests.sssil.pictures import FLOAT32, FLOAT64, camera, made, random_picture, same
 from tests.wiring.cases import LAMPS, room
 
 DIRECT = 1e-9  # of the brightest: float64 in another order

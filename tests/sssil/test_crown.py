@@ -14,8 +14,7 @@ from refgi.sssil.form_factor import DISC, Emitters, SampleForm
 from refgi.sssil.pattern import samples_at
 from refgi.sssil.settings import PRESETS, HssilSettings
 from refgi.sssil.view import Level
-from tests.sssil.crown.counting import COUNTED, reads_of_levels
-from tests.sssil.crown.shares import share_inside
+from tests.sssil.counting import COUNTED, reads_of_levels, share_inside
 
 SETTINGS = of(HssilSettings, radius=3.3, samples=9, levels=2)
 # of the largest value: terms of a sum of up to 200, each with a dozen roundings

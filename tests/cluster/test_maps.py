@@ -1,6 +1,5 @@
 """Maps of area lights: the same by rays, none where nothing occludes, and what lies near the centre kept or lost."""
 
-
 import numba
 import numpy as np
 import pytest
@@ -12,8 +11,8 @@ from refgi.rays import Tracer
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.stages import observe
-from tests.cluster.maps.lights import area_lights, hard_visibility, surface_points
-from tests.cluster.maps.test_occluders import box, together
+from tests.cluster.lights import area_lights, hard_visibility, surface_points
+from tests.cluster.test_occluders import box, together
 from tests.rsm.shapes import geometry, soup
 
 # Embree keeps triangles and rays in float32: its distances are off by a few rounding steps over the cosine at the

@@ -1,6 +1,5 @@
 """Samples past the bitmask, against a twin of vectors and sets, convex rooms, and what must hold for any picture."""
 
-
 import numpy as np
 import pytest
 

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError
+from refgi.frame import Frame
 from refgi.literal import upsampling as literal
+from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.sssil.settings import HssilSettings
 from refgi.sssil.upsampling import Guide, upsample
@@ -253,3 +255,22 @@ def test_sizes_that_do_not_fit_are_refused():
         upsample(light, below, here, PLAIN, np.zeros((3, 20, 29)))
     with pytest.raises(InputError, match=r"coarse: expected texels of 2, 4, \.\. 32 pixels"):
         upsample(light, below, Guide(*slanted((20, 31))), PLAIN)
+
+
+ROUNDED = 4e-15  # a few roundings of float64
+
+
+@pytest.mark.feature("HSS-16")
+def test_direct_and_indirect_light_leave_by_the_same_albedo(evidence):
+    frame = Frame(load_scene("cornell_box"), width=24, height=18, dtype=np.float64, rsm_resolution=32)
+    indirect = np.random.default_rng(1).random((3, 18, 24)) * frame.gbuffer.covered
+    without, with_light = frame.radiance(), frame.radiance(indirect)
+    # what is added is albedo/pi E, channel by channel
+    np.testing.assert_allclose(with_light - without, frame.gbuffer.albedo / np.pi * indirect, rtol=0,
+                               atol=ROUNDED * with_light.max())
+    # and the power that leaves a surface, pi L over all directions, is the albedo's share of all that arrives
+    arrives = frame.direct + indirect
+    leaves = np.pi * (with_light - frame.radiance(-frame.direct))  # less what it emits
+    error = float(np.max(np.abs(leaves - frame.gbuffer.albedo * arrives)) / leaves.max())
+    assert error < ROUNDED
+    evidence(f"pi L - emission = albedo (direct + indirect) within {error:.0e} of the largest")

@@ -21,7 +21,7 @@ from refgi.pairs.settings import PairSettings
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
 from refgi.settings import of
-from tests.cluster.maps.lights import hard_visibility
+from tests.cluster.lights import hard_visibility
 from tests.naive import eq2
 from tests.pairs import sets
 

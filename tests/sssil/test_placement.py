@@ -25,7 +25,7 @@ from refgi.sssil.cameras import (
     visible_points,
 )
 from refgi.stages import observe
-from tests.sssil.cameras.hidden_side import BACK, HALF_ANGLE, LIGHT, hidden_side
+from tests.sssil.hidden_side import BACK, HALF_ANGLE, LIGHT, hidden_side
 
 LOW_DISCREPANCY = 0.02  # some hundred points of a Halton sequence; a turn and a half would be off by 0.16
 CENTRES = 2e-3  # 256 points of equal flux against the disc they stand for; texels of a map of 64

@@ -136,18 +136,6 @@ def _near_silhouette(tracer, points, facing, light, normal, angle):
     return found
 
 
-@pytest.mark.feature("VAL-22")
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_a_lone_plane_never_shadows_itself(dtype, evidence):
-    plane = geometry([[-9, 1, -9], [9, 1, -9], [0, 1, 15]], [[0, 1, 2]])
-    light = area_lights([[0.1, 0, 0.2]], [[0.3, 1, 0.1]])
-    settings = of(ValSettings, maps_resolution=32, occluders_alone=False)
-    maps = shadow_maps(plane, light, settings.maps, dtype)
-    points, normals = (array.astype(dtype) for array in surface_points(plane, 5000, np.random.default_rng(2)))
-    assert (hard_visibility(maps, light, 0, points, normals) == 1).all()
-    evidence("V = 1 at 5000 points of a lone plane, map of 32^2, no bias")
-
-
 def test_behind_an_area_light_all_is_visible_unless_there_is_a_map():
     plate = geometry([[-1, -1, -1], [1, -1, -1], [0, -1, 1]], [[0, 1, 2]])
     light, below = area_lights([[0, 0, 0]], [[0, 1, 0]]), np.array([[0.0, -2, 0], [0, 2, 0]]).T

@@ -109,19 +109,6 @@ def test_the_lowest_cluster_wins_a_tie():
 
 
 @pytest.mark.feature("VAL-06")
-def test_clusters_start_at_light_k_n_over_m():
-    position, normal, _ = random_lights(3)
-    for count in (1, 2, 7, 30, position.shape[1] - 1):
-        at = [k * position.shape[1] // count for k in range(count)]
-        unit = normal / np.linalg.norm(normal, axis=0)
-        start = Clustering(position[:, at], unit[:, at], np.zeros(count, np.int64), np.zeros(1, np.int32), 0,
-                           np.zeros(1))
-        one = cluster(position, normal, count, diagonal=1.0)
-        two = cluster(position, normal, count, diagonal=1.0, start=start)
-        assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
-
-
-@pytest.mark.feature("VAL-06")
 def test_reruns_and_other_numbers_of_threads_give_the_same_bits(monkeypatch, evidence):
     import numba
 
@@ -197,18 +184,6 @@ def test_all_lights_in_one_point(mode):
     assert found.members[0] == 40
     assert found.objective[-1] < 40 * ROUNDING
     assert (found.center == 0.3).all()  # the mean has what all have in common; empty clusters stay where they were
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_one_cluster_is_the_mean(mode):
-    position, normal, _ = random_lights(1)
-    unit = normal / np.linalg.norm(normal, axis=0)
-    found = cluster(position, normal, 1, distance=mode, diagonal=1.0)
-    np.testing.assert_allclose(found.center[:, 0], position.mean(axis=1), rtol=ROUNDING)
-    mean = unit.sum(axis=1)
-    np.testing.assert_allclose(found.normal[:, 0], mean / np.linalg.norm(mean), atol=ROUNDING)
-    assert found.rounds == 1
-    assert not found.of.any()
 
 
 def test_as_many_clusters_as_lights_are_the_lights_themselves():

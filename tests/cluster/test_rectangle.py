@@ -16,7 +16,6 @@ from refgi.settings import replaced
 
 PUBLISHED = ValSettings()
 ROUNDING = 1e-14  # relative to the room's size of about 1 m
-TURNS = 400  # of axes within a quarter turn
 SIGMAS = 4.0  # of the mean over all clusters: 1 in 16,000 by chance
 
 
@@ -117,38 +116,6 @@ def test_rectangles_are_those_of_the_literal_text(axes, extent, count):
     for ours, theirs in ((found.frame, frame), (found.axes, along), (found.side, side), (found.offset, offset),
                          (found.delta, delta), (found.radius, radius), (found.members, members)):
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=ROUNDING)
-
-
-def test_no_turn_makes_a_smaller_rectangle():
-    rng = np.random.default_rng(3)
-    s, t = rng.random((2, 15))
-    frame = map_frames(np.array([[0.0], [1.0], [0.0]]))[0]
-    found = area_lights(lights_at(on_plane(frame, s, t), on_plane(frame, s, t)),
-                        one_cluster(on_plane(frame, s, t), (0, 1, 0)), replaced(PUBLISHED, {"axes": "min_area"}).area)
-    turns = np.pi / 2 * np.arange(TURNS)[:, None] / TURNS
-    c, d = np.cos(turns), np.sin(turns)
-    areas = np.ptp(c * s + d * t, axis=1) * np.ptp(c * t - d * s, axis=1)
-    area, coarse = found.side[:, 0].prod(), math.pi / 2 / TURNS / 2 * (found.side[:, 0] ** 2).sum()
-    assert areas.min() - coarse < area < areas.min() + ROUNDING  # a turn is off by half a step at most
-
-
-def test_pca_follows_the_longer_spread():
-    frame = map_frames(np.array([[0.0], [0.0], [1.0]]))[0]
-    turn = 0.3
-    s, t = (grid.ravel() for grid in np.meshgrid(np.linspace(-2, 2, 9), np.linspace(-0.5, 0.5, 5)))
-    position = on_plane(frame, math.cos(turn) * s - math.sin(turn) * t, math.sin(turn) * s + math.cos(turn) * t)
-    found = area_lights(lights_at(position, position), one_cluster(position, (0, 0, 1)),
-                        replaced(PUBLISHED, {"axes": "pca"}).area)
-    np.testing.assert_allclose(found.side[:, 0], [4.0, 1.0], atol=ROUNDING)
-    np.testing.assert_allclose(found.axes[0, 0], math.cos(turn) * frame[0] + math.sin(turn) * frame[1], atol=ROUNDING)
-
-
-@pytest.mark.parametrize(("extent", "expected"), [("root", math.sqrt(1.5)), ("longer", 2.0), ("shorter", 0.75)])
-def test_one_size_of_two_sides(extent, expected):
-    position = np.array([[0.0, 2.0, 0.0, 2.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.75, 0.75]])
-    found = area_lights(lights_at(position, position), one_cluster(position, (0, 1, 0)),
-                        replaced(PUBLISHED, {"area_extent": extent}).area)
-    assert found.delta[0] == pytest.approx(expected, abs=ROUNDING)
 
 
 @pytest.mark.feature("VAL-09")

@@ -16,10 +16,9 @@ from refgi.jit import threads
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import with_clamp
 from refgi.method import Extent
-from refgi.methods import find_method, render
+from refgi.methods import find_method
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
-from refgi.splat import SiiSettings, sii
 from refgi.stages import observe, standing_for
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
@@ -44,26 +43,6 @@ def frame(name="cornell_sphere:faces=400", width=33, height=27, **options):
 @pytest.fixture(scope="module")
 def ball():
     return frame()
-
-
-def test_it_is_in_the_table_of_methods(ball):
-    method = find_method("val")
-    function, settings = method.function, method.settings
-    assert (function, settings) == (val, ValSettings)
-    picture = render(ball.scene, "val", small({}), width=33, height=27, rsm_resolution=64)
-    np.testing.assert_array_equal(picture.irradiance, val(ball, small({})))
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.feature("VAL-01")
-def test_without_visibility_it_is_the_sum_over_pixel_lights(dtype, evidence):
-    """Oracle: `sii` without a cut, at equal lights."""
-    at = frame(dtype=dtype)
-    plain = val(at, small({"visibility": "none"}))
-    full = sii(at, of(SiiSettings, lights=64))
-    off = np.abs(plain - full).max() / full.max()
-    assert off <= SUM[dtype]
-    evidence(f"{np.dtype(dtype).name}: against sii {off:.1e} of the brightest pixel")
 
 
 @pytest.mark.parametrize("how", [

@@ -226,11 +226,6 @@ def test_surfaces_in_the_same_place_give_nothing():
     assert not bitmask_gather(one, 0, SETTINGS, DIAGONAL).any()
 
 
-def test_all_texels_have_no_slices():
-    with pytest.raises(InputError, match="pattern"):
-        replaced(SETTINGS, {"pattern": "all"})
-
-
 def test_a_bitmask_needs_its_settings():
     with pytest.raises(InputError, match="visibility: expected bitmask"):
         bitmask_gather(seen(), 0, replaced(SETTINGS, {"visibility": "rays"}), DIAGONAL)

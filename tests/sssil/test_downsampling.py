@@ -52,15 +52,6 @@ def test_means_keep_the_flux(evidence):
     evidence(f"average: flux equal to {FLOAT64:g}; closest: {', '.join(f'{share:.2f}' for share in closest)} of it")
 
 
-def test_mean_radiance_is_that_of_the_pixels_with_a_surface():
-    depth, normal, albedo, direct = random_picture(16, 16)
-    level = made((depth, normal, albedo, direct), camera(16, 16), 0, 5, "closest_average")[4]
-    seen = depth < np.inf
-    assert level.shape == (1, 1)
-    np.testing.assert_allclose(level.radiance[:, 0, 0], (albedo * direct / np.pi)[:, seen].mean(axis=1), rtol=FLOAT64)
-    assert level.depth[0, 0] == depth.min()
-
-
 def test_a_texel_without_area_shows_its_closest_pixel():
     """Normals that look away send nothing, but receive."""
     depth, normal, albedo, direct = random_picture(4, 4, behind=0.0)

@@ -6,7 +6,7 @@ import pytest
 from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.method import Extent
-from refgi.methods import find_method, render
+from refgi.methods import find_method
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.sssil.hssil import hssil, level_bytes
@@ -30,14 +30,6 @@ def ball():
 
 def changed(**changes):
     return replaced(SMALL, changes)
-
-
-def test_it_is_in_the_table_of_methods(ball):
-    method = find_method("hssil")
-    function, settings = method.function, method.settings
-    assert (function, settings) == (hssil, HssilSettings)
-    picture = render(ball.scene, "hssil", SMALL, width=49, height=35, rsm_resolution=64)
-    np.testing.assert_array_equal(picture.irradiance, hssil(ball, SMALL))
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

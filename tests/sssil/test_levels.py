@@ -211,4 +211,5 @@ def test_planes_that_do_not_fit_are_refused():
         made((depth, normal, albedo[..., :-1], direct), camera(9, 5), 0, 1)
     with pytest.raises(InputError, match=r"depth: expected shape \(5, 9\)"):
         made((depth[:-1], normal, albedo, direct), camera(9, 5), 0, 1)
-    assert camera_projection(camera(9, 5)).shape == (5, 9)
+    with pytest.raises(InputError, match=r"normal: expected shape \(3, 5, 9\), got \(5, 9\)"):
+        made((depth, normal[0], albedo, direct), camera(9, 5), 0, 1)

@@ -146,14 +146,6 @@ def test_points_behind_beside_and_nowhere_find_nothing(distance):
     assert not found.any()
 
 
-def test_equal_values_stay_as_they_are(views):
-    there, here = views[0]
-    values = np.full((3, 30, 40), 0.1, np.float32)
-    found, weight = reprojected(values, source_of(there), here)
-    assert (found[:, weight > 0] == np.float32(0.1)).all()
-    assert (weight <= 1).all()
-
-
 def test_the_origins_of_two_views_may_differ(views):
     there, here = views[1]
     values = np.random.default_rng(5).random((3, 30, 40))
@@ -163,13 +155,6 @@ def test_the_origins_of_two_views_may_differ(views):
                       buffer.position - np.reshape([-8, 0, 4], (3, 1, 1)), buffer.normal, buffer.covered,
                       origin=(0.0, 0.0, 0.0), **TESTS)[0]
     assert np.allclose(plain, moved, atol=1e-9)
-
-
-def test_one_pixel():
-    there, position = wall(1, 1)
-    found, weight = reproject(ramp(1, 1), there, position, there.normal, np.ones((1, 1), np.bool_), **TESTS)
-    assert found[:, 0, 0].tolist() == [0, 0, 10]
-    assert weight[0, 0] == 1
 
 
 def test_what_is_refused():

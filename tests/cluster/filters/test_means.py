@@ -81,14 +81,6 @@ def test_lanes_that_are_not_wanted(kind):
 
 
 @pytest.mark.parametrize("kind", ["mip", "sat", "brute"])
-def test_one_depth_everywhere_is_its_own_mean(kind):
-    depth, discs = np.full((9, 9), 2.0), reads.random_discs(40, np.float64)
-    expected = reads.texels(depth, 4)[0, :, 0, 0]
-    found = reads.means(getattr(reads, kind)(depth, 4), discs, 4)
-    assert np.abs(found - expected[:, None]).max() < SUMS
-
-
-@pytest.mark.parametrize("kind", ["mip", "sat", "brute"])
 def test_discs_without_end_or_number_read_within_the_map(kind):
     depth, none = reads.random_map(16, np.float32), np.zeros(4, np.float32)
     bad = np.array([np.nan, np.inf, -np.inf, 1e30], np.float32)

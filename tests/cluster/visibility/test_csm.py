@@ -31,7 +31,6 @@ from refgi.cluster.visibility.search_region import (
 from refgi.cluster.visibility.shadow import visibility
 from refgi.settings import of
 from tests.cluster.visibility.plates import (
-    are_shares,
     lit_by,
     map_of_plates,
     on_plane,
@@ -249,29 +248,6 @@ def test_mip_levels_show_as_steps(evidence):
         off[name] = rmse(*seen)
     assert off["mip"] > 1.5 * off["sat"]
     evidence(f"change of the error as the plates move against the map: mip {off['mip']:.4f}, SAT {off['sat']:.4f}")
-
-
-@pytest.mark.parametrize(("dtype", "prefilter"), [(np.float32, "mip"), (np.float64, "brute")])
-@pytest.mark.parametrize("terms", [1, 4, 64])
-@pytest.mark.parametrize("scale", ["log_map", "map", "scene"])
-def test_any_receiver_sees_a_share(dtype, prefilter, terms, scale):
-    rng = np.random.default_rng(5)
-    extreme = np.array([[0, 0, 0], [0, 0, 1e-20], [1, 0, 0], [1, 1, -1e-9], [0, 0, -2], [0, 0, 100], [4, 5, 1e-12],
-                        [1e-8, 0, 1e-8], [0, 0, 3], [3, 0, 1e-6]]).T
-    points = np.concatenate([extreme, rng.uniform(-3, 3, (3, 30))], axis=1).astype(dtype)
-    normals = rng.normal(size=points.shape).astype(dtype)
-    for plates, plane in ((PLATES, 3.0), ([], None), ([(-50, 50, -50, 50, 1e-3)], None), ([], 3.0)):
-        depth = map_of_plates(17, plates, plane, dtype=dtype)
-        for delta in (1e-9, 0.5, 1e6):
-            areas, maps = lit_by(depth, delta, FAR)
-            for extra in ({}, {"attenuation": 100.0, "rescale": "plateau"},
-                          {"rescale": "scale2", "foreshortened": True},
-                          {"bias": 0.25, "as_published": frozenset({"val_alpha", "val_alpha_over_pi"})},
-                          {"bias": 0.0, "as_published": frozenset({"val_search_solid_angle"})}):
-                got = shadow(areas, maps, points, normals, prefilter=prefilter, terms=terms, depth_scale=scale,
-                             **extra)
-                assert are_shares(got, dtype)
-                assert (got[points[2] <= 0] == 1).all()
 
 
 def test_each_receiver_is_on_its_own():

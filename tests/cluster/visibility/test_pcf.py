@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refgi.cluster.maps import shadow_maps
-from refgi.cluster.settings import ValSettings
+from refgi.cluster.settings import ConstantBias, ValSettings
 from refgi.cluster.visibility.shadow import visibility
 from refgi.errors import InputError
 from refgi.literal.val_visibility import depth_tests
@@ -44,16 +44,6 @@ def test_pcf_is_the_literal_text(texels, evidence):
     evidence(f"{texels} x {texels} texels: {off:.1e} off the literal text, V {got.min():.2f} to 1")
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_one_texel_is_the_hard_test(dtype):
-    rng = np.random.default_rng(3)
-    areas, maps = lit_by(map_of_plates(48, PLATES, 3.0, dtype=dtype), 0.5, FAR)
-    points, normals = rng.uniform(-3, 3, (3, 400)).astype(dtype), rng.normal(size=(3, 400)).astype(dtype)
-    hard = visibility(maps, areas, 0, points, normals, of(ValSettings, visibility="hard"))
-    assert np.array_equal(pcf(areas, maps, points, normals, 1), hard)
-    assert set(np.unique(hard)) == {0.0, 1.0}
-
-
 @pytest.mark.feature("VAL-22")
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_a_lone_plane_is_wholly_visible(dtype):
@@ -66,23 +56,6 @@ def test_a_lone_plane_is_wholly_visible(dtype):
         normals[:] = -normal[:, None]
         for texels in (1, 5, 21):
             assert (pcf(areas, maps, points.astype(dtype), normals.astype(dtype), texels) == 1).all()
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_any_receiver_sees_a_share(dtype):
-    rng = np.random.default_rng(5)
-    extreme = np.array([[0, 0, 0], [0, 0, 1e-20], [1, 0, 0], [1, 1, -1e-9], [0, 0, -2], [0, 0, 100], [4, 5, 1e-12],
-                        [1e-8, 0, 1e-8], [0, 0, 3], [3, 0, 1e-6]]).T
-    points = np.concatenate([extreme, rng.uniform(-3, 3, (3, 300))], axis=1).astype(dtype)
-    normals = rng.normal(size=points.shape).astype(dtype)
-    for plates, plane in ((PLATES, 3.0), ([], None), ([(-50, 50, -50, 50, 1e-3)], None), ([], 3.0)):
-        areas, maps = lit_by(map_of_plates(17, plates, plane, dtype=dtype), 0.5, FAR)
-        for texels in (1, 5, 255):
-            got = pcf(areas, maps, points, normals, texels)
-            assert are_shares(got, dtype)
-            assert (got[points[2] <= 0] == 1).all()
-            order = rng.permutation(points.shape[1])
-            assert np.array_equal(pcf(areas, maps, points[:, order], normals[:, order], texels), got[order])
 
 
 def room_with_blocker():
@@ -159,3 +132,35 @@ def test_light_without_extent_casts_the_hard_shadow():
     unmapped = visibility(maps._replace(map_of=np.array([-1])), areas, 0, points, normals, ValSettings())
     assert (none == 1).all()
     assert (unmapped == 1).all()
+
+
+EVERY_KIND = [
+    *({"visibility": "pcf", "texels": texels} for texels in (1, 5, 255)),
+    *({"visibility": "pcss"} | how for how in ({}, {"cone": False, "as_published": {
+        "val_search_solid_angle", "val_alpha_over_pi"}}, {"constant_bias": ConstantBias(0.25, "scene")})),
+    *({"prefilter": prefilter, "terms": terms, "depth_scale": scale} | how for prefilter, terms, scale, how in (
+        ("mip", 1, "log_map", {}), ("mip", 4, "map", {"attenuation": 100.0, "rescale": "plateau"}),
+        ("mip", 64, "scene", {"rescale": "scale2", "foreshortened": True}),
+        ("brute", 4, "log_map", {"bias": 0.25, "as_published": {"val_alpha", "val_alpha_over_pi"}}),
+        ("brute", 64, "map", {"bias": 0.0, "as_published": {"val_search_solid_angle"}})))]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("how", EVERY_KIND, ids=str)
+def test_any_receiver_sees_a_share(how, dtype):
+    """Property: 0 to 1 wherever it is, 1 behind the light, by itself in any order."""
+    rng, settings = np.random.default_rng(5), of(ValSettings, **how)
+    extreme = np.array([[0, 0, 0], [0, 0, 1e-20], [1, 0, 0], [1, 1, -1e-9], [0, 0, -2], [0, 0, 100], [4, 5, 1e-12],
+                        [1e-8, 0, 1e-8], [0, 0, 3], [3, 0, 1e-6]]).T
+    points = np.concatenate([extreme, rng.uniform(-3, 3, (3, 30))], axis=1).astype(dtype)
+    normals = rng.normal(size=points.shape).astype(dtype)
+    normals[:, 3] = 0
+    order = rng.permutation(points.shape[1])
+    for plates, plane in ((PLATES, 3.0), ([], None), ([(-50, 50, -50, 50, 1e-3)], None), ([], 3.0)):
+        depth = map_of_plates(17, plates, plane, dtype=dtype)
+        for delta in (0.0, 1e-9, 0.5, 1e6):
+            areas, maps = lit_by(depth, delta, FAR)
+            got = visibility(maps, areas, 0, points, normals, settings)
+            assert are_shares(got, dtype)
+            assert (got[points[2] <= 0] == 1).all()
+            assert np.array_equal(visibility(maps, areas, 0, points[:, order], normals[:, order], settings), got[order])

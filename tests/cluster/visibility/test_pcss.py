@@ -20,7 +20,6 @@ from refgi.cluster.visibility.search_region import (
 from refgi.cluster.visibility.shadow import visibility
 from refgi.settings import of
 from tests.cluster.visibility.plates import (
-    are_shares,
     lit_by,
     map_of_plates,
     on_plane,
@@ -215,21 +214,3 @@ def test_a_lone_plane_sees_the_whole_light(dtype, evidence):
     without = shadow(areas, maps, points, normals, visibility="pcss", constant_bias=ConstantBias(), cone=False)
     assert without.min() < 0.6
     evidence(f"V = 1 exactly, {np.dtype(dtype).name}; without the plane's test down to {without.min():.2f}")
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_any_receiver_sees_a_share(dtype):
-    rng = np.random.default_rng(5)
-    extreme = np.array([[0, 0, 0], [0, 0, 1e-20], [1, 0, 0], [1, 1, -1e-9], [0, 0, -2], [0, 0, 100], [4, 5, 1e-12],
-                        [1e-8, 0, 1e-8], [0, 0, 3], [3, 0, 1e-6]]).T
-    points = np.concatenate([extreme, rng.uniform(-3, 3, (3, 30))], axis=1).astype(dtype)
-    normals = rng.normal(size=points.shape).astype(dtype)
-    normals[:, 3] = 0
-    for plates, plane in ((PLATES, 3.0), ([], None), ([(-50, 50, -50, 50, 1e-3)], None), ([], 3.0)):
-        depth = map_of_plates(17, plates, plane, dtype=dtype)
-        for delta in (0.0, 1e-9, 0.5, 1e6):
-            areas, maps = lit_by(depth, delta, FAR)
-            for extra in ({}, {"cone": False, "as_published": PUBLISHED},
-                          {"constant_bias": ConstantBias(0.25, "scene")}):
-                got = shadow(areas, maps, points, normals, visibility="pcss", **extra)
-                assert are_shares(got, dtype)

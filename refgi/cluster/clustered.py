@@ -183,11 +183,7 @@ def _add_by_lists(
             add_unshadowed(tiles, packed.diffuse, packed.clamp, start, part)
         else:
             add_members(tiles.position, tiles.normal, parts, members, m, part)
-        places = places_with_light(part)
-        if len(places):
-            beside = {"shading": tiles.normal[:, places]} if shading else {}
-            visible = visibility_of(m, tiles.position[:, places], tiles.facing[:, places], **beside)
-            sums[:, places] += part[:, places] * np.asarray(visible, sums.dtype)
+        _add_visible(part, visibility_of, m, tiles.position, tiles.facing, tiles.normal if shading else None, sums)
         report_progress((m + 1) / len(members.start))
 
 
@@ -196,12 +192,19 @@ def asks_shading(visibility_of: VisibilityFunction, normal: Array, facing: Array
     return not np.may_share_memory(normal, facing) and "shading" in signature(visibility_of).parameters
 
 
-def places_with_light(part: Array) -> Array:
-    """Return the receivers that have light of one area light (3, n); without the skip all."""
-    with_light: Array = np.asarray(part.any(axis=0))
-    if left_out("cluster.receivers", lambda: (len(with_light) - np.count_nonzero(with_light), len(with_light))):
-        return np.flatnonzero(with_light)
-    return np.arange(len(with_light))
+def _add_visible(
+    part: Array, visibility_of: VisibilityFunction, m: int, position: Array, facing: Array, shading: Array | None,
+    sums: Array,
+) -> None:
+    """Add the light (3, n) of area light m under its V, which is found where there is any; without the skip at all."""
+    with_light = np.asarray(part.any(axis=0))
+    skips = left_out("cluster.receivers", lambda: (len(with_light) - np.count_nonzero(with_light), len(with_light)))
+    places = np.flatnonzero(with_light) if skips else np.arange(len(with_light))
+    if len(places):
+        beside = {} if shading is None else {"shading": shading[:, places]}
+        visible = visibility_of(m, position[:, places], facing[:, places], **beside)
+        # Sec. 4: sum_m V_m L_m
+        sums[:, places] += part[:, places] * np.asarray(visible, sums.dtype)
 
 
 def visibility_by(
@@ -255,12 +258,7 @@ def clustered_radiance(
         some = some_lights(members.packed, start, lobe_start)
         if some.diffuse.shape[1] > 1 or some.lobes is not None:
             part = glossy_summed(here, some, (None, None))
-            places = places_with_light(part)
-            if len(places):
-                beside = {"shading": here.normal[:, places]} if shading else {}
-                visible = visible_from(m, here.position[:, places], faces[:, places], **beside)
-                # Sec. 4: sum_m V_m L_m
-                sums[:, places] += part[:, places] * np.asarray(visible, sums.dtype)
+            _add_visible(part, visible_from, m, here.position, faces, here.normal if shading else None, sums)
         report_progress((m + 1) / len(members.start))
     result = np.empty_like(sums)
     result[:, order] = sums

@@ -31,6 +31,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.rays import Tracer
 
+
 @stage("cluster.interleaving", kept=False)
 def subset_of_lights(of: Array, side: int, assignment: Assignment) -> Array:
     """Deal lights out to n^2 subsets, of which a pixel sums (row mod n) n + column mod n (VAL Sec. 6, E-VAL-13).

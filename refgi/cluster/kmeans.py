@@ -114,33 +114,19 @@ def cluster(
             skip("cluster.kmeans", f"{count - total} of {count} area lights: there are {total} pixel lights")
         count = min(count, total)
         areas = np.ascontiguousarray(lights[:, first_lights(total, count)])
-        if count == total:
-            return _each_its_own(areas)
-    return _run(lights, areas, distance, weights, diagonal, rounds)
+        if count == total:  # each its own
+            return Clustering(areas[:3].copy(), areas[3:].copy(), np.ones(count, np.int64),
+                              np.arange(count, dtype=np.int32), 0, np.zeros(1))
+    with threads(1 if total * areas.shape[1] <= SMALL else None):
+        state = _state(lights, areas, thread_count())
+        objective = np.zeros(rounds + 1)
+        done = iterate(state, _metric(distance, weights, diagonal, _span(state)), rounds, objective)
+    return Clustering(areas[:3].copy(), areas[3:].copy(), state.members, state.of, done, objective[: done + 1])
 
 
 def first_lights(total: int, count: int) -> Array:
     """Return the light that each of `count` clusters of `total` lights begins at: floor(k N / M)."""
     return np.arange(count) * total // max(count, 1)
-
-
-def assigned(
-    position: Array, normal: Array, center: Array, axis: Array, distance: Distance, weights: tuple[float, float],
-    diagonal: float,
-) -> tuple[Array, Array]:
-    """Return C(i) of each light, and its distance, for centres and normals (3, M): one step of `cluster`."""
-    state = _state(_lights(position, normal), np.vstack([center, axis]).astype(np.float64), 1)
-    iterate(state, _metric(distance, weights, diagonal, _span(state)), 0, np.zeros(1))
-    return state.of, state.own
-
-
-def moved(position: Array, normal: Array, of: Array, center: Array, axis: Array) -> tuple[Array, Array]:
-    """Return centres and normals of clusters as the means of their lights, C(i) being `of`: one step of `cluster`."""
-    state = _state(_lights(position, normal), np.vstack([center, axis]).astype(np.float64), 1)
-    state.of[:] = of
-    sort_lights(state)
-    move_to_means(state)
-    return state.areas[:3], state.areas[3:]
 
 
 def _lights(position: Array, normal: Array) -> Array:
@@ -156,22 +142,6 @@ def _finite(values: Array, name: str) -> Array:
     expect(array.ndim == 2 and len(array) == 3, name, "shape (3, N)", array.shape)
     expect(bool(np.isfinite(array).all()), name, "finite numbers", "NaN or infinity")
     return array
-
-
-def _each_its_own(lights: Array) -> Clustering:
-    count = lights.shape[1]
-    return Clustering(lights[:3].copy(), lights[3:].copy(), np.ones(count, np.int64),
-                      np.arange(count, dtype=np.int32), 0, np.zeros(1))
-
-
-def _run(
-    lights: Array, areas: Array, distance: Distance, weights: tuple[float, float], diagonal: float, rounds: int
-) -> Clustering:
-    with threads(1 if lights.shape[1] * areas.shape[1] <= SMALL else None):
-        state = _state(lights, areas, thread_count())
-        objective = np.zeros(rounds + 1)
-        done = iterate(state, _metric(distance, weights, diagonal, _span(state)), rounds, objective)
-    return Clustering(areas[:3].copy(), areas[3:].copy(), state.members, state.of, done, objective[: done + 1])
 
 
 def _state(lights: Array, areas: Array, workers: int) -> Rounds:
@@ -245,7 +215,9 @@ def kmeans_assign(
     -> of (light,) int: Nearest cluster.
     -> distance (light,): Its distance d.
     """
-    return assigned(position, normal, center, axis, distance, (w_x, w_a), _diagonal(illuminated))
+    state = _state(_lights(position, normal), np.vstack([center, axis]).astype(np.float64), 1)
+    iterate(state, _metric(distance, (w_x, w_a), _diagonal(illuminated), _span(state)), 0, np.zeros(1))
+    return state.of, state.own
 
 
 @stage("cluster.kmeans_means", kept=False, each="round")
@@ -257,7 +229,11 @@ def kmeans_means(position: Array, normal: Array, of: Array, center: Array, axis:
     -> center (3, cluster): Means of the lights' places, m.
     -> axis (3, cluster): Mean directions of their normals, unit vectors.
     """
-    return moved(position, normal, of, center, axis)
+    state = _state(_lights(position, normal), np.vstack([center, axis]).astype(np.float64), 1)
+    state.of[:] = of
+    sort_lights(state)
+    move_to_means(state)
+    return state.areas[:3], state.areas[3:]
 
 
 @stage("cluster.kmeans_rounds", kept=False)

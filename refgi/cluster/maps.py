@@ -138,15 +138,14 @@ def shadow_maps(
         skip("cluster.depth_maps", f"nothing occludes {(map_of < 0).sum()} of {len(map_of)} area lights")
     maps = ShadowMaps(depth, map_of, center, frame, near, farthest(depth), farthest_corner(extent, center), behind,
                       near_behind, None if behind is None else farthest(behind), int(left_out.sum()))
-    _end_beyond_scene(maps, empty)
-    return maps if needed.all() else _without(maps, needed)
-
-
-def _end_beyond_scene(maps: ShadowMaps, empty: Array) -> None:
-    """Let maps that hold nothing hold it where no receiver is: none is shadowed by them."""
     for values in (maps.near, maps.far, maps.near_behind, maps.far_behind):
-        if values is not None:
+        if values is not None:  # maps that hold nothing hold it where no receiver is: none is shadowed by them
             values[empty] = 2.0 * maps.scene_far[empty]
+    if needed.all():
+        return maps
+    shown: dict[str, Any] = {name: values[needed] for name, values in maps._asdict().items()
+                             if name not in ("map_of", "left_out") and values is not None}
+    return maps._replace(**shown)
 
 
 def map_centers(center: Array, normal: Array, illuminated: Extent) -> Array:
@@ -176,13 +175,6 @@ def _farthest_in_columns(depth: Array, columns: Array) -> None:
             for j in range(depth.shape[2]):
                 z = depth[k, i, j]
                 columns[k, j] = z if (z > columns[k, j]) & (z < np.inf) else columns[k, j]
-
-
-def _without(maps: ShadowMaps, needed: Array) -> ShadowMaps:
-    """Drop the maps on which there is nothing."""
-    shown: dict[str, Any] = {name: values[needed] for name, values in maps._asdict().items()
-                            if name not in ("map_of", "left_out") and values is not None}
-    return maps._replace(**shown)
 
 
 @stage("cluster.distances")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from refgi.cluster.kmeans import Clustering
-from refgi.cluster.settings import AreaLightSettings, Axes, Extent
+from refgi.cluster.settings import AreaLightSettings, Axes
 from refgi.cluster.settings import Extent as Size
 from refgi.errors import expect
 from refgi.pairs.pixel_lights import PixelLights
@@ -135,11 +135,13 @@ def rectangles(
         side[:, used], offset[:, used] = high - low, (low + high) / 2
         radius[used] = np.sqrt(np.maximum.reduceat((away**2).sum(axis=0), starts))
     side[side < FLAT * radius] = 0.0
-    side *= _correction(clusters.members) if settings.unbiased_area else 1.0
+    n = clusters.members
+    side *= np.where(n > 1, (n + 1) / np.maximum(n - 1, 1), 1.0) if settings.unbiased_area else 1.0
     if settings.single_light == "footprint" and footprint is not None:
         single = np.flatnonzero(clusters.members[clusters.of] == 1)
         side[:, clusters.of[single]] = np.sqrt(footprint[single])
-    delta = _size(side, settings.extent)
+    delta = {"root": np.sqrt(side[0] * side[1]), "longer": side.max(axis=0),
+             "shorter": side.min(axis=0)}[settings.extent]
     return AreaLights(clusters.center, clusters.normal, frames, side, axes, offset, delta, radius, clusters.members,
                       clusters.of)
 
@@ -173,19 +175,6 @@ def _axes(away: Array, frames: Array, clusters: Clustering, axes: Axes) -> Array
         turned[m] = np.array([[c, s], [-s, c]]) @ turned[m]
         first += members
     return turned
-
-
-def _correction(members: Array) -> Array:
-    """Return by how much the sides of a rectangle around n lights fall short."""
-    return np.where(members > 1, (members + 1) / np.maximum(members - 1, 1), 1.0)
-
-
-def _size(side: Array, extent: Extent) -> Array:
-    """Return Delta, the one size of each rectangle."""
-    if extent == "root":
-        root: Array = np.sqrt(side[0] * side[1])
-        return root
-    return np.asarray(side.max(axis=0) if extent == "longer" else side.min(axis=0))
 
 
 @stage("cluster.areas", kept=False)

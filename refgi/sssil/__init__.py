@@ -9,8 +9,9 @@ what lies between receiver and sample.
 """
 
 from refgi.method import Method
+from refgi.sssil.approximations import APPROXIMATIONS, extra_bytes
 from refgi.sssil.crown import gather
-from refgi.sssil.hssil import APPROXIMATIONS, extra_bytes, hssil, hssil_lobes
+from refgi.sssil.hssil import hssil, hssil_lobes
 from refgi.sssil.levels import pyramid
 from refgi.sssil.settings import (
     PRESETS,

@@ -1,23 +1,17 @@
-"""Sum over the samples around every texel of a level (Eq. 1; Sec. 3.2), and the share of light that few samples lose.
+"""Sum over the samples around every texel of a level (Sec. 3.1, Eq. 1; Sec. 3.2, indirect lighting shader).
 
 Threads take strips of a level so narrow that what their samples read stays in the cache of a core. Receivers at either
 end of a strip whose samples have no radiance are skipped, which changes no bit of a sum; a sample that is dark for a
-whole strip is not listed, which changes the rounding. A sample's disc is as large as what it stands for (Eq. 4), and a
-large disc near a receiver gives less than the texels that it covers: few samples lose light at every receiver.
+whole strip is not listed, which changes the rounding.
 """
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from refgi.diagnostics import asked
 from refgi.jit import kernel, prange
-from refgi.pairs.estimates import lost_share, sample_pixels, warn_of_loss
-from refgi.pairs.irradiance import Receivers
 from refgi.rsm.pool import plane
-from refgi.settings import replaced
 from refgi.skips import left_out
 from refgi.sssil.form_factor import (
     BLOCK,
@@ -27,7 +21,6 @@ from refgi.sssil.form_factor import (
     TEXEL,
     WIDE,
     Emitters,
-    Facing,
     SampleForm,
     add_two,
     close_group,
@@ -35,7 +28,6 @@ from refgi.sssil.form_factor import (
     disc_texels,
     form_of,
     pack,
-    term,
 )
 from refgi.sssil.pattern import (
     PixelSamples,
@@ -47,7 +39,7 @@ from refgi.sssil.pattern import (
     shift_of,
     shifted,
 )
-from refgi.sssil.settings import HssilSettings, SamplingSettings
+from refgi.sssil.settings import HssilSettings
 from refgi.sssil.view import Level
 from refgi.stages import stage, tally
 from refgi.types import Array
@@ -280,81 +272,3 @@ def _expand(
             by = 1.0 if c < 3 else (area if c < 6 else radiance)
             lines[np.uint64(to + c * WIDE) + i] = packed[texel + np.uint64(c * line)] * real(by)
     return real(weight if form.kind == DISC else (1.0 if form.kind == TEXEL else 0.0))
-
-
-ENOUGH = 256  # samples that lose next to nothing
-FEW = 32  # more lose 3 % at most (docs/methods/hssil.md), which is not worth an estimate
-SAMPLED = 512  # texels of a level
-LEAST_LOSS = 0.05  # share below which a loss gives no warning: at so few texels two draws differ by as much
-
-
-@stage("sssil.sample_loss")
-def sample_loss(levels: Sequence[Level], senders: Sequence[Level], settings: HssilSettings) -> float:
-    """Return the share of the light that the settings' number of samples loses against `ENOUGH`; below 0 for a gain.
-
-    levels: Receivers, the first level first.
-    senders: The same levels as senders.
-    settings: Sampling and form factor. Samples of each pixel's own are taken as interleaved ones.
-    -> float: Of the light without visibility.
-    """
-    own = settings.sampling
-    own = replaced(own, {"pattern": "interleaved"}) if own.pattern == "pixel" else own
-    form = form_of(settings.senders)
-    sums = np.zeros(2)
-    for index, (level, sending) in enumerate(zip(levels, senders, strict=True)):
-        if settings.senders.only_level not in (None, index):
-            continue
-        place = sample_pixels(Receivers(level.position, level.normal, np.isfinite(level.depth)), SAMPLED).place
-        found = [_mean(place, level, sending, index, one, form)
-                 for one in (own, replaced(own, {"samples": ENOUGH, "pattern": "interleaved"}))]
-        sums += np.array(found) * level_factor(index, settings)
-    return lost_share(float(sums[1]), float(sums[0]))
-
-
-def _mean(
-    place: Array, level: Level, senders: Level, index: int, sampling: SamplingSettings, form: SampleForm
-) -> float:
-    rows, columns = level.shape
-    radius = chosen_radius((rows << index, columns << index), sampling)
-    offsets, weight = shared_offsets(sampling, index, level.number, rows, radius, columns)
-    sums = np.zeros(len(place))
-    _sum_at(place, level.position, level.normal, senders.position, senders.normal, senders.area, senders.radiance,
-            offsets, weight, form, sums)
-    return float(sums.mean()) if len(sums) else 0.0
-
-
-@kernel(parallel=True)
-def _sum_at(
-    place: Array, position: Array, normal: Array, sender: Array, facing: Array, area: Array, radiance: Array,
-    offsets: Array, weight: Array, form: SampleForm, sums: Array,
-) -> None:
-    """Fill the light of the samples of some texels, all channels together, without pi."""
-    for i in prange(len(place)):
-        rows, columns = area.shape
-        y, x = place[i] // columns, place[i] % columns
-        of, at = offsets[y % offsets.shape[0], x % offsets.shape[1]], weight[y % weight.shape[0], x % weight.shape[1]]
-        total = 0.0
-        for j in range(at.size):
-            a, b = y + of[j, 1], x + of[j, 0]
-            if 0 <= a < rows and 0 <= b < columns and not (a == y and b == x):
-                light = float(radiance[0, a, b]) + float(radiance[1, a, b]) + float(radiance[2, a, b])
-                by = -float(area[a, b]) / math.pi
-                # Eq. (1)
-                total += light * term(
-                    Facing(float(position[0, y, x]), float(position[1, y, x]), float(position[2, y, x]),
-                           float(normal[0, y, x]), float(normal[1, y, x]), float(normal[2, y, x])),
-                    Facing(float(sender[0, a, b]), float(sender[1, a, b]), float(sender[2, a, b]),
-                           facing[0, a, b] * by, facing[1, a, b] * by, facing[2, a, b] * by),
-                    at[j], disc_texels(at[j], form))
-        sums[i] = total
-
-
-def warn_of_few_samples(levels: Sequence[Level], senders: Sequence[Level], settings: HssilSettings) -> None:
-    """Warn whoever collects diagnostics where few samples lose more than `LEAST_LOSS` of the light of a picture."""
-    sampling = settings.sampling
-    if sampling.pattern == "all" or sampling.samples > FEW or asked("sssil.sample_loss") is None:
-        return
-    share = sample_loss(levels, senders, settings)
-    if share > LEAST_LOSS:
-        fixed = " in one fixed set" if sampling.pattern == "fixed" else ""
-        warn_of_loss(share, f"hssil: sampling.samples {sampling.samples}{fixed} in place of {ENOUGH}")

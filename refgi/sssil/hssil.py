@@ -4,29 +4,26 @@ Glossy pixels are receivers at full resolution on every level (`glossy`): on lev
 irradiance, whose receivers are its texels.
 """
 
-import dataclasses
-import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from refgi.diagnostics import is_due
-from refgi.method import Approximation, Extent
 from refgi.pairs.shadow_rays import receivers
 from refgi.rsm.buffers.leaving import GlossyPoints, glossy_points, spread_over_picture
 from refgi.rsm.raster.projection import Projection
 from refgi.settings import replaced
+from refgi.sssil.approximations import warn_of_few_samples
 from refgi.sssil.bitmask import bitmask_gather
 from refgi.sssil.blur import blur
 from refgi.sssil.cameras import join_cameras
-from refgi.sssil.crown import gather, level_factor, warn_of_few_samples
+from refgi.sssil.crown import gather, level_factor
 from refgi.sssil.form_factor import form_of
 from refgi.sssil.glossy import Draws, draw_samples, fill_glossy_rays, glossy_receivers, march_samples, slice_samples
 from refgi.sssil.levels import pyramid, sender_pyramid
-from refgi.sssil.pattern import PHASES, chosen_radius, every_texel, level_key, reach, sample_weight, warn_short_reach
+from refgi.sssil.pattern import chosen_radius, every_texel, level_key, sample_weight, warn_short_reach
 from refgi.sssil.rays import Traced, add_unoccluded, ray_gather, surfels_of
-from refgi.sssil.settings import MOST_LEVELS, MOST_SAMPLES, Bitmask, HssilSettings, Rays
+from refgi.sssil.settings import Bitmask, HssilSettings
 from refgi.sssil.upsampling import Guide, upsample
 from refgi.sssil.view import Level
 from refgi.stages import report_progress, skip, stage, tally
@@ -34,6 +31,7 @@ from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
+
 
 def hssil(frame: "Frame", settings: HssilSettings) -> Array:
     """Light what a camera sees by what it sees, near by at high and far away at low resolution.
@@ -219,139 +217,3 @@ class _Rays:
         reach = np.empty(size, np.float32)
         fill_glossy_rays(self._to, self._from, first, last, count, sender, transfer, origin, direction, reach)
         self._tracer.fill_occluded(origin, direction, reach, blocked[:size])
-
-
-MANY = 1024  # samples where not every texel can be one
-
-
-def _ignores_visibility(settings: HssilSettings) -> Mapping[str, Any]:
-    return {"visibility": False} if settings.visibility is None else {}
-
-
-def _by_rays(settings: HssilSettings, _: Mapping[str, Any]) -> HssilSettings:
-    return replaced(settings, {"visibility": "rays"}) if isinstance(settings.visibility, Bitmask) else settings
-
-
-def _points(settings: HssilSettings, _: Mapping[str, Any]) -> HssilSettings:
-    return replaced(settings, {"senders.form_factor": "point"})
-
-
-def _one_level(settings: HssilSettings, _: Mapping[str, Any]) -> HssilSettings:
-    """Return settings of one level that covers the picture, with the samples of all levels."""
-    sampling = settings.sampling
-    if sampling.levels == 1:
-        return settings
-    return replaced(settings, {"levels": 1, "radius": None, "senders.only_level": None,
-                               "samples": min(MOST_SAMPLES, sampling.samples * sampling.levels)})
-
-
-def _averaged(settings: HssilSettings, _: Mapping[str, Any]) -> HssilSettings:
-    return replaced(settings, {"downsample": "average"})
-
-
-def _whole_picture(settings: HssilSettings, options: Mapping[str, Any]) -> HssilSettings:
-    """Return settings with as many levels as reach across the picture."""
-    sampling, radius = settings.sampling, settings.sampling.radius
-    if radius is None:
-        return settings
-    diagonal = math.hypot(*(-(-options[side] >> sampling.first_level) for side in ("width", "height")))
-    while reach(sampling, radius) < diagonal and sampling.levels < MOST_LEVELS:
-        sampling = dataclasses.replace(sampling, levels=sampling.levels + 1)
-    return dataclasses.replace(settings, sampling=sampling)
-
-
-def _full_resolution(settings: HssilSettings, _: Mapping[str, Any]) -> HssilSettings:
-    sampling = settings.sampling
-    more = 0 if sampling.radius is None else sampling.first_level  # a radius that is not set covers the picture
-    return replaced(settings, {"start": "full", "levels": min(MOST_LEVELS, sampling.levels + more)})
-
-
-def _every_texel(settings: HssilSettings, _: Mapping[str, Any]) -> HssilSettings:
-    if isinstance(settings.visibility, Bitmask):  # marches along slices, which the pattern "all" has not
-        return replaced(settings, {"samples": max(MANY, settings.sampling.samples)})
-    return replaced(settings, {"pattern": "all", "samples": 1, "seed": 0})
-
-
-def _unblurred(settings: HssilSettings, _: Mapping[str, Any]) -> HssilSettings:
-    return dataclasses.replace(settings, blur=None)
-
-
-def _single_frame(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return options of a frame that is not the last of several."""
-    return {key: value for key, value in options.items() if key != "still"}
-
-
-APPROXIMATIONS = (
-    Approximation("unseen senders", "only what the camera sees sends light",
-                  limit=lambda _: {"emitters": "visible"}),
-    Approximation("visibility", "nothing blocks indirect light, or a bitmask of the screen for rays", _by_rays,
-                  limit=_ignores_visibility),
-    Approximation("clamp", "a sender is a disc (Eq. 4) for a point (Eq. 3), whose light has no bound", _points),
-    Approximation("levels", "coarser texels for pixels farther away", _one_level),
-    Approximation("downsampling", "a coarse texel is one of four for their average", _averaged),
-    Approximation("cut", "crowns end before the picture does", _whole_picture),
-    Approximation("upsampling", "the first level is half or a quarter of the resolution", _full_resolution),
-    Approximation("few samples", "S samples a level for all its texels", _every_texel),
-    Approximation("blur", "the mean over texels of the same surface", _unblurred),
-    Approximation("temporal", "the frames before are blended in; here of a resting scene", frame=_single_frame))
-
-
-FLOATS = 11  # a texel: position, depth, normal, radiance, area
-SENDER_FLOATS = 10  # a texel of drawn senders: the same but the depth
-PIXEL_BYTES = 4  # and the pixel that it shows
-PLANES, LIGHT_FLOATS = 9, 9  # of a texel of the level that is summed: as senders, its light blurred or not, that below
-PADDING = 32  # lanes around a row of senders at least, for each of the phases into which columns are split
-VIEW_FLOATS = 32  # of a pixel of a further view: its G-buffer, direct and indirect light, and temporaries
-RAY_BYTES = 1 << 26  # rays that are held at a time
-OFFSET_BYTES, SLICED_BYTES = 16, 32  # of a sample with its weight, and of one in a slice
-CANDIDATE_BYTES = 104  # of a texel that may be among all around a receiver
-LISTED_RAY_BYTES = 48  # of a sample of one receiver
-
-
-def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
-    """Return the bytes of the levels of one picture: n from full resolution on are (4 - 4^(1 - n)) / 3 times the first.
-
-    >>> from refgi.sssil.settings import SamplingSettings >>> level_bytes(HssilSettings(SamplingSettings(start="full",
-    levels=1)), 100, 4) 4800
-    """
-    sampling, downsample = settings.sampling, settings.senders.downsample
-    floats = FLOATS + (downsample == "closest_average")
-    numbers = range(sampling.first_level, sampling.first_level + sampling.levels)
-    texels = [-(-pixels >> 2 * number) for number in numbers]
-    drawn = [count for count, number in zip(texels, numbers, strict=True) if number > 0]  # pixels are their own senders
-    senders = sum(drawn) * (SENDER_FLOATS * float_bytes + PIXEL_BYTES) if downsample == "resampled" else 0
-    return sum(texels) * (floats * float_bytes + PIXEL_BYTES) + senders
-
-
-def extra_bytes(settings: HssilSettings, extent: Extent) -> int:
-    """Estimate the bytes that levels, samples and further cameras add to a picture, rather too many than too few."""
-    size, float_bytes = extent.size, extent.float_bytes
-    pixels = size[0] * size[1]
-    columns, rows = (-(-side >> settings.sampling.first_level) for side in size)
-    radius = chosen_radius((rows, columns), settings.sampling)
-    phases = settings.sampling.tile if settings.sampling.pattern == "interleaved" else PHASES
-    padded = columns + 2 * min(math.ceil(2 * radius), columns) + PADDING * phases
-    view = level_bytes(settings, pixels, float_bytes)
-    view += (PLANES * padded * (rows + 1) + LIGHT_FLOATS * columns * rows) * float_bytes
-    further = VIEW_FLOATS * pixels * float_bytes if settings.cameras.count or settings.cameras.views else 0
-    samples = _sample_bytes(settings, rows, columns, radius)
-    return view + further + samples + (RAY_BYTES if isinstance(settings.visibility, Rays) else 0)
-
-
-def _sample_bytes(settings: HssilSettings, rows: int, columns: int, radius: float) -> int:
-    """Return the memory of the first level's list of samples, the longest of all levels'."""
-    sampling = settings.sampling
-    if sampling.pattern == "all":
-        reach = math.ceil(2 * radius)
-        candidates = (2 * min(reach, rows) + 1) * (min(reach, columns) + 1)
-        rays = 2 * LISTED_RAY_BYTES * candidates if isinstance(settings.visibility, Rays) else 0
-        return CANDIDATE_BYTES * candidates + rays
-    if sampling.pattern == "pixel":
-        return 0
-    if sampling.pattern == "fixed":
-        rows = 1
-    if isinstance(settings.visibility, Bitmask):  # half as many occluders as samples of the crown
-        slices = settings.visibility.count(sampling.samples)
-        return SLICED_BYTES * rows * (3 * sampling.samples // 2 + sampling.inner + 3 * slices)
-    sets = sampling.tile**2 if sampling.pattern == "interleaved" else PHASES * rows
-    return OFFSET_BYTES * sets * (sampling.samples + sampling.inner)

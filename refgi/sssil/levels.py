@@ -32,6 +32,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.frame import Frame
 
+
 def pyramid(frame: "Frame", settings: HssilSettings) -> list[Level]:
     """Return what a camera sees at the resolutions at which light is gathered.
 
@@ -95,13 +96,9 @@ def levels(
 ) -> tuple[Level, ...]:
     """Return levels of a picture, the first from its pixels, each further one from that before.
 
-    depth (H, W): Along the view direction, m; inf where there is no surface.
-    normal (3, H, W): Unit vectors on the visible side, world space.
-    albedo (3, H, W): Diffuse reflectance.
     direct (3, H, W): Direct irradiance, W/m^2.
     first, count: Number of the first level, and how many.
     downsample {"closest", "average", "closest_average"}: How texels become one.
-    as_published: "hss_tan_f": sample areas with the tangents of Eq. 3 as printed.
     -> tuple of Level: Finest first.
 
     Raises
@@ -134,13 +131,9 @@ def drawn_senders(
 ) -> tuple[Level, ...]:
     """Return levels whose texels stand where one of four does, drawn in proportion to flux, and send the flux of all.
 
-    depth (H, W): Along the view direction, m; inf where there is no surface.
-    normal (3, H, W): Unit vectors on the visible side, world space.
-    albedo (3, H, W): Diffuse reflectance.
     direct (3, H, W): Direct irradiance, W/m^2.
     closest: Levels of the closest texels: those that a texel which sends nothing is like.
     seed: Seed of the draws.
-    as_published: "hss_tan_f": sample areas with the tangents of Eq. 3 as printed.
     -> tuple of Level: Area is the sum over pixels, radiance times area the flux over pi, to rounding. `depth` is that
         of `closest`.
 

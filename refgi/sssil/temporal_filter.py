@@ -25,6 +25,7 @@ from refgi.types import Array
 if TYPE_CHECKING:
     from refgi.frame import Frame
 
+
 def clamp_to_neighbourhood(new: Array, covered: Array, deviations: float, radius: int, earlier: Array) -> None:
     """Clamp `earlier` light (3 or 4, h, w) to the mean of the new light in a square of pixels, by deviations."""
     _clamp(new, covered, new.dtype.type(deviations), radius, earlier)

@@ -9,7 +9,8 @@ from refgi.method import Extent
 from refgi.methods import find_method
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
-from refgi.sssil.hssil import hssil, level_bytes
+from refgi.sssil.approximations import level_bytes
+from refgi.sssil.hssil import hssil
 from refgi.sssil.levels import pyramid, sender_pyramid
 from refgi.sssil.settings import HssilSettings
 from refgi.stages import observe

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from refgi.cluster.filters.mip_build import build_mip, build_mips
 from refgi.cluster.filters.pyramid import (
     CHUNK,
     DIRECT,
@@ -20,8 +19,6 @@ from refgi.cluster.filters.pyramid import (
     add,
     add_level_0,
     load,
-    mip_of,
-    mips,
     scale,
     stack_array,
     store_at,
@@ -30,8 +27,6 @@ from refgi.cluster.filters.pyramid import (
 from refgi.elementary import log2p1
 from refgi.jit import kernel
 from refgi.types import Array
-
-__all__ = ["Mip", "build_mip", "build_mips", "mip_means", "mip_of", "mips"]
 
 WIDEST = 4.0  # radius from which on a disc holds the whole map
 FINE, COARSE, FINE_SIDE, COARSE_SIDE = range(4)  # rows of whole numbers, before LEVEL and DIRECT

@@ -17,9 +17,8 @@ import numpy.typing as npt
 from numba import types
 
 from refgi.cluster.filters.basis import DepthScale, beyond_disc, fill_basis, fill_beyond, joined, normalise
-from refgi.cluster.filters.mip import build_mips
 from refgi.cluster.filters.mip import mip_means as means_of_mip
-from refgi.cluster.filters.mip_build import halve, round_texels
+from refgi.cluster.filters.mip_build import build_mips, halve, round_texels
 from refgi.cluster.filters.pyramid import EIGHT, Mip, level_offsets, mip_of, mips, stack_array
 from refgi.cluster.settings import MOST_TERMS, Csm
 from refgi.jit import by_type, kernel

@@ -10,8 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.cluster.filters.basis import DepthScale, beyond_disc, fill_basis, fill_beyond, normalise
-from refgi.cluster.filters.mip import build_mip, mip_means, mip_of, mips
+from refgi.cluster.filters.mip import mip_means
+from refgi.cluster.filters.mip_build import build_mip
 from refgi.cluster.filters.prefilter import brute_means, brutes, build_brute
+from refgi.cluster.filters.pyramid import mip_of, mips
 from refgi.jit import kernel
 from refgi.literal.val_maps import basis, series_depth
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from refgi.cluster.filters.mip import Mip, build_mips, mips
+from refgi.cluster.filters.mip_build import build_mips
 from refgi.cluster.filters.prefilter import build_filters
+from refgi.cluster.filters.pyramid import Mip, mips
 from refgi.cluster.settings import Csm
 from refgi.literal import val_filters, val_series
 from refgi.literal.val_maps import map_depths

@@ -1,11 +1,10 @@
 """Clustered visibility: pixel lights that share the soft shadow of a virtual area light.
 
-`val` (Dong, Grosch, Ritschel, Kautz and Seidel 2009) groups pixel lights by k-means into area lights, draws one
-paraboloid shadow map for each and filters it into soft visibility, which the lights of a cluster share.
-
-`clustering` makes the area lights, `maps` their shadow maps, `filters` the prefilters of these, `visibility` hard
-shadows, PCF, PCSS and convolution shadow maps, `lighting` the picture. `adaptive` finds a number of area lights;
-`reference` holds the references of these steps and the error of each.
+`val` (Dong, Grosch, Ritschel, Kautz and Seidel 2009) groups pixel lights by `kmeans` into area lights (`rectangle`),
+draws one paraboloid shadow map for each (`occluders`, `maps`) and filters it (`filters`) into soft `visibility`, which
+the lights of a cluster share: `interleave`, `area_sum` and `clustered` sum them, `geometry_blur` joins the blocks.
+`adaptive` finds a number of area lights; `reference` and `back_projection` hold the references of soft shadows. Unlike
+the paper, each light counts n^2 times in the pixels that sum it, and irradiance is blurred instead of radiance.
 """
 
 from refgi.cluster.clustered import clustered_irradiance

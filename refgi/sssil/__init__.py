@@ -1,11 +1,9 @@
 """Screen-space indirect light: the surfaces that a camera sees light each other.
 
 `hssil` (Soler, Hoel, Rochet, Jay and Holzschuch 2009) gathers light from samples around every pixel, near by at high
-and far away at low resolution.
-
-`pyramid` builds the mip levels, `crown` places samples and sums their light, `blur` averages it along surfaces,
-`upsampling` joins the levels, `temporal` blends frames, `cameras` adds surfaces outside the picture, `visibility` tests
-what lies between receiver and sample.
+and far away at low resolution. `levels` builds the mip levels, `pattern` places samples, `crown` sums their light,
+`blur` averages it along surfaces, `upsampling` joins the levels, `temporal` blends frames, `cameras` adds surfaces
+outside the picture, `bitmask` and `rays` test what lies between receiver and sample, `glossy` draws samples for lobes.
 """
 
 from refgi.method import Method

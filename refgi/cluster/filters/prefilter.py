@@ -239,8 +239,8 @@ def _halved(level: Array, in_bytes: bool) -> Array:
         halve(parts[0], parts[1], depth, 0, new.start, side)
         if in_bytes:
             empty = mips(1, 1, terms, level.dtype, quantised=True)
-            round_texels(mip_of.py_func(empty, 0)._replace(basis=parts[0], basis_z=parts[1], mean_depth=depth), new.start,
-                         half * half)
+            round_texels(mip_of.py_func(empty, 0)._replace(basis=parts[0], basis_z=parts[1], mean_depth=depth),
+                         new.start, half * half)
         made[k] = np.concatenate([*(part[new, : 2 * terms] for part in parts), depth[new, None]], axis=1).T.reshape(
             channels, half, half)
     return made

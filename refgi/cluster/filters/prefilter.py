@@ -19,7 +19,7 @@ from numba import types
 from refgi.cluster.filters.basis import DepthScale, beyond_disc, fill_basis, fill_beyond, joined, normalise
 from refgi.cluster.filters.mip import mip_means as means_of_mip
 from refgi.cluster.filters.mip_build import build_mips, halve, round_texels
-from refgi.cluster.filters.pyramid import EIGHT, Mip, level_offsets, mip_of, mips, stack_array
+from refgi.cluster.filters.pyramid import EIGHT, Mip, level_offsets, mips, stack_array
 from refgi.cluster.settings import MOST_TERMS, Csm
 from refgi.jit import by_type, kernel
 from refgi.stages import stage
@@ -158,7 +158,7 @@ def build_several(
     if settings.prefilter == "mip":
         several = allocate_mips(len(depth), size, dtype, settings) if scratch is None else scratch
         build_mips(depth, joined(scales), several)
-        return [mip_of.py_func(several, k) for k in range(len(depth))]  # as views: nothing to compile
+        return [_pyramid(several, k) for k in range(len(depth))]
     filtered = []
     for one, scale in zip(depth, scales, strict=True):
         filtered.append(brutes(size, settings.terms, dtype, box=box, quantised=settings.quantisation == "published"))
@@ -239,7 +239,7 @@ def _halved(level: Array, in_bytes: bool) -> Array:
         halve(parts[0], parts[1], depth, 0, new.start, side)
         if in_bytes:
             empty = mips(1, 1, terms, level.dtype, quantised=True)
-            round_texels(mip_of.py_func(empty, 0)._replace(basis=parts[0], basis_z=parts[1], mean_depth=depth),
+            round_texels(_pyramid(empty, 0)._replace(basis=parts[0], basis_z=parts[1], mean_depth=depth),
                          new.start, half * half)
         made[k] = np.concatenate([*(part[new, : 2 * terms] for part in parts), depth[new, None]], axis=1).T.reshape(
             channels, half, half)
@@ -260,7 +260,7 @@ def mip_means(
     size, count = basis.shape[2], 2 * terms
 
     def mip(k: int) -> Mip:
-        made = mip_of.py_func(mips(1, size, terms, basis.dtype, shift=LEVEL_SHIFT, quantised=t is not None), 0)
+        made = _pyramid(mips(1, size, terms, basis.dtype, shift=LEVEL_SHIFT, quantised=t is not None), 0)
         made.depth[:] = basis[k, -1] if t is None else t[k]
         for start, level in zip(level_offsets(size)[0][1:], levels.values(), strict=True):
             flat = level[k].reshape(len(level[k]), -1).T
@@ -312,3 +312,9 @@ def _means(pending: Array, region: Array, filters: Any, terms: int, weighed: boo
         filter_means(filters(int(k)), s, t, radius, asked, len(asked), weighed, means)
         made[k].reshape(channels, -1)[:, asked] = means[:channels, asked]
     return made
+
+
+def _pyramid(several: Mip, k: int) -> Mip:
+    """Return views of pyramid k of several, as `mip_of` without a kernel to compile."""
+    return several._replace(depth=several.depth[k], basis=several.basis[k], basis_z=several.basis_z[k],
+                            mean_depth=several.mean_depth[k])

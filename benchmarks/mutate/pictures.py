@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 from benchmarks.mutate.project import DIFFERENT
 from benchmarks.sameness.cases import DEFAULTS, all_cases
-from benchmarks.sameness.picture import hash_of
-from benchmarks.sameness.picture import picture as picture_of_ledger
+from benchmarks.sameness.ledger import hash_of
+from benchmarks.sameness.ledger import picture as picture_of_ledger
 from refgi.errors import RefgiWarning
 from refgi.methods import METHODS
 from refgi.settings import of

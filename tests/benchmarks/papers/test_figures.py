@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.papers.records import PAPERS, find_paper
-from benchmarks.papers.report import page
-from benchmarks.papers.runner import as_json
+from benchmarks.papers.runner import as_json, page
 from tests.compare.test_report import Outline
 
 KEYS = {"sii": ["fig4", "fig6", "fig7", "fig8", "fig9", "fig10", "fig11", "fig12", "fig13", "table1", "table2",

@@ -9,8 +9,7 @@ import pytest
 
 from benchmarks.harness import interleaved
 from benchmarks.papers.records import PAPERS, Entry, choose, find_paper
-from benchmarks.papers.report import page
-from benchmarks.papers.runner import reproduce
+from benchmarks.papers.runner import page, reproduce
 from benchmarks.papers.workbench import FULL, QUICK, Workbench
 from refgi.errors import InputError
 from refgi.image import read_exr

@@ -24,8 +24,7 @@ from tests.naive.shares import nearest_grid, shares_of
 from tests.wiring.cases import Case, needed, uncovered, under
 from tests.wiring.features import MULTIRES, featured
 from tests.wiring.fold import fold
-from tests.wiring.pair_cases import OCCLUSION_CASES, PAIR_CASES
-from tests.wiring.shadow_cases import shadow_cases
+from tests.wiring.part_cases import OCCLUSION_CASES, PAIR_CASES, shadow_cases
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
 
@@ -233,7 +232,7 @@ def under_shadows(frame, settings):
 
 def test_every_field_has_a_case():
     """Property: no setting of the method's own is without a case."""
-    assert not uncovered(MultiresSettings, ALL, BASE) - set(needed(LightSettings))  # those: test_lights, test_shared
+    assert not uncovered(MultiresSettings, ALL, BASE) - set(needed(LightSettings))  # those: test_lights
 
 
 @pytest.mark.parametrize("name", featured(FOLDED, MULTIRES))

@@ -22,7 +22,7 @@ from tests.naive import ledger
 from tests.wiring.cases import SCENES, Case, needed, uncovered, under
 from tests.wiring.features import SII, featured
 from tests.wiring.fold import fold
-from tests.wiring.pair_cases import OCCLUSION_CASES, PAIR_CASES
+from tests.wiring.part_cases import OCCLUSION_CASES, PAIR_CASES
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 

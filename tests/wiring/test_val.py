@@ -15,8 +15,7 @@ from tests.literal.whole.pairs import with_clamp
 from tests.wiring.cases import Case, needed, uncovered, under
 from tests.wiring.features import VAL, featured
 from tests.wiring.fold import fold
-from tests.wiring.pair_cases import PAIR_CASES
-from tests.wiring.shadow_cases import FEW, few, shadow_cases
+from tests.wiring.part_cases import FEW, PAIR_CASES, few, shadow_cases
 
 ROUNDING = 1e-9  # of the brightest pixel: float64 in another order
 FLOAT32_RAYS = 2e-6  # the same, where depths come from rays in float32: a few times 6e-8
@@ -58,7 +57,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # wh
 
 
 def test_every_field_has_a_case():
-    elsewhere = set(needed(LightSettings))  # test_lights, test_shared
+    elsewhere = set(needed(LightSettings))  # test_lights
     assert not uncovered(ValSettings, CASES | PROMISES, BASE) - elsewhere
 
 

@@ -53,7 +53,7 @@ FOLDED = fold(VplSettings, CASES, BASE, fits=known) | {
 
 
 def test_every_field_has_a_case():
-    assert not uncovered(VplSettings, CASES, BASE) - set(needed(LightSettings))  # those: test_lights, test_shared
+    assert not uncovered(VplSettings, CASES, BASE) - set(needed(LightSettings))  # those: test_lights
 
 
 @pytest.fixture(scope="module", params=CASES)

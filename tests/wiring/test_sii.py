@@ -211,7 +211,7 @@ def test_a_tree_is_kept_while_lights_rest():
     status = []
     for moved in (scene, scene.with_camera(eye=(0.1, *scene.camera.eye[1:])), scene.with_lights(scene.lights[0])):
         with reusing(memory) as runs:
-            sii(Frame(moved, width=17, height=13, rsm_resolution=16), base)
+            sii(Frame(moved, width=17, height=13, rsm_resolution=16, dtype=np.float64), base)
         status += [run.status for run in runs if run.name == "pairs.light_tree"]
     assert status == ["ran", "reused", "ran"]
 

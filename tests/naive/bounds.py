@@ -101,7 +101,7 @@ def sphere_mesh(count):
     corners = [np.roll((0, s, t * golden), turn) for turn in range(3) for s in (-1, 1) for t in (-1, 1)]
     triangles = [(p, q, r) for i, p in enumerate(corners) for j, q in enumerate(corners[:i]) for r in corners[:j]
                  if all(abs(np.linalg.norm(u - v) - 2) < 1e-9 for u, v in ((p, q), (q, r), (r, p)))]
-    triangles = [tuple(unit(corner) for corner in triangle) for triangle in triangles]
+    triangles = [tuple(raster.unit(corner) for corner in triangle) for triangle in triangles]
     while len(triangles) < count:
         triangles = [four for triangle in triangles for four in cut_in_four(*triangle)]
     return np.array(triangles).reshape(-1, 3)
@@ -109,9 +109,5 @@ def sphere_mesh(count):
 
 def cut_in_four(p, q, r):
     """Cut a triangle at the middles of its edges, moved out to the ball."""
-    pq, qr, rp = unit(p + q), unit(q + r), unit(r + p)
+    pq, qr, rp = raster.unit(p + q), raster.unit(q + r), raster.unit(r + p)
     return (p, pq, rp), (pq, q, qr), (rp, qr, r), (pq, qr, rp)
-
-
-def unit(vector):
-    return vector / np.linalg.norm(vector)

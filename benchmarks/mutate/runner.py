@@ -22,9 +22,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.mutate.faults import KINDS, Fault, all_faults, drawn, is_fault
-from benchmarks.mutate.project import DIFFERENT, REFGI, Project
+from benchmarks.mutate.project import DIFFERENT, REFGI, Programs, Project, Scratch, remove_copies
 from benchmarks.mutate.results import Result, Results, as_text, state_of, survivors
-from benchmarks.mutate.scratch import Programs, Scratch, remove_copies
 from benchmarks.mutate.selection import tests_of
 from benchmarks.mutate.trial import INVALID, SAME, SURVIVED, Baseline, run_pictures, run_tests
 from refgi.cli.session import DONE, FAILED, INTERRUPTED, progress, say

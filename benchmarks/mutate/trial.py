@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.mutate.project import Project
-from benchmarks.mutate.scratch import Ended, Programs, Scratch
+from benchmarks.mutate.project import Ended, Programs, Project, Scratch
 from refgi.errors import InputError
 from refgi.image import write_text
 

@@ -128,6 +128,7 @@ SII = Table({"lights": 96, "clamp": "none"}, [
     vary("widening", 0.3, on=("stage", "ring"), **CUT),
     vary("lightcuts", "bounded", lights=500),
     vary("lightcuts.error", 0.3, lights=500, lightcuts="bounded"),
+    vary("lightcuts", "none", same="few lights are summed in full in any case"),
     vary("quantisation", "published"),
     vary("compensation", "screen", clamp="geometry", clamp_value=2.0),
     vary("half_resolution", True),

@@ -66,6 +66,8 @@ LIGHTING = [
     vary("blur_extent", 0.02, **BLOCKS),
     vary("every_subset", False, **BLOCKS),
     vary("blur_cosine", 0.99, -1.0, on=("cornell_sphere", "stage"), **BLOCKS),
+    vary("subsplats.target", 0.5, clamp="disc", visibility="none"),
+    vary("subsplats.coarsest", 4, clamp="disc", visibility="none"),
     vary("clamp", "none", same="what the cases start from"),
     vary("clamp", "disc"),
     vary("clamp", "auto"),

@@ -5,6 +5,9 @@ BIN := $(VENV)/bin
 # a file's tests run in one process, so that few kernels are compiled twice; files in the order of tests/conftest.py
 PYTEST := $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --durations 25 --durations-min 5
 
+# tests start many processes, which would compile all sources each time
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test quick test-for test-all check evidence bench stress mutate kit-score records docs clean
 
 demo: $(VENV)/run.stamp

@@ -31,7 +31,7 @@ COMMANDS = {"accuracy": "benchmarks.accuracy", "before-after": "benchmarks.befor
             "kit-score": "benchmarks.kit_score", "kill-batch": "benchmarks.kill_batch", "skips": "benchmarks.skips",
             "records": "benchmarks.records", "stability": "benchmarks.stability.runner"}
 NOT_TOPICS = {"__init__", "__main__", "accuracy", "before_after", "harness", "signatures", "kit_score", "kill_batch",
-              "records", "skips", "llvmpipe", "embree_packets", "mitsuba_worker"}
+              "records", "skips", "mitsuba_worker"}
 
 
 def topics() -> list[str]:

@@ -13,6 +13,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -111,16 +112,19 @@ def digest(root: Path, record: Record) -> str:
     """Return a digest of the sources that a record rests on; comments and docstrings are no part of it."""
     found = hashlib.sha256()
     for path in sorted({path for pattern in record.sources for path in root.glob(pattern)}):
-        found.update(f"{path.relative_to(root)}\0{ast.dump(_undocumented(ast.parse(path.read_text())))}\0".encode())
+        found.update(f"{path.relative_to(root)}\0{_code_of(path.read_text())}\0".encode())
     return found.hexdigest()[:16]
 
 
-def _undocumented(tree: ast.Module) -> ast.Module:
+@cache  # records share most of their sources
+def _code_of(text: str) -> str:
+    """Return the syntax tree of a source without docstrings."""
+    tree = ast.parse(text)
     for node in ast.walk(tree):
         documented = isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
         if documented and ast.get_docstring(node, clean=False) is not None:
             del node.body[0]
-    return tree
+    return ast.dump(tree)
 
 
 def _commit(root: Path) -> str:

@@ -8,6 +8,7 @@ import ast
 import inspect
 import re
 import tomllib
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
@@ -103,6 +104,7 @@ def order() -> list[str]:
     return [*dict.fromkeys(named), *sorted(there - set(named))]
 
 
+@cache
 def functions(name: str) -> list[tuple[FunctionType, list[str]]]:
     """Return the functions of a module in their order, each with the tests that reach it."""
     module = import_module(f"refgi.literal.{name}")
@@ -127,7 +129,7 @@ def reached(names: set[str], calls: dict[str, set[str]]) -> set[str]:
 
 def tests_of(file: Path, module: str) -> dict[str, set[str]]:
     """Return what each test of a file uses of a literal module, by the test's name."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+    tree = parsed(file)
     known = {alias.asname or alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
              for alias in node.names if node.module == f"refgi.literal.{module}" or (
                  node.module == "refgi.literal" and alias.name == module)}
@@ -140,6 +142,12 @@ def tests_of(file: Path, module: str) -> dict[str, set[str]]:
     return found
 
 
+@cache
+def parsed(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+@cache
 def names_in(node: ast.AST) -> set[str]:
     """Return names and attributes that a piece of code uses."""
     return {one.id for one in ast.walk(node) if isinstance(one, ast.Name)} | {

@@ -1,8 +1,6 @@
 """Every method at its defaults: on every number and kind of lights, and where direct light's shadows come from."""
 
 import functools
-import subprocess
-import sys
 import warnings
 
 import numpy as np
@@ -80,14 +78,6 @@ def test_a_picture_has_the_shadows_of_its_method(method):
 
 def test_a_frame_alone_takes_the_map():
     assert Frame(BOX, **TINY).shadows == Frame(BOX, shadows=None, **TINY).shadows == "map"
-
-
-@pytest.mark.parametrize("method", ["sii", "multires", "val", "hssil", "gather"])
-def test_methods_without_rays_load_none(method):
-    code = (f"import sys, warnings; warnings.simplefilter('ignore'); from refgi import render\n"
-            f"render('cornell_box', {method!r}, width=12, height=12, rsm_resolution=16)\n"
-            "assert not any(name.startswith('embreex') for name in sys.modules), 'Embree is loaded'")
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.parametrize("kind", [SiiSettings, MultiresSettings, ValSettings])

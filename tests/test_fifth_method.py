@@ -44,51 +44,66 @@ def site(tmp_path_factory):
     return folder / "site"
 
 
-def refgi(site, *arguments, code=0):
+RUN = """
+import json, sys
+from click.testing import CliRunner
+from refgi.cli.group import VerbGroup
+said = []
+for arguments in json.loads(sys.argv[1]):
+    done = CliRunner().invoke(VerbGroup.refgi(), arguments)
+    said.append((done.exit_code, done.stdout, done.stderr))
+print(json.dumps(said))
+"""
+
+
+def refgi(site, *commands, codes=None):
+    """Run commands in one process that sees a folder of packages; return what each says, on stdout and stderr."""
     paths = [str(site), str(PAGE.parents[1])]
-    done = subprocess.run([sys.executable, "-m", "refgi", *map(str, arguments)], capture_output=True, text=True,
-                          check=False, env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)})
-    assert done.returncode == code, done.stderr
-    return done
+    asked = json.dumps([[str(word) for word in command] for command in commands])
+    done = subprocess.run([sys.executable, "-c", RUN, asked], capture_output=True, text=True, check=False,
+                          env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)})
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert [code for code, *_ in found] == (codes or [0] * len(commands)), found
+    return [said for _, *said in found]
 
 
 def test_it_renders(site, tmp_path):
-    for share, name in ((0.2, "a.exr"), (0.4, "b.exr")):
-        refgi(site, "render", "cornell_box", *TINY, "--method", "ambient", "--set", f"share={share}", "--out",
-              tmp_path / name)
+    render = ("render", "cornell_box", *TINY, "--method", "ambient")
+    *_, (again, _) = refgi(site, (*render, "--set", "share=0.2", "--out", tmp_path / "a.exr"),
+                           (*render, "--set", "share=0.4", "--out", tmp_path / "b.exr"),
+                           ("render", "--again", tmp_path / "a.exr"))
     planes, record = read_exr(tmp_path / "a.exr")
     twice = read_exr(tmp_path / "b.exr")[0]
     assert record["settings"] == {"share": 0.2}
     assert planes["irradiance.R"].max() > 0
     lit = planes["irradiance.R"] > 0
     assert abs(twice["irradiance.R"][lit] / planes["irradiance.R"][lit] - 2).max() < 1e-6
-    again = refgi(site, "render", "--again", tmp_path / "a.exr")
-    assert "the same to the bit" in again.stdout
+    assert "the same to the bit" in again
 
 
 def test_it_is_compared(site, tmp_path):
-    done = refgi(site, "compare", "cornell_box", *TINY, "--methods", "sii,ambient", "--set", "sii.lights=16", "--set",
-                 "truth.samples=24", "--out", tmp_path / "out", "--json")
-    content = json.loads(done.stdout)
+    ((said, _),) = refgi(site, ("compare", "cornell_box", *TINY, "--methods", "sii,ambient", "--set", "sii.lights=16",
+                                "--set", "truth.samples=24", "--out", tmp_path / "out", "--json"))
+    content = json.loads(said)
     assert set(content["methods"]) == {"sii", "ambient"}
     assert len(content["methods"]["ambient"]["against"]) == 2  # truth, and truth without visibility
     assert "ambient" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
 
 
-def test_it_is_explained(site):
-    content = json.loads(refgi(site, "explain", "cornell_box", *TINY, "--method", "ambient", "--preset", "dim",
-                               "--json").stdout)
+def test_it_is_explained_and_listed_with_its_settings(site):
+    (explained, _), (info, _), (settings, _), (_, refused) = refgi(
+        site, ("explain", "cornell_box", *TINY, "--method", "ambient", "--preset", "dim", "--json"),
+        ("info", "--json"), ("settings", "ambient", "--json"),
+        ("render", "cornell_box", "--method", "ambient", "--set", "shares=2", "--out", "x.exr"), codes=[0, 0, 0, 2])
+    content = json.loads(explained)
     assert "ambient.spread" in {line["name"] for line in content["stages"]}
     assert content["settings"]["share"] == 0.1
-
-
-def test_it_is_listed_with_its_settings(site):
-    assert "ambient" in json.loads(refgi(site, "info", "--json").stdout)["methods"]
-    content = json.loads(refgi(site, "settings", "ambient", "--json").stdout)
+    assert "ambient" in json.loads(info)["methods"]
+    content = json.loads(settings)
     assert content["schema"]["properties"]["share"]["maximum"] == 1.0
     assert content["presets"]["dim"] == {"share": 0.1}
-    assert "share" in refgi(site, "render", "cornell_box", "--method", "ambient", "--set", "shares=2", "--out", "x.exr",
-                            code=2).stderr
+    assert "share" in refused
 
 
 def test_one_that_cannot_be_imported_is_one_error(tmp_path):
@@ -96,6 +111,6 @@ def test_one_that_cannot_be_imported_is_one_error(tmp_path):
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[refgi.methods]\nbroken = nowhere:METHOD\nsii = nowhere:METHOD\n")
-    done = refgi(tmp_path, "render", "cornell_box", *TINY, "--method", "broken", "--out", tmp_path / "a.exr", code=2)
-    assert "method broken: nowhere:METHOD cannot be imported" in done.stderr
-    refgi(tmp_path, "settings", "sii")  # no other package takes the place of refgi's own
+    (_, said), _ = refgi(tmp_path, ("render", "cornell_box", *TINY, "--method", "broken", "--out", tmp_path / "a.exr"),
+                         ("settings", "sii"), codes=[2, 0])  # no other package takes the place of refgi's own
+    assert "method broken: nowhere:METHOD cannot be imported" in said

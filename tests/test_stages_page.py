@@ -18,27 +18,26 @@ def loaded(name):
 
 
 @pytest.fixture(scope="module")
-def program():
-    return loaded("stages_page")
+def literal():
+    return loaded("literal_page")
 
 
-def test_the_page_is_that_of_the_code(program):
-    assert (DOCS / "stages.md").read_text(encoding="utf-8") == program.page(), "run python docs/stages_page.py"
+@pytest.fixture(scope="module")
+def papers():
+    return loaded("papers_page")
 
 
-def test_the_page_of_the_literal_text_is_that_of_the_code():
-    literal = loaded("literal_page")
-    assert (DOCS / "literal.md").read_text(encoding="utf-8") == literal.page(), "run python docs/literal_page.py"
+def test_the_page_is_that_of_the_code():
+    page = loaded("stages_page").page()
+    assert (DOCS / "stages.md").read_text(encoding="utf-8") == page, "run python docs/stages_page.py"
 
 
-def test_the_page_of_equations_is_that_of_the_code():
-    literal = loaded("literal_page")
-    assert (DOCS / "equations.md").read_text(encoding="utf-8") == literal.equations_page(), \
-        "run python docs/literal_page.py"
+def test_pages_of_the_literal_text_are_those_of_the_code(literal):
+    for name, page in (("literal", literal.page()), ("equations", literal.equations_page())):
+        assert (DOCS / f"{name}.md").read_text(encoding="utf-8") == page, "run python docs/literal_page.py"
 
 
-def test_every_numbered_equation_has_lines_a_kernel_and_a_test_that_knows_it(evidence):
-    literal = loaded("literal_page")
+def test_every_numbered_equation_has_lines_a_kernel_and_a_test_that_knows_it(literal, evidence):
     rows = {row["name"]: row for row in tomllib.loads((DOCS / "equations.toml").read_text("utf-8"))["equation"]}
     numbered = [re.fullmatch(r"(\w+) Eq\. (\d)(?: (?:to|and) (\d))?", name) for name in rows]
     numbers = [(one[1], number) for one in numbered if one for number in range(int(one[2]), int(one[3] or one[2]) + 1)]
@@ -50,8 +49,7 @@ def test_every_numbered_equation_has_lines_a_kernel_and_a_test_that_knows_it(evi
     evidence(f"{len(rows)} printed equations, {len(kernels)} kernels")
 
 
-def test_few_literal_functions_lack_a_test_that_knows_them_from_elsewhere(evidence):
-    literal = loaded("literal_page")
+def test_few_literal_functions_lack_a_test_that_knows_them_from_elsewhere(literal, evidence):
     tests = {f"{module}.{one.__name__}": found for module in literal.order()
              for one, found in literal.functions(module)}
     bare = sorted(name for name, found in tests.items() if not found)
@@ -89,8 +87,7 @@ def is_there(name):
     return False
 
 
-def test_the_page_of_claims_is_that_of_the_records():
-    papers = loaded("papers_page")
+def test_the_page_of_claims_is_that_of_the_records(papers):
     made = papers.page(tomllib.loads(papers.CLAIMS.read_text(encoding="utf-8")), papers.read(papers.RECORD))
     assert papers.PAGE.read_text(encoding="utf-8") == made, "run python docs/papers_page.py"
     rows = [line for line in made.splitlines() if line.startswith("| ") and not line.startswith("| where")]
@@ -100,8 +97,7 @@ def test_the_page_of_claims_is_that_of_the_records():
 @pytest.mark.parametrize(("printed", "ours", "met"), [
     ("4", 5.0, "yes"), ("4", 5.01, "no"), ("4", 3.2, "yes"), ("4", 3.19, "no"), (">70", 70.0, "no"),
     (">70", 71.0, "yes"), ("<10", 9.0, "yes"), ("<10", 10.0, "no"), ("4", None, "not measured")])
-def test_a_claim_is_met_within_a_quarter_or_on_its_side(printed, ours, met):
-    papers = loaded("papers_page")
+def test_a_claim_is_met_within_a_quarter_or_on_its_side(papers, printed, ours, met):
     assert papers.verdict(printed, ours, "slow") == met
     assert papers.verdict(printed, ours, "fitted: so") == ("fitted" if ours else met)
 
@@ -109,12 +105,11 @@ def test_a_claim_is_met_within_a_quarter_or_on_its_side(printed, ours, met):
 @pytest.mark.parametrize(("why", "ours", "met"), [
     ("GPU", 3.2, "yes"), ("GPU", 3.1, "no"), ("GPU", 9.0, "yes"),
     ("GPU ms", 5.0, "yes"), ("GPU ms", 5.1, "no"), ("GPU ms", 1.0, "yes")])
-def test_what_is_faster_than_a_printed_rate_meets_it(why, ours, met):
-    assert loaded("papers_page").verdict("4", ours, why) == met
+def test_what_is_faster_than_a_printed_rate_meets_it(papers, why, ours, met):
+    assert papers.verdict("4", ours, why) == met
 
 
-def test_a_claim_reads_the_cell_that_it_names():
-    papers = loaded("papers_page")
+def test_a_claim_reads_the_cell_that_it_names(papers):
     tables = [{"columns": ["", "ms"], "rows": [["a", 2.0], ["b", 8.0]]}, {"columns": ["", "fps"], "rows": [["a", 3.0]]}]
     found = {"fig1": {"tables": tables}}
     assert papers.cells(found, "fig1 :: b :: ms") == 8
@@ -126,8 +121,7 @@ def test_a_claim_reads_the_cell_that_it_names():
         papers.cells(found, "fig1 :: a :: s")
 
 
-def test_results_of_a_run_replace_figures_in_the_record():
-    papers = loaded("papers_page")
+def test_results_of_a_run_replace_figures_in_the_record(papers):
     old = {"sii": {"fig1": {"tables": []}, "fig2": {"tables": []}}}
     table = {"title": "t", "columns": ["", "ms"], "rows": [["a", 2.0]], "columns_of_the_paper": []}
     papers.taken_over(old, {"paper": {"name": "sii"}, "scale": {"name": "quick", "size": 256},

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 from benchmarks.mutate.project import DIFFERENT
 from benchmarks.sameness.cases import DEFAULTS, all_cases
-from benchmarks.sameness.picture import hash_of
-from benchmarks.sameness.picture import picture as picture_of_ledger
+from benchmarks.sameness.ledger import hash_of
+from benchmarks.sameness.ledger import picture as picture_of_ledger
 from refgi.errors import RefgiWarning
 from refgi.methods import METHODS
 from refgi.settings import of
@@ -58,9 +58,9 @@ def _wiring() -> Iterator[Picture]:
 
 def _lights() -> Iterator[Picture]:
     """Yield cases of the pixel lights, as `sii` has them."""
-    module = _module("tests.wiring.light_cases")
+    module = _module("tests.wiring.part_cases")
     for name, case in _cases(module, "LIGHT_CASES").items():
-        lights = case.settings(type(SiiSettings().lights), module.BASE)
+        lights = case.settings(type(SiiSettings().lights), module.LIGHT_BASE)
         yield _of_case(f"wiring/lights/{name}", "sii", case, SiiSettings(lights=lights))
 
 

@@ -1,8 +1,20 @@
-"""What is mutated, by which tests it is judged, and by which pictures."""
+"""What is mutated and judged by; scratch copies, the only places where a fault is ever written, and their programs."""
 
-from collections.abc import Mapping
+import compileall
+import contextlib
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from py_compile import PycInvalidationMode
+from typing import NamedTuple, Protocol
 
 DIFFERENT = 3  # exit code of the pictures' program where one is not as before
 
@@ -47,3 +59,137 @@ REFGI = Project(
     pictures="benchmarks.mutate.pictures",
     judging=("benchmarks/sameness", "benchmarks/mutate/pictures.py"),
 )
+
+
+LEFT = (".*", "__pycache__", "out", "_build", "*.egg-info")
+KERNELS = "*.kernel"
+PREFIX = "copy-"
+
+
+class Edited(Protocol):
+    """What is changed in one file."""
+
+    @property
+    def file(self) -> str: ...
+    def put_into(self, text: str) -> str: ...
+
+
+class Scratch:
+    """A copy of a project, with kernels of its own that start as those of all copies.
+
+    Compiled modules of the copy are told by their contents, not by their time: a fault may change no size and come
+    within the same second.
+    """
+
+    def __init__(self, project: Project, folder: Path, kernels: Path, shared: bool = False) -> None:
+        """Make a copy in a folder; `shared` where it holds no faults, so that its kernels are those of all copies."""
+        self.project, self.folder, self._kernels = project, Path(tempfile.mkdtemp(prefix=PREFIX, dir=folder)), kernels
+        self.tree, self._cache = self.folder / "tree", kernels if shared else self.folder / "cache"
+        shutil.copytree(project.root, self.tree, ignore=_ignoring(folder))
+        for place in (kernels, self._cache):
+            place.mkdir(parents=True, exist_ok=True)
+        compileall.compile_dir(self.tree / project.package, quiet=2, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
+
+    @contextlib.contextmanager
+    def with_fault(self, fault: Edited) -> Iterator[None]:
+        """Put a fault into the copy while the block runs, with the kernels of sources without faults."""
+        file = self.tree / fault.file
+        whole = file.read_text()
+        shutil.rmtree(self._cache)
+        self._cache.mkdir()
+        self.share_kernels()
+        file.write_text(fault.put_into(whole))
+        try:
+            yield
+        finally:
+            file.write_text(whole)
+
+    def share_kernels(self) -> None:
+        """Give the copy the kernels that were compiled from sources without faults."""
+        for kernel in self._kernels.glob(KERNELS):
+            with contextlib.suppress(FileExistsError):
+                os.link(kernel, self._cache / kernel.name)
+
+    def compiled(self) -> int:
+        """Return how many kernels the copy has."""
+        return len(list(self._cache.glob(KERNELS)))
+
+    def environment(self) -> Mapping[str, str]:
+        """Return the environment of programs that run in the copy."""
+        return os.environ | {"PYTHONPATH": str(self.tree), "REFGI_CACHE_DIR": str(self._cache),
+                             "PYTHONDONTWRITEBYTECODE": "1"}
+
+    def python(self, *arguments: str | Path) -> list[str]:
+        """Return a command that runs Python without the folder it is called from on its path."""
+        return [sys.executable, "-P", *map(str, arguments)]
+
+
+def remove_copies(folder: Path) -> None:
+    """Remove the copies that earlier runs left in a folder."""
+    for copy in folder.glob(f"{PREFIX}*"):
+        shutil.rmtree(copy, ignore_errors=True)
+
+
+def _ignoring(folder: Path) -> "shutil._IgnoreFunction":  # type: ignore[name-defined]
+    """Leave out what no test needs, and the folder of the copies should it lie within the project."""
+    usual = shutil.ignore_patterns(*LEFT)
+    return lambda where, names: usual(where, names) | {name for name in names
+                                                       if folder.is_relative_to(Path(where, name).resolve())}
+
+
+MEMORY = 12 << 30  # bytes of address space: a fault may ask for any size
+
+
+class Ended(NamedTuple):
+    """How a program ended."""
+
+    code: int | None  # negative: a signal; None: it took too long
+    seconds: float
+
+
+class Programs:
+    """The programs that run at the moment."""
+
+    def __init__(self) -> None:
+        self._running: set[subprocess.Popen[bytes]] = set()
+        self._lock = threading.Lock()
+        self.stopped = False
+
+    def run(self, command: Sequence[str], folder: Path, environment: Mapping[str, str], said: Path,
+            limit: float | None) -> Ended:
+        """Run a command with its words in a file, for `limit` seconds at most."""
+        started = time.monotonic()
+        with said.open("wb") as stream, self._lock:
+            if self.stopped:
+                raise KeyboardInterrupt
+            process = subprocess.Popen(command, cwd=folder, env=dict(environment), stdout=stream,
+                                       stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True)
+            self._running.add(process)
+        if hasattr(resource, "prlimit"):
+            resource.prlimit(process.pid, resource.RLIMIT_AS, (MEMORY, MEMORY))
+        try:
+            code = process.wait(limit)
+        except subprocess.TimeoutExpired:
+            _kill(process)
+            code = None
+        with self._lock:
+            self._running.discard(process)
+        if self.stopped:
+            raise KeyboardInterrupt
+        return Ended(code, time.monotonic() - started)
+
+    def stop(self) -> None:
+        """End every program; none starts any more."""
+        with self._lock:
+            self.stopped = True
+            running = list(self._running)
+        for process in running:
+            _kill(process)
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """End a program and what it started; it leads a process group of its own."""
+    if process.poll() is None:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()

@@ -6,6 +6,7 @@ a run that is interrupted leaves everything up to there. Times are medians of in
 """
 
 import argparse
+import base64
 import time
 import warnings
 from collections.abc import Callable, Sequence
@@ -13,18 +14,107 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
-from benchmarks.papers.records import Entry, Outcome, Paper, Picture, Reproduction, choose, find_paper
-from benchmarks.papers.report import write_report
+from benchmarks.papers.records import (
+    Cell,
+    Entry,
+    Figure,
+    Outcome,
+    Paper,
+    Picture,
+    Ratios,
+    Reproduction,
+    Table,
+    choose,
+    find_paper,
+)
 from benchmarks.papers.workbench import FULL, QUICK, Scale, Workbench
 from refgi.cli.destination import Permission, folder
 from refgi.cli.options import on_threads
 from refgi.cli.session import FAILED, progress, say, table
 from refgi.compare.comparison import require_folder
-from refgi.compare.report import environment, number
+from refgi.compare.report import PAGE as COMMON
+from refgi.compare.report import TIMES, environment, machine, number, templates
 from refgi.errors import RefgiError, RefgiWarning
-from refgi.image import canonical_json, write_exr, write_png, write_text
+from refgi.image import canonical_json, png_bytes, write_exr, write_png, write_text
 from refgi.provenance import plain, program
+
+PAGE = Path(__file__).with_name("page")
+
+
+def write_report(made: Reproduction, folder: Path) -> None:
+    """Write index.html, whole or not at all."""
+    write_text(folder / "index.html", page(made))
+
+
+def page(made: Reproduction) -> str:
+    """Return the page as HTML that refers to nothing outside itself; the same text for equal input."""
+    style = (COMMON / "style.css").read_text("utf-8") + (PAGE / "paper.css").read_text("utf-8")
+    lead = (f"{made.paper.citation}. Its figures and tables, made again and set beside the numbers that were printed. "
+            "Times are ratios within each machine\N{RIGHT SINGLE QUOTATION MARK}s own run.")
+    return templates(PAGE).get_template("paper.html.j2").render(
+        style=Markup(style), script=Markup((PAGE / "lightbox.js").read_text("utf-8")),
+        kind=f"papers · {made.paper.name}", title=made.paper.title, lead=lead, facts=_facts(made),
+        verdict=_verdict(made), failures=[(outcome.entry.label, f"could not be made: {outcome.failure}")
+                                          for outcome in made.outcomes if outcome.figure is None],
+        figures=[_figure(outcome, outcome.figure) for outcome in made.outcomes if outcome.figure is not None],
+        versions=made.environment["versions"], machine=machine(made.environment),
+    )
+
+
+def _facts(made: Reproduction) -> list[str]:
+    scale = made.scale
+    return [f"{scale.name} run", f"{scale.size} {TIMES} {scale.size} pixels",
+            f"shadow maps of {scale.rsm_resolution} {TIMES} {scale.rsm_resolution}",
+            f"medians of {scale.repeats} interleaved rounds", machine(made.environment)]
+
+
+def _verdict(made: Reproduction) -> str:
+    done = len(made.outcomes) - len(made.failures)
+    pending = made.asked - len(made.outcomes)
+    whole = f"{done} of {made.asked} figures and tables made"
+    return f"{whole}; the run ended before the other {pending}." if pending else f"{whole}."
+
+
+def _figure(outcome: Outcome, figure: Figure) -> dict[str, Any]:
+    return outcome.entry._asdict() | {
+        "facts": figure.facts, "notes": figure.notes, "seconds": f"{number(outcome.seconds)} s",
+        "pictures": [_picture(picture) for picture in figure.pictures],
+        "ratios": [_ratios(ratios) for ratios in figure.ratios],
+        "tables": [_table(table) for table in figure.tables],
+        "plots": figure.plots,
+        "settings": [(picture.title, plain(picture.settings)) for picture in figure.pictures if picture.settings],
+    }
+
+
+def _picture(picture: Picture) -> dict[str, Any]:
+    height, width = picture.pixels.shape[:2]
+    return {"title": picture.title, "said": picture.said, "width": width, "height": height,
+            "source": "data:image/png;base64," + base64.b64encode(png_bytes(picture.pixels)).decode("ascii")}
+
+
+def _ratios(ratios: Ratios) -> dict[str, Any]:
+    longest = max((value for bar in ratios.bars for value in bar[1:] if value is not None), default=1.0) or 1.0
+
+    def bar(value: float | None) -> dict[str, str] | None:
+        return None if value is None else {"said": number(value), "share": f"{100 * value / longest:.2f}"}
+
+    return {"title": ratios.title, "bars": [{"label": label, "here": bar(here), "paper": bar(paper)}
+                                            for label, here, paper in ratios.bars]}
+
+
+def _table(table: Table) -> dict[str, Any]:
+    texts = {i for row in table.rows for i, cell in enumerate(row) if i and isinstance(cell, str)}
+    return {"title": table.title, "columns": table.columns, "paper": table.paper, "texts": texts,
+            "rows": [[_cell(cell) for cell in row] for row in table.rows]}
+
+
+def _cell(cell: Cell) -> str:
+    if cell is None:
+        return ""
+    return cell if isinstance(cell, str) else number(cell)
+
 
 SCHEMA = 1
 Progress = Callable[[str, float], None]
@@ -89,7 +179,7 @@ def as_json(made: Reproduction) -> dict[str, Any]:
         "paper": made.paper._asdict(),
         "scale": made.scale,
         "asked": made.asked,
-        "figures": {outcome.entry.key: _figure(outcome) for outcome in made.outcomes},
+        "figures": {outcome.entry.key: _figure_written(outcome) for outcome in made.outcomes},
         "environment": made.environment,
         "failures": made.failures,
         "sound": made.is_sound,
@@ -97,7 +187,7 @@ def as_json(made: Reproduction) -> dict[str, Any]:
     return content
 
 
-def _figure(outcome: Outcome) -> dict[str, Any]:
+def _figure_written(outcome: Outcome) -> dict[str, Any]:
     entry, figure = outcome.entry, outcome.figure
     head = {"label": entry.label, "title": entry.title, "shows": entry.shows, "seconds": outcome.seconds}
     if figure is None:
@@ -107,11 +197,11 @@ def _figure(outcome: Outcome) -> dict[str, Any]:
         "ratios": [{"title": one.title, "bars": [bar._asdict() for bar in one.bars]} for one in figure.ratios],
         "tables": [{"title": one.title, "columns": one.columns, "rows": one.rows,
                     "columns_of_the_paper": [one.columns[index] for index in one.paper]} for one in figure.tables],
-        "pictures": [_picture(outcome, picture) for picture in figure.pictures],
+        "pictures": [_described(outcome, picture) for picture in figure.pictures],
     }
 
 
-def _picture(outcome: Outcome, picture: Picture) -> dict[str, Any]:
+def _described(outcome: Outcome, picture: Picture) -> dict[str, Any]:
     png, exr = _names(outcome, picture)
     return {"title": picture.title, "said": picture.said, "settings": picture.settings,
             "files": [png, exr] if picture.planes else [png]}

@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numba
 
 from benchmarks.sameness import ledger
-from benchmarks.sameness.cases import Case, all_cases
-from benchmarks.sameness.complete import gaps
-from benchmarks.sameness.picture import fault_of, hash_of, picture
+from benchmarks.sameness.cases import Case, all_cases, gaps
+from benchmarks.sameness.ledger import fault_of, hash_of, picture
 from refgi.errors import RefgiWarning
 
 THREADS = 2

@@ -1,14 +1,57 @@
-"""Cases out of the tables: every method on every scene as it is, and every setting changed."""
+"""Cases out of the tables: every method on every scene as it is, every setting changed; and whether none is missing."""
 
+import functools
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from benchmarks.sameness.rows import Row
-from benchmarks.sameness.scenes import scene_names
-from benchmarks.sameness.settings import settings_of
-from benchmarks.sameness.tables import TABLES
+import numpy as np
+
+from benchmarks.sameness.settings import SETS, TRANSLATIONS, choice_of, key_of, names_of, settings_of, translated
+from benchmarks.sameness.splat_tables import GATHER, MULTIRES, SII, TRUTH, VPL, Row, Table
+from benchmarks.sameness.val_hssil_tables import HSSIL, TEMPORAL, VAL
+from refgi import load_scene
 from refgi.errors import InputError
 from refgi.methods import METHODS
+from refgi.scene import Scene
+from refgi.scene.builtin import SCENES as BUILTIN
+from refgi.scene.model import PointLight
+from refgi.scene.motion import faces_of, moved, rotation_about, with_own_vertices
+
+TABLES: dict[str, Table] = {"sii": SII, "multires": MULTIRES, "val": VAL, "hssil": HSSIL, "temporal": TEMPORAL,
+                            "gather": GATHER, "vpl": VPL, "truth": TRUTH}
+
+
+SMALLER = {"atrium": "atrium:faces=20000"}
+MOVING = {"cornell_box": "green", "stage": "glaze"}  # material of what moves
+
+
+def scene_names() -> list[str]:
+    """Return every built-in scene, and the stage with a second, weaker lamp."""
+    return [*BUILTIN, "two_lamps"]
+
+
+@functools.lru_cache(maxsize=4)
+def scene_of(name: str) -> Scene:
+    if name != "two_lamps":
+        return load_scene(SMALLER.get(name, name))
+    stage = load_scene("stage")
+    return stage.with_lights(*stage.lights, PointLight((-0.35, 0.45, 0.3), (0.04, 0.03, 0.05)))
+
+
+def sequence_of(name: str) -> list[Scene]:
+    """Return three frames of a scene in which the camera moves, and from the second on an object."""
+    scene = scene_of(name)
+    selected = faces_of(scene, MOVING[name])
+    own = with_own_vertices(scene.geometry, selected)
+    x, y, z = scene.camera.eye
+    frames = []
+    for number in range(3):
+        turn = rotation_about((0.0, 1.0, 0.0), 0.1 * max(0, number - 1))
+        geometry = moved(own, selected, np.asarray(turn), (0.0, 0.0, 0.0), (0.01 * max(0, number - 1), 0.0, 0.0))
+        frames.append(Scene(scene.name, geometry, scene.materials, scene.camera, scene.lights)
+                      .with_camera(eye=(x + 0.01 * number, y, z)))
+    return frames
+
 
 DTYPES = ("float32", "float64")
 DEFAULTS = {"truth": {"samples": 24}}  # where the default takes long
@@ -98,3 +141,27 @@ def _text(value: Any) -> str:
     if isinstance(value, str):
         return value or "empty"
     return str(value).lower() if isinstance(value, bool) or value is None else repr(value)
+
+
+def gaps() -> list[str]:
+    """Return what no case of the tables covers, and what they name without need."""
+    return [gap for method, table in TABLES.items() for gap in _gaps_of(method, table)]
+
+
+def _gaps_of(method: str, table: Table) -> list[str]:
+    wanted = names_of(method)
+    tried: dict[str, set[object]] = {}
+    for row in table.rows:
+        for value in row.values:
+            companions = row.companions if method in TRANSLATIONS else {}
+            for name, one in translated(method, companions | {row.field: value}).items():
+                key = key_of(method, name)
+                tried.setdefault(key, set()).update(one.split("+") if name in SETS else [one])
+                if chosen := choice_of(method, key):
+                    tried.setdefault(chosen[0], set()).add(chosen[1])
+    excluded = {key_of(method, name) for name in table.excluded}
+    excluded |= {name for name in wanted if name.startswith(table.borrowed)}
+    found = [f"{method}: no case has {name}" for name in wanted if name not in tried and name not in excluded]
+    found += [f"{method}: {name} is no setting" for name in (*tried, *excluded) if name not in wanted]
+    return found + [f"{method}: no case has {name} {value!r}" for name, values in wanted.items()
+                    if name not in excluded for value in sorted(values - tried.get(name, set()), key=str)]

@@ -3,14 +3,48 @@
 from collections.abc import Callable
 from typing import Any, Literal, get_args, get_origin
 
-from benchmarks.sameness.multires_keys import multires_keys
-from benchmarks.sameness.val_keys import val_keys
 from refgi.methods import METHODS
 from refgi.scene import Camera
 from refgi.settings import Settings, choices_of, flat, leaves, replaced
 from refgi.settings.fields import is_choice, may_be_none
 from refgi.settings.keys import PRINTED, SEED, find_key
 from refgi.sssil.temporal import TemporalSettings
+
+KEYS = {"light_threshold": "subsplats.threshold", "threshold_form": "subsplats.form",
+        "refinement": "subsplats.criteria.traversal", "target_error": "subsplats.target"}
+CRITERIA = {"depth": "range", "derivative": "slope", "normal": "range", "curvature": "chord"}
+
+
+def multires_keys(named: dict[str, Any]) -> dict[str, Any]:
+    """Return values by key; "criteria" are joined by "+", and "curvature" is the form of that criterion."""
+    made = {KEYS.get(name, name): value for name, value in named.items()
+            if name not in ("criteria", "curvature", "per_light")}
+    if named.get("per_light", "shared") != "shared":
+        made["subsplats"] = "irradiance"
+    if named.get("per_light") == "shared_then_light":
+        made["subsplats.criteria"] = "geometry"
+    if "target_error" in named:
+        made["subsplats"] = "error"
+    if "criteria" in named:
+        forms = CRITERIA | {"curvature": named.get("curvature", "chord")}
+        chosen = named["criteria"].split("+")
+        made |= {f"subsplats.criteria.{name}": form if name in chosen else "none" for name, form in forms.items()}
+    return made
+
+
+def val_keys(named: dict[str, Any]) -> dict[str, Any]:
+    """Return names of `val` with the choices that they stand for."""
+    made = dict(named)
+    if "target_error" in made:
+        made["clusters"] = "adaptive"
+        made.pop("area_lights", None)
+    if made.get("visibility") == "step":  # its bias is one of a scale, and only without the receiver's plane
+        bias = {"visibility.constant_bias.value": made.pop("bias", None) or 0.0,
+                "visibility.constant_bias.scale": made.pop("depth_scale", "log_map")}
+        if not made.pop("receiver_plane", True):
+            made |= {"visibility.constant_bias": "constant_bias"} | bias
+    return made
+
 
 SETS = ("as_published", "criteria")  # names joined by "+"
 VIEWS = {"cornell_side": Camera((0.5, 0.3, -0.6), (0.2, 0.2, 0.3)),

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.stability.ladder import THREADS, Ladder, each, filled
-from benchmarks.stability.numbers import BLOCK, any_size
+from benchmarks.stability.promise import BLOCK, any_size
 from refgi.elementary import exp2, log2, log2p1, pow
 from refgi.jit import kernel
 from refgi.stress.promises import Row

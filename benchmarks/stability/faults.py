@@ -14,9 +14,9 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks.stability.cache_faults import cold_starts, damaged
+from benchmarks.stability.kills import VICTIMS, Stand, undisturbed
 from benchmarks.stability.promise import Task, Tell
 from benchmarks.stability.victim_host import Host
-from benchmarks.stability.victims import VICTIMS, Stand, undisturbed
 from refgi.stress.promises import Row
 
 AGAIN = "python -m benchmarks stability --part faults --out out/stability"

@@ -22,8 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.stability.file_formats import BESIDE, FORMATS, Format
-from benchmarks.stability.mutations import mutated
+from benchmarks.stability.file_formats import BESIDE, FORMATS, Format, mutated
 
 SECONDS = 10  # of processor time for one file, whatever else the machine does
 PATIENCE = 120  # s by the clock, for a reader that waits for something

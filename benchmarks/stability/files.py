@@ -1,6 +1,6 @@
 """Files: whatever bytes a file has, it is read or refused in lines that name it, in bounded time and memory.
 
-A mutation is a sound file changed at random (`benchmarks.stability.mutations`); a bomb asks for more than it holds
+A mutation is a sound file changed at random (`benchmarks.stability.file_formats`); a bomb asks for more than it holds
 (`benchmarks.stability.bombs`). They are read in processes of their own, so that a crash or a hang is one breach.
 """
 

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from benchmarks.stability import (
-    area_promises,
     buffers,
     elementary_range,
     lamps,
@@ -16,17 +15,15 @@ from benchmarks.stability import (
     pairs,
     places,
     promise,
-    sent_promises,
     sums,
     val,
 )
 from benchmarks.stability.ladder import Ladder, conditions, errors, inputs_of, rows
-from benchmarks.stability.numbers import BLOCK, DIGITS, EXTENDED, digits, trusted
-from benchmarks.stability.promise import Task, Tell
+from benchmarks.stability.promise import BLOCK, DIGITS, EXTENDED, Task, Tell, digits, trusted
 from refgi.stress.promises import Row
 
-MODULES = (pairs, lamps, val, maps, elementary_range, lobes, places, sent_promises)
-PROMISED = (sums, lobes, buffers, map_promises, area_promises, places, sent_promises)  # of stages
+MODULES = (pairs, lamps, val, maps, elementary_range, lobes, places)
+PROMISED = (sums, lobes, buffers, map_promises, places)  # of stages
 ALL = ".all"
 
 

@@ -16,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from benchmarks.stability.numbers import BLOCK, DIGITS, EXTENDED, Precision, block_of, spacing
+from benchmarks.stability.promise import BLOCK, DIGITS, EXTENDED, Precision, block_of, spacing
 from refgi.jit import kernel
 from refgi.stress.promises import Kind, Row
 from refgi.types import Array

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.stability.ladder import Ladder, each_of
-from benchmarks.stability.numbers import BLOCK, across, directions, dot, sizes
+from benchmarks.stability.promise import BLOCK, across, directions, dot, sizes
 from refgi.jit import kernel
 from refgi.literal.light_flux import corner_angle, solid_angle
 from refgi.radiometry import (

@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.stability.ladder import Ladder, each_of
-from benchmarks.stability.numbers import (
+from benchmarks.stability.promise import (
     BLOCK,
     DIGITS,
+    Case,
+    Promise,
     across,
     around,
     complementary_error,
@@ -26,7 +28,6 @@ from benchmarks.stability.numbers import (
     sizes,
     some,
 )
-from benchmarks.stability.promise import Case, Promise
 from refgi.jit import kernel
 from refgi.literal.pairs import LEAST_SHARE
 from refgi.pairs.lobe_culling import LIMIT, bound_lobes

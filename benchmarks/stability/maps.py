@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.stability.ladder import Ladder, each_of
-from benchmarks.stability.numbers import BLOCK, across, directions, dot, sizes
+from benchmarks.stability.promise import BLOCK, across, directions, dot, sizes
 from refgi.jit import kernel
 from refgi.literal.val_maps import direction
 from refgi.rsm.buffers.surfaces import barycentric_axes, image_ray

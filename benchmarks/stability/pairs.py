@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.stability.ladder import SEED, Ladder, each_of, filled, unclamped
-from benchmarks.stability.numbers import BLOCK, across, around, block_of, directions, dot, sizes, some
+from benchmarks.stability.promise import BLOCK, across, around, block_of, directions, dot, sizes, some
 from refgi.jit import kernel
 from refgi.literal.hssil_crown import LEAST, disc_form_factor, point_form_factor, shared_disc_form_factor
 from refgi.literal.pairs import pair

@@ -16,8 +16,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from benchmarks.mutate.project import REFGI
-from benchmarks.mutate.scratch import Scratch, remove_copies
+from benchmarks.mutate.project import REFGI, Scratch, remove_copies
 from benchmarks.stability.runner import PARTS
 from refgi.stress.promises import read_rows
 from refgi.vectors.rows import replaced

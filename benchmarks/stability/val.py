@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.stability.ladder import Ladder, each_of
-from benchmarks.stability.numbers import BLOCK, around, directions, dot, pi_of, sizes
+from benchmarks.stability.promise import BLOCK, around, directions, dot, pi_of, sizes
 from refgi.cluster.filters.basis import DepthScale, fill_basis, series_depths, series_distance, sine_cosine
 from refgi.cluster.rounds import linear
 from refgi.cluster.visibility.csm import compare_filtered, find_penumbra

@@ -1,4 +1,4 @@
-"""What `python -m benchmarks accuracy` writes, and what the repository holds of it."""
+"""What `python -m benchmarks accuracy` writes and the repository holds of it; two results against each other."""
 
 import math
 from collections import Counter
@@ -7,8 +7,10 @@ from pathlib import Path
 import pytest
 
 from benchmarks.accuracy import BUILT_IN, LEVELS, REAL, cheapest_table, error_of, nearest_table
+from benchmarks.before_after import fronts_plot, main, ratio_table
 from refgi.bench.folder import read_result
-from refgi.bench.results import Figures, Run
+from refgi.bench.results import Figures, Result, Run, SceneResult, write_results
+from tests.batch.made import MACHINE
 
 ROOT = Path(__file__).parents[2]
 HELD = ROOT / "benchmarks" / "results"
@@ -19,9 +21,9 @@ def held():
     return read_result(HELD / "results.json")
 
 
-def run(method, seconds, rmse, noise=0.0):
+def run(method, seconds, rmse, noise=0.0, setting=None):
     figures = Figures(rmse=rmse, low=None, high=None, bias=None, spread=None, noise=noise)
-    return Run(method=method, changes=(f"n={seconds:g}",), settings={}, times=(seconds,), stages={},
+    return Run(method=method, changes=(setting or f"n={seconds:g}",), settings={}, times=(seconds,), stages={},
                errors={"truth": figures})
 
 
@@ -71,3 +73,39 @@ def test_each_curve_has_ten_settings_and_its_knee_is_split(held):
             assert sum(part.mean for part in split.parts) == pytest.approx(split.mean, abs=1e-9)
         assert (HELD / "plots" / f"{scene.scene}.svg").is_file()
         assert (HELD / "plots" / f"{scene.scene}_split.svg").is_file()
+
+
+def scene_of(name, runs, line=()):
+    return SceneResult(scene=name, width=8, height=8, covered=64, mean=1.0, truth="known", runs=tuple(runs),
+                       line=tuple(line), failures={})
+
+
+BEFORE = scene_of("box", [run("sii", 0.1, 0.5, setting="lights=1"), run("sii", 0.4, 0.2, setting="lights=2"),
+                          run("sii", 0.2, 0.1, setting="lights=3"), run("val", 1.0, 0.1, setting="lights=9")],
+                  [run("truth", 1.0, 0.3, setting="passes=2")])
+AFTER = scene_of("box", [run("sii", 0.05, 0.5, setting="lights=1"), run("sii", 0.1, 0.2, setting="lights=2"),
+                         run("sii", 0.16, 0.11, setting="lights=3"), run("val", 0.1, 0.05, setting="lights=8")],
+                 [run("truth", 1.5, 0.3, setting="passes=2")])
+
+
+def test_ratios_compare_the_same_settings_alone():
+    rows = ratio_table([BEFORE], [AFTER, scene_of("other", AFTER.runs)]).splitlines()[2:]
+    assert rows == ["| box | sii | 3 | 0.50 | 0.25 to 0.80 | 10 % |",
+                    "| box | path tracer | 1 | 1.50 | 1.50 to 1.50 | 0 % |"]
+
+
+@pytest.mark.slow
+def test_the_plot_has_both_fronts_and_the_path_tracer():
+    svg = fronts_plot(BEFORE, AFTER)
+    assert all(f">{name}<" in svg for name in ("before", "after", "path tracer"))
+
+
+@pytest.mark.slow
+def test_folders_of_scenes_are_read_and_drawn(tmp_path):
+    for name, found in (("before", BEFORE), ("after", AFTER)):
+        folder = tmp_path / name / "box"
+        folder.mkdir(parents=True)
+        write_results(Result(environment=MACHINE, scenes=(found,)), folder)
+    assert main([str(tmp_path / "before"), str(tmp_path / "after"), "--out", str(tmp_path / "out")]) == 0
+    assert (tmp_path / "out" / "ratios.md").read_text().count("| box |") == 2
+    assert (tmp_path / "out" / "box.svg").read_text().startswith("<svg")

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.mutate import baseline, campaign, runner
-from benchmarks.mutate.campaign import Campaign
+from benchmarks.mutate import runner, trial
 from benchmarks.mutate.faults import OPERATORS, all_faults, drawn, is_fault
 from benchmarks.mutate.project import REFGI, Project
 from benchmarks.mutate.results import hash_of
+from benchmarks.mutate.runner import Campaign
 from benchmarks.mutate.selection import tests_of as selected
 from benchmarks.mutate.trial import CAUGHT, INVALID, SAME, SURVIVED, TIMEOUT
 from refgi.errors import InputError
@@ -181,7 +181,7 @@ def test_the_tests_of_a_file():
 
 @pytest.mark.slow
 def test_what_becomes_of_faults(toy, tmp_path, monkeypatch):
-    monkeypatch.setattr(baseline, "COMPILING", 4.0)  # s
+    monkeypatch.setattr(trial, "COMPILING", 4.0)  # s
     (toy.root / "toy/lamps/lamp.py").write_text(LAMP.replace(IF_FAR, LOOP + IF_FAR))
     before = content_of(toy)
     faults = faults_to(toy, "return settings.power", "return 3.0 * falloff(distance)", "if distance >= settings.far:",
@@ -215,8 +215,8 @@ def test_results_hold_while_what_they_rest_on_is_the_same(toy, tmp_path, monkeyp
     caught, survivor = "return settings.power", "return 3.0 * falloff(distance)"
     faults, ran = faults_to(toy, caught, survivor), []
     outcomes(toy, tmp_path / "out", faults)
-    run_tests = campaign.run_tests
-    monkeypatch.setattr(campaign, "run_tests", lambda *arguments: ran.append(arguments) or run_tests(*arguments))
+    run_tests = runner.run_tests
+    monkeypatch.setattr(runner, "run_tests", lambda *arguments: ran.append(arguments) or run_tests(*arguments))
     assert outcomes(toy, tmp_path / "out", faults)[survivor] == (SURVIVED, "lamp")
     assert not ran
     (toy.root / "tests/lamps/test_lamp_power.py").write_text(

@@ -12,8 +12,7 @@ import numpy as np
 from refgi.literal.lights import grid_points, halton_points
 from refgi.literal.warp import warp
 from tests.naive.draws import draw
-from tests.naive.light_maps import maps_of
-from tests.naive.light_paths import walk
+from tests.naive.light_maps import maps_of, walk
 from tests.naive.openness import openness
 from tests.naive.shares import nearest_grid, shares_of
 

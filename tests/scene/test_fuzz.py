@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.stability.mutations import ODD, places, spoiled, with_value
+from benchmarks.stability.file_formats import ODD, places, spoiled, with_value
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene import load_scene
 from tests.scene.samples import FACES, SCENE, glb_bytes, gltf_tree, ply_bytes, write_scene

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.stability.mutations import ODD, places, spoiled, with_value
+from benchmarks.stability.file_formats import ODD, places, spoiled, with_value
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene import load_scene
 from refgi.scene.gltf import read_gltf

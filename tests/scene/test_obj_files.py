@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.stability.mutations import spoiled, with_odd_line, with_odd_token
+from benchmarks.stability.file_formats import spoiled, with_odd_line, with_odd_token
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene import Scene, load_scene
 from refgi.scene.obj import read_obj

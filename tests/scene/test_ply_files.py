@@ -9,7 +9,7 @@ import imageio.v3
 import numpy as np
 import pytest
 
-from benchmarks.stability.mutations import spoiled, with_odd_line, with_odd_token, with_odd_word
+from benchmarks.stability.file_formats import spoiled, with_odd_line, with_odd_token, with_odd_word
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene import load_scene
 from refgi.scene.files import reading_as

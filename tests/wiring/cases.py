@@ -7,7 +7,7 @@ from the settings classes, so that a new field without a case fails.
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Literal, get_args, get_origin
 
@@ -22,6 +22,7 @@ from tests.sssil.hidden_side import hidden_side
 from tests.truth.scenes import rectangle
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
+COUNTS = 1e-3  # of the brightest pixel, that a key changes at least
 # strongest and weakest differ by a factor of 8 and in hue, so that neither order nor channel can be mistaken
 LAMPS = (
     SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.4, 0.8, (4.0, 2.6, 1.3)),
@@ -145,6 +146,21 @@ SCENES = {
     "ball": lambda: room(*LAMPS, smooth=True).with_camera(eye=(0.9, 0.6, 0.4), target=(0.3, 0.35, -0.2)),
     "matte": lambda: room(*LAMPS, matte=True),
 }
+
+
+def assert_each_key_counts(
+    case: Case, kind: type, picture_of: Callable[[Frame, Any], Any], base: Mapping[str, Any] = NOTHING,
+    frame: Frame | None = None, same: float = 0.0,
+) -> None:
+    """Expect another picture with each key put back to its default, or where the case says why the same one.
+
+    Differences are shares of the brightest pixel.
+    """
+    frame = case.seen() if frame is None else frame
+    picture = picture_of(frame, case.settings(kind, base))
+    for key, other in case.without(kind, base):
+        change = np.abs(picture_of(frame, other) - picture).max() / picture.max()
+        assert change <= same if case.same else change > COUNTS, (key, change)
 
 
 def under(part: str, cases: Mapping[str, Case], base: Mapping[str, Any] = NOTHING) -> dict[str, Case]:

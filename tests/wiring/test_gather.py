@@ -10,14 +10,13 @@ from refgi.scene import DirectionalLight, SpotLight
 from refgi.splat import GatherSettings, Receivers, gather
 from refgi.splat.gather.gather import gather_counted, gather_irradiance
 from tests.literal.whole import gather as naive
-from tests.wiring.cases import LAMPS, SCENES, Case, uncovered
+from tests.wiring.cases import LAMPS, SCENES, Case, assert_each_key_counts, uncovered
 from tests.wiring.features import GATHER, featured
 from tests.wiring.fold import fold
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 ROUNDING = 1e-9  # of the brightest pixel
-SEEN = 1e-3  # of the brightest pixel, what a setting changes at least
 
 BASE = {"disc.samples": 24, "interpolation.grid": 5}
 EVERY = {"interpolation.grid": 17}  # every pixel runs the sum
@@ -52,14 +51,13 @@ def test_the_literal_text(name):
 
 @pytest.mark.parametrize("name", CASES)
 def test_each_key_counts(name):
-    case = CASES[name]
-    check_each_key(case, BASE)
+    assert_each_key_counts(CASES[name], GatherSettings, gather, BASE)
 
 
 def test_without_interpolation():
     """The default's grid has 64 places a side, so the picture has more."""
     check(EXACT.seen(), EXACT.settings(GatherSettings))
-    check_each_key(EXACT, {})
+    assert_each_key_counts(EXACT, GatherSettings, gather)
 
 
 def check(frame, settings):
@@ -70,14 +68,6 @@ def check(frame, settings):
     np.testing.assert_array_equal(gather(frame, settings), got.irradiance)
     assert got.evaluated == ran
     assert got.covered == np.count_nonzero(frame.gbuffer.covered)
-
-
-def check_each_key(case, base):
-    frame = case.seen()
-    picture = gather(frame, case.settings(GatherSettings, base))
-    for key, settings in case.without(GatherSettings, base):
-        change = np.abs(gather(frame, settings) - picture).max() / picture.max()
-        assert change > SEEN, key
 
 
 def test_likeness_is_a_share_of_what_is_seen():

@@ -1,19 +1,27 @@
-"""Which pixel lights there are: every setting against the twin that chooses light by light, and their footprints."""
+"""Which pixel lights there are: every setting against the twin that chooses light by light, and their footprints.
+
+Each method sums those that the settings choose.
+"""
 
 from functools import cache
 
 import numpy as np
 import pytest
 
+from refgi.cluster import ValSettings, val
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import LightSettings
 from refgi.pairs.settings import PairSettings
 from refgi.rsm import incident_flux
 from refgi.settings import of
+from refgi.splat import MultiresSettings, SiiSettings, multires, sii
+from refgi.stages import observe
+from refgi.truth.vpl import VplSettings, vpl
 from tests.naive.lights import drawn, pixel_lights
-from tests.wiring.cases import uncovered
+from tests.wiring.cases import uncovered, under
 from tests.wiring.features import LIGHTS, featured
-from tests.wiring.light_cases import BASE, LIGHT_CASES
+from tests.wiring.fold import fold
+from tests.wiring.part_cases import LIGHT_BASE, LIGHT_CASES
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 EXACT = 1e-9  # of the largest: sums of some thousand float64 numbers in another order
@@ -24,16 +32,21 @@ SHOWS = 1e-3  # of the largest: what a setting changes at least
 FOOTPRINTS = of(PairSettings, clamp="disc")  # a clamp that needs them
 PLACES = ("position", "normal", "lobe_axis")
 FIELDS = ("position", "normal", "flux", "lobe_flux", "lobe_axis", "lobe_exponent")
+METHODS = {"sii": (sii, SiiSettings, {}), "multires": (multires, MultiresSettings, {}),
+           "val": (val, ValSettings, {"clusters.count": 3, "maps.resolution": 8, "interleaving.block": 1}),
+           "vpl": (vpl, VplSettings, {"visibility": False})}
+SUMS = ("pairs.sum", "multires.evaluate", "cluster.irradiance", "vpl.light")
+FOLDED = under("lights", fold(LightSettings, LIGHT_CASES, LIGHT_BASE, elsewhere=("",)))
 
 
 def test_every_field_has_a_case():
-    assert not uncovered(LightSettings, LIGHT_CASES, BASE)
+    assert not uncovered(LightSettings, LIGHT_CASES, LIGHT_BASE)
 
 
 @pytest.mark.parametrize("name", featured(LIGHT_CASES, LIGHTS))
 def test_the_lights_are_those_of_the_twin(name):
     case = LIGHT_CASES[name]
-    settings = case.settings(LightSettings, BASE)
+    settings = case.settings(LightSettings, LIGHT_BASE)
     got, expected = chosen(case, settings), by_the_twin(case, settings)
     assert got.keys() == expected.keys()
     for field, values in expected.items():
@@ -44,8 +57,8 @@ def test_the_lights_are_those_of_the_twin(name):
 @pytest.mark.parametrize("name", LIGHT_CASES)
 def test_each_key_counts(name):
     case = LIGHT_CASES[name]
-    lights = chosen(case, case.settings(LightSettings, BASE))
-    for key, other in case.without(LightSettings, BASE):
+    lights = chosen(case, case.settings(LightSettings, LIGHT_BASE))
+    for key, other in case.without(LightSettings, LIGHT_BASE):
         assert differ(lights, chosen(case, other)) >= SHOWS, key
 
 
@@ -104,3 +117,20 @@ def differ(lights, others):
     """Return by how much the flux or places of lights differ; by all where there are not as many."""
     return max(1.0 if lights[field].shape != others[field].shape else apart(lights[field], others[field])
                for field in FIELDS)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", featured(FOLDED, LIGHTS))
+def test_the_method_sums_the_chosen_lights(name, method):
+    function, kind, over = METHODS[method]
+    case = FOLDED[name]
+    settings = case.settings(kind, {f"lights.{key}": value for key, value in LIGHT_BASE.items()} | over)
+    frame = case.seen()
+    with observe(record=True) as log:
+        function(frame, settings)
+    expected = choose_lights(frame, settings.lights)
+    summed = [run.arguments["lights"] for run in log.runs if run.name in SUMS]
+    assert summed
+    for lights in summed:
+        for field in FIELDS:
+            np.testing.assert_array_equal(getattr(lights, field), getattr(expected, field), err_msg=field)

@@ -2,7 +2,7 @@
 
 import dataclasses
 import sys
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 import pytest
@@ -21,11 +21,10 @@ from tests.literal.whole import multires as literal
 from tests.literal.whole import val as clustered
 from tests.literal.whole.pairs import occluded_of, with_clamp
 from tests.naive.shares import nearest_grid, shares_of
-from tests.wiring.cases import Case, needed, uncovered, under
+from tests.wiring.cases import Case, assert_each_key_counts, needed, uncovered, under
 from tests.wiring.features import MULTIRES, featured
 from tests.wiring.fold import fold
-from tests.wiring.pair_cases import OCCLUSION_CASES, PAIR_CASES
-from tests.wiring.shadow_cases import shadow_cases
+from tests.wiring.part_cases import OCCLUSION_CASES, PAIR_CASES, shadow_cases
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
 
@@ -33,7 +32,6 @@ ROUNDING = 1e-9  # of the brightest pixel
 SHADOWS_OF_RAYS = 2e-6  # the same, where depths come from rays in float32
 RAYS = 1e-5  # receivers of shadow rays are float32
 SPHERES = 1e-4  # of a light on its axis: slices of a cone by a Gauss rule (docs/methods/sii_sum)
-LEAST = 1e-3  # of the brightest pixel, that a key must change
 
 BASE = {"lights.count": 30, "subsplats.coarsest": 3}
 BARE = {"subsplats.criteria.depth": None, "subsplats.criteria.normal": None}
@@ -233,7 +231,7 @@ def under_shadows(frame, settings):
 
 def test_every_field_has_a_case():
     """Property: no setting of the method's own is without a case."""
-    assert not uncovered(MultiresSettings, ALL, BASE) - set(needed(LightSettings))  # those: test_lights, test_shared
+    assert not uncovered(MultiresSettings, ALL, BASE) - set(needed(LightSettings))  # those: test_lights
 
 
 @pytest.mark.parametrize("name", featured(FOLDED, MULTIRES))
@@ -286,12 +284,7 @@ def sums(frame, settings):
 @pytest.mark.parametrize("name", ALL)
 def test_each_key_counts(name):
     """Property: a key put back to its default makes another picture, unless the case says why not."""
-    case = ALL[name]
-    render = partial(multires, frame_of(case))
-    light = render(case.settings(MultiresSettings, BASE))
-    for key, other in case.without(MultiresSettings, BASE):
-        change = np.abs(render(other) - light).max() / light.max()
-        assert change <= TOLERANCE.get(name, 0.0) if case.same else change > LEAST, (key, change)
+    assert_each_key_counts(ALL[name], MultiresSettings, multires, BASE, frame_of(ALL[name]), TOLERANCE.get(name, 0.0))
 
 
 def cut(error=None, **keys):

@@ -19,17 +19,16 @@ from refgi.stages import Memory, reusing
 from tests.literal.whole import sii as literal
 from tests.literal.whole.pairs import occluded_of, with_clamp
 from tests.naive import ledger
-from tests.wiring.cases import SCENES, Case, needed, uncovered, under
+from tests.wiring.cases import SCENES, Case, assert_each_key_counts, needed, uncovered, under
 from tests.wiring.features import SII, featured
 from tests.wiring.fold import fold
-from tests.wiring.pair_cases import OCCLUSION_CASES, PAIR_CASES
+from tests.wiring.part_cases import OCCLUSION_CASES, PAIR_CASES
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 ROUNDING = 1e-9  # of the brightest pixel
 SLICES = 1e-5  # of the brightest pixel: the Gauss rule of cut cones is off by up to 1e-4 of a light on its axis
 ORDER = {"clusters": 1e-14, "clusters at half the resolution": 1e-14}  # of the lights: clusters sort them
-SEEN = 1e-3  # of the brightest pixel, what a setting changes at least
 
 BASE = {"lights.count": 40}
 CUT = {"reach.cut": "relative", "reach.cut.reference_length": 0.5}
@@ -165,12 +164,7 @@ def test_the_literal_text(name):
 
 @pytest.mark.parametrize("name", CASES)
 def test_each_key_counts(name):
-    case = CASES[name]
-    frame = case.seen()
-    picture = sii(frame, case.settings(SiiSettings, BASE))
-    for key, settings in case.without(SiiSettings, BASE):
-        change = np.abs(sii(frame, settings) - picture).max() / picture.max()
-        assert change <= ORDER.get(name, 0.0) if case.same else change > SEEN, key
+    assert_each_key_counts(CASES[name], SiiSettings, sii, BASE, same=ORDER.get(name, 0.0))
 
 
 @pytest.mark.parametrize("half", [False, True])
@@ -211,7 +205,7 @@ def test_a_tree_is_kept_while_lights_rest():
     status = []
     for moved in (scene, scene.with_camera(eye=(0.1, *scene.camera.eye[1:])), scene.with_lights(scene.lights[0])):
         with reusing(memory) as runs:
-            sii(Frame(moved, width=17, height=13, rsm_resolution=16), base)
+            sii(Frame(moved, width=17, height=13, rsm_resolution=16, dtype=np.float64), base)
         status += [run.status for run in runs if run.name == "pairs.light_tree"]
     assert status == ["ran", "reused", "ran"]
 

@@ -12,16 +12,14 @@ from refgi.stages import observe
 from tests.literal.whole import val as clustered
 from tests.literal.whole.multires import coarsest_level
 from tests.literal.whole.pairs import with_clamp
-from tests.wiring.cases import Case, needed, uncovered, under
+from tests.wiring.cases import Case, assert_each_key_counts, needed, uncovered, under
 from tests.wiring.features import VAL, featured
 from tests.wiring.fold import fold
-from tests.wiring.pair_cases import PAIR_CASES
-from tests.wiring.shadow_cases import FEW, few, shadow_cases
+from tests.wiring.part_cases import FEW, PAIR_CASES, few, shadow_cases
 
 ROUNDING = 1e-9  # of the brightest pixel: float64 in another order
 FLOAT32_RAYS = 2e-6  # the same, where depths come from rays in float32: a few times 6e-8
 SLICES = 1e-5  # the same: the Gauss rule of cut cones is off by up to 1e-4 of a light on its axis
-COUNTS = 1e-3  # of the brightest pixel: a key that is not heeded
 
 BASE = {"lights": 48, "maps": 16, "interleaving": 1}
 BLOCKS = {"interleaving": 4}
@@ -58,21 +56,13 @@ pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # wh
 
 
 def test_every_field_has_a_case():
-    elsewhere = set(needed(LightSettings))  # test_lights, test_shared
+    elsewhere = set(needed(LightSettings))  # test_lights
     assert not uncovered(ValSettings, CASES | PROMISES, BASE) - elsewhere
 
 
 @pytest.fixture(autouse=True)
 def subsplats_in_small_pictures(monkeypatch):
     monkeypatch.setattr(sys.modules["refgi.cluster.val"], "FEW_PIXELS", 0)
-
-
-@pytest.fixture(scope="module", params=CASES)
-def made(request):
-    """Return the case with its frame, settings and picture."""
-    case = CASES[request.param]
-    frame, settings = case.seen(), case.settings(ValSettings, BASE)
-    return case, frame, settings, val(frame, settings)
 
 
 @pytest.mark.parametrize("name", featured(FOLDED, VAL))
@@ -102,23 +92,12 @@ def test_the_promise(name, evidence):
     assert np.abs(off[:, finest]).max() <= ROUNDING * full.max()
 
 
-@pytest.mark.parametrize("name", PROMISES)
-def test_each_key_of_subsplats_counts(name):
-    frame = PROMISES[name].seen()
-    picture = val(frame, PROMISES[name].settings(ValSettings, BASE))
-    for _, settings in PROMISES[name].without(ValSettings, BASE):
-        assert np.abs(picture - val(frame, settings)).max() > COUNTS * picture.max()
-
-
 def tolerance(settings):
     if settings.maps.renderer == "rays":
         return FLOAT32_RAYS
     return SLICES if settings.pairs.clamp is not None and settings.pairs.clamp.name() == "sphere" else ROUNDING
 
 
-def test_each_key_counts(made, evidence):
-    case, frame, _, picture = made
-    for key, settings in case.without(ValSettings, BASE):
-        change = np.abs(picture - val(frame, settings)).max() / picture.max()
-        evidence(f"{key}: {change:.1e} of the brightest pixel")
-        assert (change > COUNTS) == (not case.same)
+@pytest.mark.parametrize("name", CASES | PROMISES)
+def test_each_key_counts(name):
+    assert_each_key_counts((CASES | PROMISES)[name], ValSettings, val, BASE, same=FLOAT32_RAYS)

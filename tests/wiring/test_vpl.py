@@ -9,12 +9,11 @@ from refgi.lights.selection import choose_lights
 from refgi.lights.settings import LightSettings
 from refgi.truth.vpl import VplSettings, vpl
 from tests.literal.whole.vpl import picture as twin
-from tests.wiring.cases import Case, needed, uncovered
+from tests.wiring.cases import Case, assert_each_key_counts, needed, uncovered
 from tests.wiring.features import VPL, featured
 from tests.wiring.fold import fold
 
 SINGLE = 2e-6  # of the brightest pixel: rays and what they carry are float32, some 30 roundings of 6e-8
-COUNTS = 1e-3  # of the brightest pixel: a key that is not heeded
 BASE = {"lights": 60}
 FEW_POINTS = {"maps.points": 300, "maps.resolution": 16}  # for the twin's loops
 
@@ -53,15 +52,7 @@ FOLDED = fold(VplSettings, CASES, BASE, fits=known) | {
 
 
 def test_every_field_has_a_case():
-    assert not uncovered(VplSettings, CASES, BASE) - set(needed(LightSettings))  # those: test_lights, test_shared
-
-
-@pytest.fixture(scope="module", params=CASES)
-def made(request):
-    """Return the case with its frame, settings and picture."""
-    case = CASES[request.param]
-    frame, settings = case.seen(), case.settings(VplSettings, BASE)
-    return case, frame, settings, vpl(frame, settings)
+    assert not uncovered(VplSettings, CASES, BASE) - set(needed(LightSettings))  # those: test_lights
 
 
 @pytest.mark.parametrize("name", featured(FOLDED, VPL))
@@ -75,12 +66,9 @@ def test_the_literal_text(name, evidence):
     assert off < SINGLE
 
 
-def test_each_key_counts(made, evidence):
-    case, frame, _, picture = made
-    for key, settings in case.without(VplSettings, BASE):
-        change = np.abs(picture - vpl(frame, settings)).max() / picture.max()
-        evidence(f"{key}: {change:.1e} of the brightest pixel")
-        assert change == 0 if case.same else change > COUNTS
+@pytest.mark.parametrize("name", CASES)
+def test_each_key_counts(name):
+    assert_each_key_counts(CASES[name], VplSettings, vpl, BASE)
 
 
 def test_no_more_pairs_are_held_than_asked_for():

@@ -15,8 +15,7 @@ from benchmarks.papers.multires.error import (
     two_pictures,
 )
 from benchmarks.papers.multires.rates import by_lights, by_scene, by_threshold
-from benchmarks.papers.multires.receivers import glossy_receivers
-from benchmarks.papers.multires.speed import flight
+from benchmarks.papers.multires.speed import flight, glossy_receivers
 from benchmarks.papers.multires.subjects import BUDDHA, BUNNIES, DRAGON, TEAPOT
 from benchmarks.papers.multires.subsplats import of_each_light, passes, upsampling, upsampling_passes
 from benchmarks.papers.records import Case, Entry

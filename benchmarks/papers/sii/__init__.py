@@ -8,11 +8,9 @@ as in the paper's Figure 8 (125 of 768). The colour plates are cited by the text
 from functools import partial
 
 from benchmarks.papers.records import Case, Entry
-from benchmarks.papers.sii.bounds import isosurfaces
 from benchmarks.papers.sii.cuts import cut_off, gathering, overdraw, scaled_fluxes, scaled_pictures
 from benchmarks.papers.sii.lights import caustics, instant_radiosity, warped
-from benchmarks.papers.sii.subjects import BOX, CAUSTIC
-from benchmarks.papers.sii.times import moving_and_resting, warp_alone
+from benchmarks.papers.sii.subjects import BOX, CAUSTIC, isosurfaces, moving_and_resting, warp_alone
 from refgi.settings import replaced
 
 COURT = "atrium:faces=50000"

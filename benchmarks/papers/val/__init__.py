@@ -8,8 +8,7 @@ from functools import partial
 
 from benchmarks.papers.records import Entry
 from benchmarks.papers.val.clusters import criteria, one_by_one, to_the_ceiling
-from benchmarks.papers.val.error import by_area_lights
-from benchmarks.papers.val.frames import four_scenes, one_frame, steps
+from benchmarks.papers.val.frames import by_area_lights, four_scenes, one_frame, steps
 from benchmarks.papers.val.moving import changing_topology, walking
 from benchmarks.papers.val.shadows import View, behind_a_light, failures, small_and_large, soft_and_crisp
 from benchmarks.papers.val.subjects import AREA_LIGHTS, ATRIUM, BLOB, BOX, CORNER, HORSE

@@ -17,7 +17,7 @@ from benchmarks.stability.faults import (
     unclear,
     writers_faults,
 )
-from benchmarks.stability.victims import VICTIMS, Victim
+from benchmarks.stability.kills import VICTIMS, Victim
 from refgi.errors import InputError, RefgiWarning
 from refgi.jit import cache, kernelfile
 

@@ -12,8 +12,7 @@ import pytest
 from benchmarks.stability import files, written_promises
 from benchmarks.stability.bombs import BOMBS, exr_bytes
 from benchmarks.stability.file_child import BOMB, MOST_BYTES, Breach, breach_of, kinds, read_in_children, unclear
-from benchmarks.stability.file_formats import FORMATS, Format
-from benchmarks.stability.mutations import mutated
+from benchmarks.stability.file_formats import FORMATS, Format, mutated
 from refgi.errors import LONGEST_MESSAGE, InputError, first_faults
 from refgi.image import read_exr
 from refgi.scene import load_scene

@@ -10,7 +10,7 @@ from benchmarks.stability import again, elementary_range, kernels, pairs, places
 from benchmarks.stability import ladder as ladders
 from benchmarks.stability.kernels import tasks
 from benchmarks.stability.ladder import conditions, errors, inputs_of, measure, rows
-from benchmarks.stability.numbers import (
+from benchmarks.stability.promise import (
     BLOCK,
     DIGITS,
     EXTENDED,

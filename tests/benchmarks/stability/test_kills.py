@@ -9,8 +9,7 @@ import time
 import pytest
 
 from benchmarks.stability import kills
-from benchmarks.stability.kills import Found, asked, killed, prepared, rows_of
-from benchmarks.stability.victims import VICTIMS, Victim
+from benchmarks.stability.kills import VICTIMS, Found, Victim, asked, killed, prepared, rows_of
 from refgi.image import write_text
 from refgi.image.whole import TEMPORARY, is_dead, remove_dead, temporary_name, whole_file
 
@@ -92,7 +91,7 @@ def write(path):
 @pytest.fixture(autouse=True)
 def _fake(monkeypatch):
     monkeypatch.setitem(VICTIMS, "fake", Victim(["work"], patch=COMMAND, before=("old",)))
-    monkeypatch.setattr("benchmarks.stability.victims.digest", lambda file: file.read_text())
+    monkeypatch.setattr("benchmarks.stability.kills.digest", lambda file: file.read_text())
 
 
 @pytest.mark.slow

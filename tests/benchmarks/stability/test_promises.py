@@ -10,7 +10,6 @@ import pytest
 
 from benchmarks.stability import (
     again,
-    area_promises,
     buffers,
     kernels,
     lobes,
@@ -18,7 +17,6 @@ from benchmarks.stability import (
     places,
     promise,
     rays,
-    sent_promises,
     shadows,
     sums,
     written_promises,
@@ -188,8 +186,8 @@ def floor_of(of, share):
 
 
 real = {name: getattr(module, name) for module, name in (
-    (sums, "importance_pyramid"), (sums, "gather_discs"), (sent_promises, "light_rays"),
-    (sent_promises, "walk_lights"), (area_promises, "area_lights"), (area_promises, "shadow_maps"),
+    (sums, "importance_pyramid"), (sums, "gather_discs"), (places, "light_rays"),
+    (places, "walk_lights"), (map_promises, "area_lights"), (map_promises, "shadow_maps"),
     (places, "surface_levels"), (places, "reproject"), (written_promises, "tone_map"), (sums, "irradiance"),
     (lobes, "norms"), (map_promises, "project"), (map_promises, "spot_power"), (map_promises, "directional_projection"),
     (map_promises, "draw_paraboloids"), (shadows, "receivers"), (shadows, "shadowed_sum"), (Tracer, "fill_closest"),
@@ -205,11 +203,11 @@ FAULTS = {
     "map from the left": ("importance.warp", module("refgi.lights.warp"), "_choose_map", from_the_left),
     "rows beside their texel": ("importance.warp", module("refgi.lights.warp"), "_clamped_to_texel",
                                 lambda row, rows: np.minimum(np.nextafter(row / rows, 1), 1 - 2.0**-53)),
-    "directions of float32": ("sent.spot", sent_promises, "light_rays", single_rays),
-    "lights off": ("sent.walk", sent_promises, "walk_lights", slightly_off),
-    "not lifted from where it is": ("sent.lift", sent_promises, "lift", lambda *one: ray_offset(*one[2], one[4])),
-    "areas in metres": ("val.rectangles", area_promises, "area_lights", metric_areas),
-    "maps of the whole file": ("val.maps", area_promises, "shadow_maps",
+    "directions of float32": ("sent.spot", places, "light_rays", single_rays),
+    "lights off": ("sent.walk", places, "walk_lights", slightly_off),
+    "not lifted from where it is": ("sent.lift", places, "lift", lambda *one: ray_offset(*one[2], one[4])),
+    "areas in metres": ("val.rectangles", map_promises, "area_lights", metric_areas),
+    "maps of the whole file": ("val.maps", map_promises, "shadow_maps",
                                lambda *arguments, **_: real["shadow_maps"](*arguments)),
     "cells in metres": ("blends.unit", places, "surface_levels", on_a_grid),
     "origin forgotten": ("reproject.origin", places, "reproject",

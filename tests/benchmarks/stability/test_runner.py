@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.stability import pictures, runner, sameness
-from benchmarks.stability.hostile import Hostile, hostile, shrunk
+from benchmarks.stability.pictures import Hostile, hostile, shrunk
 from benchmarks.stability.promise import Task
 from refgi.stress.promises import Row, over_scenes
 

@@ -12,7 +12,7 @@ from refgi.literal.hssil_levels import first_level
 from refgi.literal.upsampling import joint_bilateral
 from refgi.settings import replaced
 from tests.literal.whole.pairs import irradiance_of, occluded_of, sent
-from tests.naive.bound_mesh import drawn
+from tests.naive.bounds import drawn
 from tests.naive.draws import draw
 
 STREAMS = 3, 3 + 256  # of the random shares of both parts

@@ -26,7 +26,6 @@ from refgi.splat.sii.reach.bounds import (
     tiles_of_quads,
 )
 from refgi.splat.sii.reach.lists import list_lights, pack_solids
-from tests.naive import bound_mesh as naive_mesh
 from tests.naive import bounds as naive
 from tests.pairs import sets
 from tests.splat.sii.reach.regions import in_ellipsoid, significant_radius, waste
@@ -193,7 +192,7 @@ def test_the_depth_test_leaves_what_lies_in_the_mesh(exponent, evidence):
     kept = drawn = 0
     for k, faces in itertools.product(range(len(square)), (8, 80)):
         radius = math.sqrt(square[k])
-        bodies = naive_mesh.bodies(place[:, k], axis[:, k], exponent, radius, min(radius, 0.2), faces)
+        bodies = naive.bodies(place[:, k], axis[:, k], exponent, radius, min(radius, 0.2), faces)
         outside = np.min([out_of(body.reshape(-1, 3, 3), seen) for body in bodies], axis=0).reshape(VIEW.shape)
         covered, left = (covered_pixels(VIEW, solids, k, faces, False, given) for given in (None, 1 / depth))
         sure = np.abs(outside) > NEAR_A_FACE

@@ -21,7 +21,7 @@ from refgi.errors import expect
 from refgi.image import canonical_json
 from refgi.methods import METHODS
 from refgi.provenance import plain, versions
-from refgi.provenance.content import geometry_digest, light_json, materials_digest
+from refgi.provenance.record import geometry_digest, light_json, materials_digest
 from refgi.scene import Scene, load_scene
 from refgi.scene.path import scenes_along
 from refgi.scene.pathfile import read_path

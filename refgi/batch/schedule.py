@@ -29,12 +29,13 @@ from typing import Any, NamedTuple
 
 from refgi.batch.jobs import Job, reference_settings, scene_at
 from refgi.batch.outcome import failed, is_done, write_outcome
-from refgi.batch.shared import Common, Tell, within
+from refgi.batch.shared import Common, within
 from refgi.batch.work import Chunk, forget, run_chunk
 from refgi.bench.grid import TRUTH
 from refgi.errors import InputError, RefgiError, RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import METHODS
+from refgi.types import Tell
 
 SECONDS_BETWEEN_LOOKS = 0.5
 DIED = "its process died: out of memory, or a fault of compiled code"

@@ -16,10 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from refgi import stages
-from refgi.batch.buffers import BUFFERS, Buffers, hashes_of
 from refgi.batch.jobs import Job, Shot, picture_of, scene_at
 from refgi.batch.outcome import Outcome, failed, is_done, write_outcome
-from refgi.batch.shared import Common, Shared, Tell, within
+from refgi.batch.shared import BUFFERS, Buffers, Common, Shared, hashes_of, within
 from refgi.bench.grid import TRUTH
 from refgi.bench.measure import Made, judged, timed, with_seed
 from refgi.compare.outcome import UNOCCLUDED
@@ -32,7 +31,7 @@ from refgi.method import Method
 from refgi.methods import METHODS
 from refgi.provenance import Record, plain
 from refgi.sssil.temporal.filter import Filtered, History, first_light, history_of, temporal_filter, with_frames
-from refgi.types import Array
+from refgi.types import Array, Tell
 
 
 class _Left(NamedTuple):

@@ -16,7 +16,7 @@ import heapq
 import math
 import statistics
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from refgi.bench.error import error_of, without_noise
@@ -26,6 +26,7 @@ from refgi.errors import RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.scene import Scene
 from refgi.truth import TruthSettings
+from refgi.types import Tell
 
 STRIDE = 4  # rungs from probe to probe: a factor of 4
 SLACK = 3.0  # a probe may take as many times as long as what meets the wish: small pictures tell times roughly
@@ -204,7 +205,6 @@ def _by_time(probes: Iterable[Probe]) -> tuple[Probe, ...]:
     return tuple(sorted(probes, key=lambda one: one.seconds))
 
 
-Tell = Callable[[str, float], None]
 
 SMALL = 128  # pixels along the longer side of the small picture
 SMALL_ROUNDS = 2

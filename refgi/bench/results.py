@@ -102,7 +102,7 @@ class Figures(_Strict):
 
 
 class Work(_Strict):
-    """What a frame takes beside time (`refgi.bench.work`)."""
+    """What a frame takes beside time (`refgi.bench.measure`)."""
 
     pairs: int  # of light, or other sender, and receiver that sums are given, before skips within a sum
     rays: int  # traced

@@ -21,7 +21,7 @@ import dataclasses
 import math
 import warnings
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -42,9 +42,7 @@ from refgi.provenance.frames import StillFrames
 from refgi.scene import Scene
 from refgi.sssil.temporal import still_frame
 from refgi.truth import TruthResult, TruthSettings, trace_truth
-from refgi.types import Array
-
-Tell = Callable[[str, float], None]
+from refgi.types import Array, Tell
 
 REST = "rest"
 REST_ABOUT = "what is left with all of them switched off: texels of maps, pixels for surfaces"

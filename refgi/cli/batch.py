@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from refgi.batch.plan import Finding, Plan
     from refgi.batch.shared import Common
     from refgi.bench.results import Result
-    from refgi.cli.session import Tell
+    from refgi.types import Tell
 
 
 class Done(NamedTuple):
@@ -240,7 +240,7 @@ def _since(jobs: "list[Job]", commit: str | None) -> "list[Job]":
     """Return the jobs of methods whose code changed since a commit; all where there is none."""
     if commit is None:
         return jobs
-    from refgi.batch.changes import changed_methods
+    from refgi.batch.code import changed_methods
 
     names = dict.fromkeys(job.choice.method for job in jobs)
     changed = changed_methods(names, commit)

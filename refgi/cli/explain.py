@@ -12,19 +12,20 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from refgi.cli.options import machine, shadows, speech, view
-from refgi.cli.session import DONE, FAILED, Session, Tell, table
+from refgi.cli.session import DONE, FAILED, Session, table
 from refgi.cli.settings import preset
 
 if TYPE_CHECKING:
     from refgi.bench.skips import SkipReport
     from refgi.scene import Light, Scene
     from refgi.stages import Memory, Run
+    from refgi.types import Tell
 
 CLOCKS = {"wall": time.perf_counter, "processor": time.process_time}
 
 
 def measured(
-    scene: "Scene", method: str, settings: Any, options: dict[str, Any], rounds: int, clock: str, tell: Tell
+    scene: "Scene", method: str, settings: Any, options: dict[str, Any], rounds: int, clock: str, tell: "Tell"
 ) -> "SkipReport":
     """Measure the skips of a method on a scene, at its own size; as `refgi.bench.skips.measure_skips`."""
     from refgi.bench.skips import measure_skips

@@ -14,11 +14,11 @@ from refgi.cli.settings import preset
 
 if TYPE_CHECKING:
     from refgi.cli.frame_files import FrameFiles
-    from refgi.cli.session import Tell
     from refgi.methods import KeepingEstimate
     from refgi.scene import Scene
     from refgi.scene.path import Path as Way
     from refgi.sssil.temporal import Sequence, TemporalSettings
+    from refgi.types import Tell
 
 FRAME = ("dtype", "rsm_resolution", "shadows")
 KINDS = {"both": (".exr", ".png"), "exr": (".exr",), "png": (".png",)}

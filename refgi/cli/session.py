@@ -9,19 +9,21 @@ import json
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from refgi.texts import table as table  # of the commands
 
+if TYPE_CHECKING:
+    from refgi.types import Tell
+
 DONE, FAILED, USAGE, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 PERCENTAGE = re.compile(r"\d+(?= %)")
 SECONDS_BETWEEN_LINES = 3.0
 
-Tell = Callable[[str, float], None]
 
 
 @dataclasses.dataclass
@@ -103,7 +105,7 @@ def say(text: str) -> None:
 
 
 @contextmanager
-def progress() -> Iterator[Tell]:
+def progress() -> "Iterator[Tell]":
     """Show how far long work is while the block runs: yield what is to be called with (what runs, fraction done)."""
     if sys.stderr.isatty():
         with _bar() as tell:
@@ -113,7 +115,7 @@ def progress() -> Iterator[Tell]:
 
 
 @contextmanager
-def _bar() -> Iterator[Tell]:
+def _bar() -> "Iterator[Tell]":
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -130,7 +132,7 @@ def _bar() -> Iterator[Tell]:
         yield tell
 
 
-def _lines() -> Tell:
+def _lines() -> "Tell":
     last = time.monotonic()
 
     def tell(what: str, done: float) -> None:

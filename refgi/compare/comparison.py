@@ -28,12 +28,12 @@ from refgi.frame import Frame
 from refgi.methods import METHODS, find_method, require_filter
 from refgi.provenance import estimate_record
 from refgi.scene import Scene, load_scene
+from refgi.types import Tell
 
 if TYPE_CHECKING:
     from refgi.methods import Picture
     from refgi.provenance.frames import StillFrames
 
-Progress = Callable[[str, float], None]
 
 WITHOUT_VISIBILITY: Mapping[str, Any] = MappingProxyType({"visibility": False})  # nothing blocks indirect light
 WARM_UP_SIZE = 96  # pixels along a side: more than the coarse grid of `gather`, whose interpolation then runs as well
@@ -48,7 +48,7 @@ def compare(
     truth_settings: Any = None,
     method_settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
-    progress: Progress | None = None,
+    progress: Tell | None = None,
     still: "StillFrames | None" = None,
     **frame_options: Any,
 ) -> Comparison:
@@ -114,7 +114,7 @@ def compare(
 class _Runner:
     """Runs methods on frames of one scene and view."""
 
-    def __init__(self, scene: Scene, options: Mapping[str, Any], progress: Progress | None) -> None:
+    def __init__(self, scene: Scene, options: Mapping[str, Any], progress: Tell | None) -> None:
         self.frame = Frame(scene, **options)  # shows every method's irradiance; never timed
         expect(bool(self.frame.gbuffer.covered.any()), f"scene {scene.name!r}: camera", "a view of some surface",
                "a view past all of it")
@@ -187,7 +187,7 @@ class _Runner:
     def _fresh_frame(self, width: int, height: int) -> Frame:
         return Frame(self.scene, width=width, height=height, **self.options)
 
-    def _inner_progress(self, name: str) -> Progress | None:
+    def _inner_progress(self, name: str) -> Tell | None:
         return (lambda stage, done: self._tell(f"{name}: {stage}", done)) if self.progress else None
 
     def _tell(self, what: str, done: float) -> None:
@@ -239,7 +239,7 @@ def require_folder(folder: Path) -> None:
         raise InputError(f"out: {folder} cannot be written: {error.strerror or error}") from error
 
 
-def _write(comparison: Comparison, folder: Path, progress: Progress | None) -> None:
+def _write(comparison: Comparison, folder: Path, progress: Tell | None) -> None:
     from refgi.compare.report import write_report
     from refgi.compare.results import write_results
 

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 from refgi.errors import InputError, expect
 from refgi.methods import KeepingEstimate, Picture, find_method, require_filter, usual_shadows
-from refgi.provenance.content import light_json, plain
-from refgi.provenance.record import Record
+from refgi.provenance.record import Record, light_json, plain
 from refgi.scene import Scene
 from refgi.scene.files import read_bytes
 from refgi.scene.path import Path as Way

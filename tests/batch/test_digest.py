@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from refgi.batch.buffers import digest_of, hashes_of
+from refgi.batch.shared import digest_of, hashes_of
 from refgi.stages import observe, stage
 
 

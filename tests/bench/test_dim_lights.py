@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from refgi.bench import trades as module
-from refgi.bench.trades import brightest, dim_lights, parts_of_lights
+from refgi.bench import skips as module
+from refgi.bench.skips import brightest, dim_lights, parts_of_lights
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.methods import METHODS

@@ -5,8 +5,7 @@ import pytest
 
 from refgi import frame as frames
 from refgi import skips
-from refgi.bench.skips import UNMEASURED, measure_skips
-from refgi.bench.trades import TRADES
+from refgi.bench.skips import TRADES, UNMEASURED, measure_skips
 from refgi.diagnostics import diagnosing
 from refgi.errors import InputError
 from refgi.frame import Frame

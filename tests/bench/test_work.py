@@ -7,7 +7,7 @@ import pytest
 
 from refgi import stages
 from refgi.bench.grid import Choice
-from refgi.bench.work import cold_seconds, first_frames, work_of, works_of
+from refgi.bench.measure import cold_seconds, first_frames, work_of, works_of
 from refgi.errors import RefgiError, RefgiWarning
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights

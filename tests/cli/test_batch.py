@@ -6,7 +6,7 @@ import subprocess
 import pytest
 from click.testing import CliRunner
 
-from refgi.batch import changes, schedule, work
+from refgi.batch import code, schedule, work
 from refgi.bench import measure
 from refgi.bench.results import Result
 from refgi.cli.group import VerbGroup
@@ -161,9 +161,9 @@ def test_thresholds_and_a_baseline_fail_the_batch(tmp_path, plan, did):
 
 def test_since_a_commit_only_what_reaches_changed_code(tmp_path, plan, did, monkeypatch):
     repository = tmp_path / "repository"
-    monkeypatch.setattr(changes, "PACKAGE", repository)
-    monkeypatch.setattr(changes, "file_of", lambda name: repository / f"{name}.py")
-    monkeypatch.setattr(changes, "reached", lambda place: {"shared", place.partition(":")[0].rpartition(".")[2]})
+    monkeypatch.setattr(code, "PACKAGE", repository)
+    monkeypatch.setattr(code, "file_of", lambda name: repository / f"{name}.py")
+    monkeypatch.setattr(code, "reached", lambda place: {"shared", place.partition(":")[0].rpartition(".")[2]})
     repository.mkdir()
     for name in ("sii", "gather", "shared"):
         (repository / f"{name}.py").write_text("x = 1\n")

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from refgi.bench.skips import MeasuredSkip, SkipReport, Unmeasured
-from refgi.bench.trades import DimLights, Trade
+from refgi.bench.skips import DimLights, MeasuredSkip, SkipReport, Trade, Unmeasured
 from refgi.cli.explain import measured_text
 from refgi.cli.group import VerbGroup
 from refgi.pairs import irradiance as pairs

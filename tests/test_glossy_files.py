@@ -9,8 +9,9 @@ from click.testing import CliRunner
 
 from refgi.cli.group import VerbGroup
 from refgi.compare import compare
+from refgi.compare.pages import number
 from refgi.compare.pictures import linear_planes
-from refgi.compare.report import number, page
+from refgi.compare.report import page
 from refgi.compare.results import as_json, write_results
 from refgi.frame import Frame
 from refgi.image import read_exr

@@ -18,13 +18,14 @@ from benchmarks.papers.records import Entry, Outcome, Paper, Picture, Reproducti
 from benchmarks.papers.report import write_report
 from benchmarks.papers.workbench import FULL, QUICK, Scale, Workbench
 from refgi.cli.destination import Permission, folder
-from refgi.cli.options import on_threads
 from refgi.cli.session import FAILED, progress, say, table
+from refgi.cli.view import on_threads
 from refgi.compare.comparison import require_folder
-from refgi.compare.report import environment, number
+from refgi.compare.pages import number
 from refgi.errors import RefgiError, RefgiWarning
 from refgi.image import canonical_json, write_exr, write_png, write_text
 from refgi.provenance import plain, program
+from refgi.provenance.record import environment
 
 SCHEMA = 1
 Progress = Callable[[str, float], None]

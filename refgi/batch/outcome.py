@@ -27,9 +27,8 @@ from refgi.batch.plan import Finding, figure_of, place_of
 from refgi.bench.grid import TRUTH
 from refgi.bench.measure import compared
 from refgi.bench.results import PathResult, Result, Run, SceneResult, known
-from refgi.compare.report import environment
-from refgi.errors import InputError
 from refgi.image import is_dead, read_exr, write_text
+from refgi.provenance.record import environment
 from refgi.types import Array
 
 SECONDS_OF_A_LEFTOVER = 3600.0
@@ -218,19 +217,6 @@ def _scene(shot: Shot, outcomes: Sequence[Outcome]) -> SceneResult:
 
 LESS_IS_BETTER = ("rmse", "rmse_unoccluded", "relmse", "flip")
 MORE_IS_BETTER = ("ssim",)
-
-
-def read_baseline(file: Path) -> Result:
-    """Read the results.json of an earlier batch or bench; InputError if it cannot be read or is something else."""
-    try:
-        return Result.model_validate_json(file.read_bytes())
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file), key="--baseline") from error
-    except pydantic.ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(map(str, first["loc"])) or "content"
-        raise InputError(f"{file}: {where}: expected results of a batch: {first['msg'].lower()}", file=str(file),
-                         key="--baseline") from error
 
 
 def worse(result: Result, baseline: Result, tolerance: float, folder: str = "") -> list[Finding]:

@@ -6,12 +6,10 @@ from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import quote
 
-import pydantic
-
 from refgi.bench.grid import FILES
 from refgi.bench.report import Place, overview, write_page
-from refgi.bench.results import Result
-from refgi.compare.report import PAGE, machine, script, templates
+from refgi.bench.results import Result, read_result
+from refgi.compare.pages import machine, page_of
 from refgi.errors import InputError
 from refgi.image import write_text
 
@@ -27,19 +25,6 @@ class Held(NamedTuple):
 
     folder: Path
     result: Result
-
-
-def read_result(file: Path) -> Result:
-    """Read the results.json of a bench or batch; an InputError names the first key that is wrong."""
-    try:
-        return Result.model_validate_json(file.read_bytes())
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file)) from error
-    except pydantic.ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"])) or "JSON"
-        raise InputError(f"{file}: {key}: expected results of `refgi bench` or `refgi batch`, got another kind: "
-                         f"{first['msg'].lower()}", file=str(file), key=key) from error
 
 
 def folders_of(folder: Path) -> list[Path]:
@@ -71,17 +56,13 @@ def index_page(folder: Path, held: Sequence[Held], refresh: int | None = None) -
 
     A browser reads it again each `refresh` seconds unless it is in use; never where absent.
     """
-    from markupsafe import Markup
-
     places = [Place(scene, f"{quote(one.folder.name)}/{INDEX}#scene{number}")
               for one in held for number, scene in enumerate(one.result.scenes, 1)]
     made = [{"name": one.folder.name, "machine": machine(one.result.environment),
              "runs": sum(len(scene.runs) for scene in one.result.scenes)} for one in held]
-    return templates(FILES).get_template("index.html.j2").render(
-        style=Markup((PAGE / "style.css").read_text("utf-8")), script=script(), kind="report",
-        title=folder.resolve().name, lead=f"{len(places)} scenes of {len(held)} folders", facts=[], verdict="",
-        failures=[], overview=overview(places), held=made, refresh=refresh,
-        versions=held[0].result.environment["versions"], machine=machine(held[0].result.environment))
+    return page_of("index.html.j2", held[0].result.environment, FILES, kind="report", title=folder.resolve().name,
+                   lead=f"{len(places)} scenes of {len(held)} folders", overview=overview(places), held=made,
+                   refresh=refresh)
 
 
 def watch(folder: Path, say: Say, wait: Callable[[float], None] = time.sleep) -> None:

@@ -12,11 +12,10 @@ import numpy as np
 
 from refgi.bench.grid import TRUTH
 from refgi.bench.results import Run, SceneResult, in_percent
+from refgi.compare.album import SECOND, THIRD, Judge, Picture, View
 from refgi.compare.outcome import UNOCCLUDED
-from refgi.compare.page.album import Judge, Picture, View
-from refgi.compare.page.floats import SECOND, THIRD
+from refgi.compare.pages import number
 from refgi.compare.pictures import linear_planes
-from refgi.compare.report import number
 from refgi.errors import expect
 from refgi.frame import Frame
 from refgi.image import read_exr, write_exr

@@ -11,7 +11,8 @@ from typing import Any, Self
 import pydantic
 
 from refgi.bench.error import Error
-from refgi.compare.report import number, require_environment
+from refgi.compare.pages import number, require_environment
+from refgi.errors import InputError
 from refgi.image import write_text
 
 SPLIT_COLUMNS = ("approximation", "mean, %", "RMS, %", "spread, %", "share, %", "RMSE without, %", "mean without, %")
@@ -305,6 +306,19 @@ def write_results(result: Result, folder: Path) -> None:
     write_text(folder / "results.json", result.model_dump_json(indent=1) + "\n")
     write_text(folder / "results.csv", table.getvalue())
     write_text(folder / "results.md", markdown(result))
+
+
+def read_result(file: Path, option: str | None = None) -> Result:
+    """Read the results.json of a bench or batch; an InputError names the first key that is wrong, or an option."""
+    try:
+        return Result.model_validate_json(file.read_bytes())
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file), key=option) from error
+    except pydantic.ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(map(str, first["loc"])) or "JSON"
+        raise InputError(f"{file}: {key}: expected results of `refgi bench` or `refgi batch`, got another kind: "
+                         f"{first['msg'].lower()}", file=str(file), key=option or key) from error
 
 
 def markdown(result: Result) -> str:

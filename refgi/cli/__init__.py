@@ -1,4 +1,4 @@
-"""The command `refgi`: one file a verb, loaded when it is used; the only place that prints, asks or exits.
+"""The command `refgi`: verbs are loaded when they are used; the only place that prints, asks or exits.
 
 Results go to stdout, everything else to stderr. Exit codes: 0 done, 1 a check failed (or a fault of refgi itself),
 2 usage or input error, 130 interrupted, 143 terminated.

@@ -1,43 +1,26 @@
-"""`refgi bench`: run time against error of methods over a grid of settings."""
+"""`refgi bench` and `refgi choose`: run time against error over a grid, and the cheapest settings that meet a wish."""
 
+import os
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import click
+from refgi.cli.options import WRITING, Asked, verb
+from refgi.cli.session import DONE, FAILED, Session, progress, say, table
 
-from refgi.cli.options import Size, on_threads, speech, writing
-from refgi.cli.session import DONE, FAILED, Session, progress, say
+if TYPE_CHECKING:
+    from refgi.bench.choose import Chosen, Probe, Wish
 
 FILES = ("index.html", "results.json", "results.csv", "results.md")
 
 
-@click.command("bench")
-@click.argument("scenes", nargs=-1)
-@click.option("--methods", metavar="A,B", help="Methods of the grid to run; all where absent.")
-@click.option("--grid", "grid_file", metavar="FILE", help="Settings of each method as TOML.")
-@click.option("--quick", is_flag=True, help="Three settings a method in place of ten and more.")
-@click.option("--rounds", type=click.IntRange(1, 1000), default=3, show_default=True,
-              help="How often each setting runs, with a seed each.")
-@click.option("--size", type=Size(), help="Picture size in pixels; the scenes' own where absent.")
-@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE",
-              help="A setting of the truth, such as samples=1024 or checkpoint=DIR; repeatable.")
-@click.option("--split", is_flag=True, help="Split each method's error into its approximations, at the default and at "
-                                            "the knee of its curve.")
-@click.option("--split-size", type=Size(), help="Picture size of the split; 128 pixels along the longer side at most "
-                                                "where absent.")
-@click.option("--split-frames", type=click.IntRange(2, 1000), help="Frames of the resting scene that the split blends, "
-                                                                   "of methods with a temporal filter.")
-@click.option("--threads", type=click.IntRange(1), help="Threads of compiled kernels; all where absent.")
-@click.option("--out", required=True, help="Folder for index.html, results.json, results.csv, results.md and pictures.")
-@writing
-@speech
-@click.pass_obj
-def _bench(
-    session: Session, /, scenes: tuple[str, ...], methods: str | None, grid_file: str | None, quick: bool, rounds: int,
-    size: tuple[int, int] | None, pairs: tuple[str, ...], split: bool, split_size: tuple[int, int] | None,
-    split_frames: int | None, threads: int | None, out: str, parents: bool, force: bool,
-) -> int:
+@verb("bench", "SCENES", "methods", "grid", "quick", "rounds", "size", "set", "split", "split-size", "split-frames",
+      "threads", "out", *WRITING,
+      SCENES={"nargs": -1}, methods="Methods of the grid to run; all where absent.",
+      set="A setting of the truth, such as samples=1024 or checkpoint=DIR; repeatable.",
+      size="Picture size in pixels; the scenes' own where absent.",
+      out={"required": True, "help": "Folder for index.html, results.json, results.csv, results.md and pictures."})
+def _bench(session: Session, asked: Asked) -> int:
     """Measure error over time on SCENES (cornell_box where absent).
 
     Methods run over a grid of settings beside the path tracer stopped early; errors are told apart into bias and
@@ -50,25 +33,25 @@ def _bench(
     from refgi.bench.results import Result, markdown, write_results
     from refgi.bench.split import with_splits
     from refgi.cli.destination import Permission, folder
-    from refgi.cli.settings import settings_for, still_frames
-    from refgi.cli.view import View
-    from refgi.compare.report import environment
+    from refgi.cli.view import named_methods, on_threads, scene_of, settings_for, still_frames
     from refgi.errors import RefgiWarning, expect
+    from refgi.provenance.record import environment
 
-    expect(not (quick and grid_file), "--grid", "--quick or --grid, not both", "both")
-    for option, given in (("--split-size", split_size), ("--split-frames", split_frames)):
-        expect(split or given is None, option, "--split beside it", "none")
-    names = None if methods is None else [name.strip() for name in methods.split(",")]
-    grid = chosen(read_grid(Path(grid_file)) if grid_file else built_in(quick), names)
-    still = still_frames({one.method for one in grid.choices}, split_frames, ())
-    truth = settings_for(TRUTH, pairs)
-    sources = scenes or ("cornell_box",)
-    loaded = [View(source, size, None, None, None, None, ()).load() for source in sources]
+    out, rounds = asked.out, asked.rounds
+    expect(not (asked.quick and asked.grid_file), "--grid", "--quick or --grid, not both", "both")
+    for option, given in (("--split-size", asked.split_size), ("--split-frames", asked.split_frames)):
+        expect(asked.split or given is None, option, "--split beside it", "none")
+    grid = chosen(read_grid(Path(asked.grid_file)) if asked.grid_file else built_in(asked.quick),
+                  named_methods(asked.methods))
+    still = still_frames({one.method for one in grid.choices}, asked.split_frames, ())
+    truth = settings_for(TRUTH, asked.pairs)
+    sources = asked.scenes or ("cornell_box",)
+    loaded = [scene_of(Asked(scene=source, size=asked.size)) for source in sources]
     kept = (str(file.relative_to(out)) for file in Path(out, FOLDER).rglob("*.exr"))
-    path = folder(out, Permission(parents, force), (*FILES, *kept))
+    path = folder(out, Permission(asked.parents, asked.force), (*FILES, *kept))
     path.mkdir(parents=True, exist_ok=True)
     made: list[Any] = []
-    with on_threads(threads), progress() as tell, warnings.catch_warnings():
+    with on_threads(asked.threads), progress() as tell, warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)  # of each of many settings in each round
         for number, (scene, place) in enumerate(zip(loaded, places(path, [one.name for one in loaded]), strict=True)):
             def told(what: str, done: float, number: int = number, name: str = scene.name) -> None:
@@ -76,8 +59,8 @@ def _bench(
 
             one = bench_scene(scene, grid, rounds=rounds, truth=truth, tell=told, place=place,
                               source=sources[number], shadows="exact")
-            if split:
-                options: dict[str, Any] = dict(zip(("width", "height"), split_size or (), strict=False))
+            if asked.split:
+                options: dict[str, Any] = dict(zip(("width", "height"), asked.split_size or (), strict=False))
                 one = with_splits(one, scene, grid, seeds=rounds, truth=truth, tell=told, still=still,
                                   shadows="exact", **options)
             made.append(one)
@@ -93,4 +76,98 @@ def _bench(
     return FAILED if failures else DONE
 
 
-command = _bench
+@verb("choose", "SCENE", "error", "time", "methods", "size", "rounds", "set", "emit", "force", "threads",
+      methods="Methods to look at, truth among them; all where absent.",
+      rounds="How often each choice runs at full size, with a seed each.",
+      set="A setting of the truth, such as target_error=0.005 or checkpoint=DIR; repeatable.",
+      force="Overwrite the file of --emit.")
+def _choose(session: Session, asked: Asked) -> int:
+    """Find the cheapest method and settings that meet a wish on SCENE.
+
+    A search on a small picture finds candidates; they are verified at full size. Errors are plain RMSE against path
+    tracing over its mean, without the path tracer's own noise. The path tracer is among the candidates.
+    """
+    from refgi.bench.choose import Wish, choose
+    from refgi.bench.grid import built_in_tracks
+    from refgi.cli.view import named_methods, on_threads, scene_of
+    from refgi.errors import expect
+    from refgi.settings import from_text
+
+    error, seconds, size, emit = asked.error, asked.seconds, asked.size, asked.emit
+    expect((error is None) != (seconds is None), "--error, --time", "one of the two", "both" if error else "neither")
+    wish = Wish(error, seconds)
+    tracks = built_in_tracks(named_methods(asked.methods))
+    truth = from_text(wish.truth, asked.pairs)
+    expect(emit is None or asked.force or not Path(emit).exists(), "--emit", "a new file, or --force", emit)
+    loaded = scene_of(asked)
+    with on_threads(asked.threads), progress() as tell:
+        chosen = choose(loaded, tracks, wish, rounds=asked.rounds, truth=truth, tell=tell, shadows="exact")
+    best = chosen.found.best
+    shown = f" --size {size[0]}x{size[1]}" if size else ""
+    line = None if best is None else f"refgi render {asked.scene}{shown}{_options(best)} --out {best.choice.method}.exr"
+    if best is not None and emit is not None:
+        from refgi.image import write_text
+
+        write_text(Path(emit), _plan(asked.scene, size, best, Path(emit).parent))
+    session.result(_text(chosen, wish, line), _content(chosen, wish, line))
+    return DONE if best is not None else FAILED
+
+
+def _options(best: "Probe") -> str:
+    return f" --method {best.choice.method}" + "".join(f" --set {change}" for change in best.choice.changes)
+
+
+def _plan(scene: str, size: tuple[int, int] | None, best: "Probe", folder: Path) -> str:
+    """Return the choice as a plan in a folder, with the scene it was found on; files are named from that folder."""
+    from refgi.bench.grid import TRUTH, toml_line
+    from refgi.scene import builtin_scenes
+
+    choice = best.choice
+    named = scene if scene.partition(":")[0] in builtin_scenes() else os.path.relpath(scene, folder)
+    lines = ["[batch]", toml_line("scenes", [named]), *([toml_line("size", list(size))] if size else []), "",
+             f"[{choice.method}]"]
+    if choice.method == TRUTH:
+        passes: int = choice.settings.passes  # type: ignore[attr-defined]
+        return "\n".join([*lines, toml_line("passes", [passes])]) + "\n"
+    return "\n".join([*lines, *(toml_line(*change.split("=", 1)) for change in choice.changes)]) + "\n"
+
+
+def _content(chosen: "Chosen", wish: "Wish", line: str | None) -> dict[str, Any]:
+    def plain(one: "Probe") -> dict[str, Any]:
+        return {"method": one.choice.method, "changes": list(one.choice.changes), "seconds": _finite(one.seconds),
+                "error": _finite(one.error)}
+
+    found = chosen.found
+    return {"wish": wish._asdict(), "best": None if found.best is None else plain(found.best), "line": line,
+            "skips": [{"stage": name, "reason": reason} for name, reason in chosen.skips], "truth": chosen.truth,
+            "trusted": not chosen.doubt,
+            "judged": [plain(one) for one in found.judged], "small": [plain(one) for one in found.small]}
+
+
+def _finite(value: float) -> float | None:
+    return value if abs(value) < float("inf") else None
+
+
+def _text(chosen: "Chosen", wish: "Wish", line: str | None) -> str:
+    from refgi.compare.pages import number
+
+    found = chosen.found
+    asked = f"an error of {100 * wish.error:.3g} %" if wish.error else f"{number(1e3 * (wish.seconds or 0))} ms"
+    parts = [f"nothing is known to meet {asked}: {chosen.doubt}" if chosen.doubt else f"nothing meets {asked}"]
+    if found.best is not None:
+        parts = [f"{found.best.choice.method}, {found.best.choice.label}: {100 * found.best.error:.3g} % in "
+                 f"{number(1e3 * found.best.seconds)} ms, wished for {asked}"]
+    parts += [_table("judged at full size", found.judged)] if found.judged else []
+    parts += [_table("nearest on the small picture", sorted(found.small, key=lambda one: one.error)[:5])]
+    parts += ["left out on this scene\n" + table([(name, reason) for name, reason in chosen.skips])] if chosen.skips \
+        else []
+    return "\n\n".join([*parts, f"truth: {chosen.truth}", *([line] if line else [])])
+
+
+def _table(title: str, probes: Any) -> str:
+    from refgi.compare.pages import number
+
+    rows = [("method", "settings", "ms", "error, %")]
+    rows += [(one.choice.method, one.choice.label, number(1e3 * one.seconds), f"{100 * one.error:.3g}")
+             for one in probes]
+    return f"{title}\n{table(rows, right=frozenset((2, 3)))}"

@@ -61,8 +61,10 @@ def _left() -> int | None:
     return None if limit == resource.RLIM_INFINITY else limit - pages * resource.getpagesize()
 
 
-VERBS = ("scenes", "render", "sequence", "compare", "bench", "batch", "choose", "report", "vectors", "check", "stress",
-         "explain", "settings", "warm", "info")
+# by name the module of this package that has it
+VERBS = {"scenes": "short", "render": "render", "sequence": "sequence", "compare": "compare", "bench": "bench",
+         "batch": "batch", "choose": "bench", "report": "short", "vectors": "vectors", "check": "compare",
+         "stress": "short", "explain": "explain", "settings": "short", "warm": "short", "info": "short"}
 HELP = """Indirect light by four published methods on the CPU, judged by path tracing.
 
 SCENE is a built-in name such as cornell_box (see `refgi scenes`), a scene file (.json), or a mesh (.glb, .gltf, .obj,
@@ -138,7 +140,7 @@ def _one_line(text: str) -> str:
 
 
 class VerbGroup(click.Group):
-    """A group of verbs, each the `command` of a module of this package with its name."""
+    """A group of verbs, each the command `_VERB` of a module of this package."""
 
     @classmethod
     def refgi(cls) -> "VerbGroup":
@@ -155,7 +157,7 @@ class VerbGroup(click.Group):
         """Import a verb."""
         if cmd_name not in VERBS:
             return None
-        command: click.Command = importlib.import_module(f"refgi.cli.{cmd_name}").command
+        command: click.Command = getattr(importlib.import_module(f"refgi.cli.{VERBS[cmd_name]}"), f"_{cmd_name}")
         return command
 
     def resolve_command(

@@ -22,11 +22,11 @@ import numpy as np
 from refgi import stages
 from refgi.compare.flip import flip
 from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference, measure
-from refgi.compare.report import environment
 from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.methods import METHODS, find_method, require_filter
 from refgi.provenance import estimate_record
+from refgi.provenance.record import environment
 from refgi.scene import Scene, load_scene
 from refgi.types import Tell
 

@@ -25,8 +25,8 @@ from refgi.compare.metrics import (
     over_magnitude,
     relative_scale,
     samples,
+    ssim_of_noise,
 )
-from refgi.compare.ssim import ssim_of_noise
 from refgi.errors import expect
 from refgi.provenance import Record, scene_record
 from refgi.scene import Scene

@@ -6,6 +6,7 @@ last colour; a pixel without surface is grey, and one that is not finite magenta
 
 import io
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -64,6 +65,11 @@ def auto_exposure(radiance: Array) -> float:
 def rgb_planes(prefix: str, rgb: Array) -> dict[str, Array]:
     """Return the float32 planes of one quantity, (3, h, w), by channel; names start with `prefix`."""
     return {f"{prefix}{channel}": np.asarray(plane, np.float32) for channel, plane in zip("RGB", rgb, strict=True)}
+
+
+def rgb_of(planes: Mapping[str, Array], prefix: str) -> Array:
+    """Return one quantity, (3, h, w), of planes by channel; the reverse of `rgb_planes`."""
+    return np.stack([planes[f"{prefix}{channel}"] for channel in "RGB"])
 
 
 Pixels = npt.NDArray[np.uint8]

@@ -1,32 +1,23 @@
-"""The page of a comparison: one file that works from disk, with pictures as numbers, table, plot and stages inside.
-
-It says what its results were made with: versions, processor, threads.
-"""
+"""The page of a comparison: pictures as numbers, table, plot, stages and what all was made with."""
 
 import functools
 import math
-import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from refgi import stages
+from refgi.compare.album import LABELS, Judge, Picture, View, album
 from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, Figure, Measurement, MethodResult, Reference
-from refgi.compare.page.album import LABELS, Judge, Picture, View, album
-from refgi.compare.plot import Point, time_against_error
+from refgi.compare.pages import DASH, MINUS, TIMES, Point, markup, number, page_of, sort_key, time_against_error
 from refgi.image import write_text
-from refgi.provenance import Record, plain, versions
+from refgi.provenance import Record, plain
 from refgi.scene.files import text_of
 from refgi.types import Array
 
-if TYPE_CHECKING:
-    import jinja2
-    from markupsafe import Markup
-
 DEGREE = "\N{DEGREE SIGN}"
-SIMD = ("sse2", "avx", "avx2", "fma", "avx512f", "avx512vl", "neon", "sve")
 
 
 def provenance_rows(record: Record) -> list[tuple[str, str]]:
@@ -54,25 +45,6 @@ def _value(value: Sequence[float] | float) -> str:
     return str(value) if isinstance(value, int) else f"{math.degrees(value):g}{DEGREE}"  # sizes, and angles
 
 
-def environment() -> dict[str, Any]:
-    """Return versions, platform, cpu, simd (features of the processor) and threads as JSON values."""
-    import llvmlite.binding
-
-    from refgi.jit import thread_count
-
-    features = llvmlite.binding.get_host_cpu_features()
-    return {
-        "versions": versions(),
-        "platform": f"{platform.system()} {platform.machine()}",
-        "cpu": llvmlite.binding.get_host_cpu_name(),
-        "simd": [name for name in SIMD if features.get(name)],
-        "threads": thread_count(),
-    }
-
-
-PAGE = Path(__file__).with_name("page")
-SCRIPTS = ("floats", "scene", "paint", "panels", "input", "viewer", "page")  # each after what it builds on
-MINUS, DASH, TIMES = "\N{MINUS SIGN}", "\N{EN DASH}", "\N{MULTIPLICATION SIGN}"
 JUDGES = {TRUTH: "truth", UNOCCLUDED: "truth without visibility"}
 COLUMNS = {
     "relmse": ("relMSE", "mean of (x-r)² / (r² + (0.1 mean r)²)"), "rmse": ("RMSE", "W/m²"), "mae": ("MAE", "W/m²"),
@@ -86,74 +58,19 @@ def write_report(comparison: Comparison, folder: Path) -> None:
     write_text(Path(folder) / "index.html", page(comparison))
 
 
-def templates(*folders: Path) -> "jinja2.Environment":
-    """Return the templates of this package and of `folders` by file name: all escaped, nothing left out in silence."""
-    import jinja2
-
-    return jinja2.Environment(loader=jinja2.FileSystemLoader([*folders, PAGE]), autoescape=True, trim_blocks=True,
-                              lstrip_blocks=True, undefined=jinja2.StrictUndefined)
-
-
-def script() -> "Markup":
-    """Return the script of a page, its viewers and its tables: JavaScript that asks for nothing else."""
-    from markupsafe import Markup
-
-    return Markup("\n".join((PAGE / f"{name}.js").read_text("utf-8") for name in SCRIPTS))
-
-
 def page(comparison: Comparison) -> str:
     """Return the page as HTML that refers to nothing outside itself; the same for equal input."""
-    from markupsafe import Markup
-
-    return templates().get_template("report.html.j2").render(
-        style=Markup((PAGE / "style.css").read_text("utf-8")), script=script(),
+    return page_of(
+        "report.html.j2", comparison.environment,
         kind="comparison", title=comparison.scene.name, lead=comparison.scene.description, facts=_facts(comparison),
         verdict=_verdict(comparison),
         failures=[*((name, f"gave no picture: {reason}") for name, reason in comparison.failures.items()),
                   *(doubt.split(": ", 1) for one in comparison.references.values() for doubt in one.doubts)],
         album=album([_view(comparison)]), again=next(iter(comparison.results), TRUTH),
         columns=[{"label": label, "about": about} for label, about in (*COLUMNS.values(), ("FLIP", "of the picture"))],
-        rows=_rows(comparison), notes=_notes(comparison), plot=Markup(_plot(comparison)), made=_made(comparison),
+        rows=_rows(comparison), notes=_notes(comparison), plot=markup(_plot(comparison)), made=_made(comparison),
         ledgers=[_ledger(result) for result in comparison.results.values() if result.ledger is not None],
-        provenance=provenance_rows(comparison.record),
-        versions=comparison.environment["versions"], machine=machine(comparison.environment),
-    )
-
-
-def number(value: float) -> str:
-    r"""Write a figure with three significant digits, a dash for nan.
-
-    >>> [ascii(number(value)) for value in (0.0123456, -1234.5, 2.5e-7)]
-    ["'0.0123'", "'\\u22121230'", "'2.5e\\u22127'"]
-    """
-    if math.isnan(value):
-        return DASH
-    if math.isinf(value):
-        return "∞" if value > 0 else f"{MINUS}∞"
-    if value == 0:
-        return "0"
-    if not 1e-4 <= abs(value) < 1e6:
-        mantissa, _, exponent = f"{value:.2e}".partition("e")
-        return f"{float(mantissa):g}e{int(exponent)}".replace("-", MINUS)
-    rounded = float(f"{value:.3g}")
-    return f"{rounded:.10f}".rstrip("0").rstrip(".").replace("-", MINUS)
-
-
-def sort_key(value: float | None) -> str:
-    """Return what a table sorts a number by, all its digits; nothing where it is not known, which stands last."""
-    return "" if value is None or math.isnan(value) else repr(float(value)).replace("inf", "Infinity")
-
-
-def machine(environment: Mapping[str, Any]) -> str:
-    """Return what a result was made on, in a line: platform, processor, threads."""
-    return f"{environment['platform']}, {environment['cpu']}, {environment['threads']} threads"
-
-
-def require_environment(environment: Mapping[str, Any]) -> None:
-    """Refuse (ValueError) what a result was made on where it is not all that a page needs."""
-    missing = [key for key in ("platform", "cpu", "threads", "versions") if key not in environment]
-    if missing or not isinstance(environment["versions"], dict) or "refgi" not in environment["versions"]:
-        raise ValueError(f"environment: expected {', '.join(missing) or 'versions, that of refgi among them'}")
+        provenance=provenance_rows(comparison.record))
 
 
 def ledger_cells(ledger: Any) -> list[tuple[str, ...]]:

@@ -143,6 +143,7 @@ def _made(kind: type[Any], content: Mapping[str, Any], key: str) -> Any:
 
 PACKAGES = ("refgi", "numpy", "numba", "llvmlite", "scipy", "embreex", "OpenEXR", "imageio", "pillow", "matplotlib",
             "click", "rich", "pydantic", "jinja2", "flip-evaluator")
+SIMD = ("sse2", "avx", "avx2", "fma", "avx512f", "avx512vl", "neon", "sve")
 GIT_SECONDS = 10.0
 DIRTY = "-dirty"
 VERSION = 2  # of the record; its key is `provenance`
@@ -163,6 +164,22 @@ def versions() -> dict[str, str | None]:
         None for a package that is not installed.
     """
     return {"python": platform.python_version()} | {name: _version(name) for name in PACKAGES}
+
+
+def environment() -> dict[str, Any]:
+    """Return versions, platform, cpu, simd (features of the processor) and threads as JSON values."""
+    import llvmlite.binding
+
+    from refgi.jit import thread_count
+
+    features = llvmlite.binding.get_host_cpu_features()
+    return {
+        "versions": versions(),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "cpu": llvmlite.binding.get_host_cpu_name(),
+        "simd": [name for name in SIMD if features.get(name)],
+        "threads": thread_count(),
+    }
 
 
 def program() -> dict[str, str]:

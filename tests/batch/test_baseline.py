@@ -2,7 +2,8 @@
 
 import pytest
 
-from refgi.batch.outcome import first_change, read_baseline, worse
+from refgi.batch.outcome import first_change, worse
+from refgi.bench.results import read_result
 from refgi.errors import InputError
 from tests.batch.made import result_of, run_of, scene_of
 
@@ -63,6 +64,6 @@ def test_what_is_no_baseline(tmp_path, text, said):
     if text is not None:
         (tmp_path / "results.json").write_text(text)
     with pytest.raises(InputError, match=said) as error:
-        read_baseline(tmp_path / "results.json")
+        read_result(tmp_path / "results.json", "--baseline")
     assert "results.json" in str(error.value)
     assert error.value.key == "--baseline"

@@ -7,8 +7,8 @@ import shutil
 import pytest
 
 from refgi.bench import report
-from refgi.bench.folder import INDEX, RESULTS, folders_of, read_result, remake, watch
-from refgi.bench.results import write_results
+from refgi.bench.folder import INDEX, RESULTS, folders_of, remake, watch
+from refgi.bench.results import read_result, write_results
 from refgi.errors import InputError
 from refgi.image import is_from_refgi
 from tests.bench.folders import make_folder

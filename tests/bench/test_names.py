@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from refgi.bench.folder import folders_of, read_result, remake
-from refgi.bench.results import write_results
+from refgi.bench.folder import folders_of, remake
+from refgi.bench.results import read_result, write_results
 from refgi.errors import InputError
 from tests.bench.folders import make_folder
 

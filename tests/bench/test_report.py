@@ -6,12 +6,12 @@ import pytest
 
 from refgi.bench import report
 from refgi.bench.report import page, plot_of
-from refgi.compare.page.album import album
+from refgi.compare.album import album
 from refgi.compare.pictures import luminance
 from tests.bench.folders import HEIGHT, WIDTH, light, make_folder, make_scene, radiance
-from tests.compare.page.browser import clicked
-from tests.compare.page.test_viewer import DIGITS, HALF, RADIANCE, shown
+from tests.compare.browser import clicked
 from tests.compare.test_report import Outline
+from tests.compare.test_viewer import DIGITS, HALF, RADIANCE, shown
 
 X, Y = 9, 5  # of the pixel that is read
 SCRIPT = f"""

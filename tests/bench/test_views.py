@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refgi.bench.pictures import named, view_of
-from refgi.compare.page.floats import SECOND, THIRD
+from refgi.compare.album import SECOND, THIRD
 from refgi.compare.pictures import linear_planes
 from refgi.errors import InputError
 from refgi.image import read_exr, write_exr

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from refgi.compare import metrics
+from refgi.compare.metrics import ssim_of_noise
 from refgi.compare.outcome import measure
-from refgi.compare.ssim import ssim_of_noise
 from refgi.errors import InputError
 from tests.naive import metrics as naive
 

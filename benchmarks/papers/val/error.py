@@ -16,7 +16,7 @@ from benchmarks.papers.val.subjects import (
 )
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of
 from refgi.cluster.val import val
-from refgi.compare.plot import Axes, Curve, curves_plot
+from refgi.compare.pages import Axes, Curve, curves_plot
 
 
 def by_area_lights(bench: Workbench, scene: str, shown: tuple[int, ...], further: tuple[int, ...],

@@ -44,10 +44,7 @@ class Source(NamedTuple):
 
 
 def code_key(*places: str, alone: tuple[str, ...] = ()) -> str:
-    """Return a digest, 64 hexadecimal digits, of all sources that objects such as "refgi.splat.sii:METHOD" reach.
-
-    Equal where these are the same but for comments and docstrings. Modules `alone` count without what they import.
-    """
+    """Return a digest of all sources that objects reach, and of modules `alone` without what they import."""
     modules = sorted({*alone}.union(*(reached(place) for place in places)))
     text = "\n".join(f"{module} {_source(file_of(module)).digest}" for module in modules)
     return hashlib.sha256(text.encode()).hexdigest()
@@ -163,10 +160,7 @@ PACKAGE = Path(refgi.__file__).parent
 
 
 def changed_methods(methods: Iterable[str], commit: str) -> dict[str, list[str]]:
-    """Return by method which modules of those that it reaches changed since a commit; methods without are left out.
-
-    Comments and docstrings count for nothing. InputError if refgi lies in no git checkout or there is no such commit.
-    """
+    """Return by method which modules of those that it reaches changed since a commit; methods without are left out."""
     changed = _changed_files(commit)
     found = {}
     for method in methods:

@@ -72,19 +72,13 @@ class Job(NamedTuple):
 
 
 def jobs_of(plan: Plan) -> list[Job]:
-    """Return all jobs of a plan in the order of scenes, frames and choices; its scenes are loaded.
-
-    InputError if a scene or path is not usable.
-    """
+    """Return all jobs of a plan in the order of scenes, frames and choices; its scenes are loaded."""
     _loaded.cache_clear()
     return [job for name, source in plan.scenes.items() for job in _of_scene(plan, name, source)]
 
 
 def scene_at(shot: Shot) -> Scene:
-    """Return the scene as the path leaves it at a frame, its camera of the picture's size.
-
-    InputError if scene or path are not usable.
-    """
+    """Return the scene as the path leaves it at a frame, its camera of the picture's size."""
     return next(itertools.islice(_scenes(shot), shot.frame, None))
 
 

@@ -26,7 +26,7 @@ from refgi.batch.jobs import FORMAT, Job, Shot
 from refgi.batch.plan import Finding, figure_of, place_of
 from refgi.bench.grid import TRUTH
 from refgi.bench.measure import compared
-from refgi.bench.results import PathResult, Result, Run, SceneResult, known
+from refgi.bench.results import PathResult, Result, Run, SceneResult, Strict, known
 from refgi.image import is_dead, read_exr, write_text
 from refgi.provenance.record import environment
 from refgi.types import Array
@@ -34,10 +34,8 @@ from refgi.types import Array
 SECONDS_OF_A_LEFTOVER = 3600.0
 
 
-class View(pydantic.BaseModel):
+class View(Strict):
     """What the results of one frame share."""
-
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
 
     width: int
     height: int
@@ -46,10 +44,8 @@ class View(pydantic.BaseModel):
     truth: str  # how well it is known
 
 
-class Outcome(pydantic.BaseModel):
+class Outcome(Strict):
     """jobs/NAME.json."""
-
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
 
     refgi: str = FORMAT
     job: str
@@ -84,10 +80,7 @@ def write_outcome(folder: Path, outcome: Outcome) -> None:
 
 
 def read_outcome(folder: Path, job: Job) -> Outcome | None:
-    """Return the result of a job from the batch's folder.
-
-    None where there is none, or a file that is not whole: whoever damaged it, the job is run again.
-    """
+    """Return the result of a job from the batch's folder; None without one, or where its file is not whole."""
     try:
         found = Outcome.model_validate_json(outcome_file(folder, job).read_bytes())
     except (OSError, pydantic.ValidationError):
@@ -125,10 +118,7 @@ class OverTime(NamedTuple):
 
 
 def over_time(frames: Iterator[Still]) -> OverTime:
-    """Judge a sequence of frames by that of the truth; two are held at a time.
-
-    Flicker and its noise, and lag; nan for fewer than two frames, and a lag of nan where the light rests.
-    """
+    """Judge a sequence of frames by that of the truth, two held at a time; nan for what cannot be told."""
     sums = np.zeros(6)  # of squared flicker, its noise, x - r along the change, v, squared change, r; a value each
     count, before = 0, None
     for still in frames:
@@ -145,10 +135,7 @@ def over_time(frames: Iterator[Still]) -> OverTime:
 
 
 def paths_of(folder: Path, jobs: Sequence[Job], outcomes: dict[str, Outcome]) -> tuple[PathResult, ...]:
-    """Return the figures of each choice whose frames are all there; nothing for scenes at rest.
-
-    The folder of the batch holds the pictures; `outcomes` are by name of the job.
-    """
+    """Return the figures of each choice whose frames are all there; nothing for scenes at rest."""
     ways: dict[Any, list[Job]] = {}
     for job in jobs:
         if job.shot.path is not None and job.choice.method != TRUTH:
@@ -192,10 +179,7 @@ def read_outcomes(folder: Path, jobs: Sequence[Job]) -> Outcomes:
 
 
 def result_of(folder: Path, jobs: Sequence[Job], outcomes: Outcomes) -> Result:
-    """Return what a batch has found so far, as a bench does: a scene for each frame of which there is some result.
-
-    The jobs of one frame are side by side.
-    """
+    """Return what a batch has found so far, as a bench does: a scene for each frame that has some result."""
     scenes = []
     for shot, group in groupby(jobs, lambda job: job.shot):
         found = [outcomes[job.name] for job in group if job.name in outcomes]
@@ -220,21 +204,14 @@ MORE_IS_BETTER = ("ssim",)
 
 
 def worse(result: Result, baseline: Result, tolerance: float, folder: str = "") -> list[Finding]:
-    """Return figures of a batch that are worse than an earlier one's by more than `tolerance`, a share of that.
-
-    One finding a figure, with both pictures (the earlier ones in `folder`) and the first stage whose output is another.
-    What only one of the results holds is passed over.
-    """
+    """Return a finding for each figure worse than a baseline's by more than a share of it; `folder`: its pictures."""
     before = dict(_runs(baseline))
     return [finding for key, run in _runs(result) if key in before
             for finding in _worse(key, run, before[key], tolerance, folder)]
 
 
 def first_change(now: Run, before: Run) -> str | None:
-    """Return the first stage of one method and setting whose output is not what it was.
-
-    None where all are the same or one of the runs holds no digests.
-    """
+    """Return the first stage whose output is not what it was; None where all are the same or one has no digests."""
     if not (now.hashes and before.hashes):
         return None
     return next((one[0] if one else other[0] for one, other in zip_longest(now.hashes, before.hashes)

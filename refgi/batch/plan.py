@@ -59,11 +59,7 @@ class Finding(NamedTuple):
 
 
 def read_threshold(key: str, text: object, scenes: Collection[str], methods: Collection[str], file: str) -> Threshold:
-    """Read one line of a plan's `[expect]`.
-
-    `key`: such as ``atrium.sii.relmse`` or ``atrium.val.clusters.count=8, lights=256.rmse``; `text`: such as ``<=
-    0.31``. An InputError, which names `file`, if scene, method, figure or comparison is unknown.
-    """
+    """Read a line of `[expect]`, such as ``"atrium.val.clusters.count=8, lights=256.rmse" = "<= 0.31"``."""
     where = f'{file}: expect."{key}"'
     scene = max((name for name in scenes if key.startswith(f"{name}.")), key=len, default="")
     expect(scene != "", where, f"a scene of the plan ({', '.join(scenes)}) first", key)
@@ -81,11 +77,7 @@ def read_threshold(key: str, text: object, scenes: Collection[str], methods: Col
 
 
 def broken(thresholds: Collection[Threshold], result: Result, *, whole: bool = True) -> list[Finding]:
-    """Return a finding for each threshold that does not hold.
-
-    Its figure is missed, or judged by a truth whose error is not to be trusted, or, where the `whole` plan is done, not
-    there.
-    """
+    """Return a finding for each threshold that is missed, in doubt or, of a `whole` plan, without a figure."""
     found = []
     for one in thresholds:
         values = list(_values(one, result))
@@ -199,10 +191,7 @@ class Plan(NamedTuple):
 
 
 def read_plan(file: Path) -> Plan:
-    """Read a plan from TOML; its scenes are not loaded yet.
-
-    InputError if the file cannot be read, or a table, a method, a key or a value is not usable.
-    """
+    """Read a plan from TOML; its scenes are not loaded yet. An InputError names what is not usable."""
     tables = read_toml(file)
     expect(BATCH in tables, str(file), "a table [batch] with the key scenes", ", ".join(tables) or "no table")
     table, thresholds = tables.pop(BATCH), tables.pop(EXPECT, {})

@@ -44,10 +44,7 @@ Written = Callable[[], None]
 
 
 def chunks_of(jobs: Sequence[Job], common: Common, workers: int) -> list[Chunk]:
-    """Cut jobs, those of one frame side by side, into chunks: a frame each, or parts of one each if workers are more.
-
-    All frames of one method behind a temporal filter are one chunk, in the order of frames.
-    """
+    """Cut jobs into chunks: a frame each, parts of one if workers are more, a filter's frames in their order."""
     alone = [list(group) for _, group in groupby((job for job in jobs if job.temporal is None), lambda job: job.shot)]
     ways: dict[object, list[Job]] = {}
     for job in jobs:
@@ -87,11 +84,7 @@ def follow(
     running: Sequence[tuple[Chunk, "Future[int]"]], tell: Tell, written: Written,
     died: Callable[[Chunk, BaseException], "Future[int] | None"] | None = None,
 ) -> None:
-    """Wait for submitted chunks and say how many jobs are done; `written` is called after each.
-
-    `died` is called with a chunk and what ended it; gives what runs in its place, or None where nothing is left of it.
-    Without it, what ended a chunk is raised.
-    """
+    """Wait for submitted chunks and say how many jobs are done; `died` gives what runs in place of one that ended."""
     of = {future: chunk for chunk, future in running}
     total = sum(len(chunk.jobs) for chunk in of.values())
     open_ = set(of)
@@ -160,11 +153,7 @@ SECONDS_TO_ANSWER = 10
 
 
 def run_on_cluster(address: str, jobs: Sequence[Job], common: Common, tell: Tell, written: Written) -> None:
-    """Do jobs, those of one frame side by side, on the workers of a scheduler, such as ``tcp://10.0.0.1:8786``.
-
-    Scenes and folders are there on every worker; `written` is called after each chunk. InputError if dask.distributed
-    is not installed or nobody answers at the address.
-    """
+    """Do jobs on the workers of a scheduler such as ``tcp://10.0.0.1:8786``, which see all scenes and folders."""
     try:
         distributed: Any = import_module("distributed")
     except ImportError as error:
@@ -207,10 +196,7 @@ class Estimate(NamedTuple):
 
 
 def estimate(jobs: Sequence[Job], common: Common, tell: Tell) -> Estimate:
-    """Estimate the time of jobs by measuring each choice on the first frame of each scene.
-
-    A choice that gives no picture there counts nothing.
-    """
+    """Estimate the time of jobs by running each choice on each scene's first frame; without a picture it is 0."""
     known: dict[Any, float] = {}
     seconds, truths, seen = 0.0, 0.0, set()
     for number, job in enumerate(jobs):

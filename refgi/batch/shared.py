@@ -22,10 +22,10 @@ from refgi.batch.code import code_key
 from refgi.batch.jobs import Shot, key_of_scene, reference_settings, scene_at
 from refgi.batch.outcome import View
 from refgi.bench.grid import TRUTH
-from refgi.bench.measure import Reference, traced
+from refgi.bench.measure import traced
 from refgi.bench.pictures import FOLDER, Place, Writer
 from refgi.compare.comparison import WITHOUT_VISIBILITY, limited
-from refgi.compare.pictures import linear_planes
+from refgi.compare.outcome import Reference
 from refgi.errors import InputError, expect
 from refgi.frame import Frame
 from refgi.image import canonical_json, read_exr, write_exr
@@ -59,10 +59,7 @@ def hashes_of(log: Log, buffers: Mapping[str, Sequence[str]]) -> tuple[tuple[str
 
 
 def digest_of(value: Any) -> str:
-    """Return a digest of a stage's output, in hexadecimal digits.
-
-    Of arrays, numbers, text and None, in tuples, lists, mappings and dataclasses; of any other object its type alone.
-    """
+    """Return a digest of arrays, numbers, text and None in containers; of any other object its type alone."""
     digest = hashlib.sha256()
     for part in _parts(value):
         digest.update(part)
@@ -149,10 +146,7 @@ class Buffers(stages.Memory):
 
 
 def load_kernels(scene: Scene) -> None:
-    """Make the smallest of buffers, so that the time of no other holds that of loading its kernels.
-
-    The scene's materials and lights decide on the kernels.
-    """
+    """Make the smallest of a scene's buffers, so that no other's time holds that of loading kernels."""
     small = Frame(scene, width=TINY, height=TINY, rsm_resolution=TINY)
     small.gbuffer.recorded()
     for rsm in small.rsms:
@@ -192,10 +186,7 @@ class Common(NamedTuple):
 
 
 class Shared:
-    """What all jobs of one frame share, each part made on first use.
-
-    InputError if the scene is no more what it was when the job was named, `scene_key`, or its camera sees no surface.
-    """
+    """What all jobs of one frame share, each part made on first use; InputError if the scene is another by now."""
 
     def __init__(self, shot: Shot, scene_key: str, common: Common, tell: Tell) -> None:
         self.scene = scene_at(shot)
@@ -230,7 +221,7 @@ class Shared:
         if name not in self.references:
             settings = reference_settings(self._common.truth, self.shot)
             settings = settings if name == TRUTH else limited(settings, name, WITHOUT_VISIBILITY)
-            self.references[name] = self._traced(settings)
+            self.references[name] = self._traced(name, settings)
             self._write(name, settings, self.references[name])
         return self.references[name]
 
@@ -238,7 +229,7 @@ class Shared:
         """Return what the results of the frame share."""
         covered, truth = self.frame.gbuffer.covered, self.reference(TRUTH)
         return View(width=self.frame.width, height=self.frame.height, covered=int(covered.sum()),
-                    mean=float(truth.mean[:, covered].mean(dtype=np.float64)), truth=truth.statement)
+                    mean=float(truth.irradiance[:, covered].mean(dtype=np.float64)), truth=truth.statement)
 
     def record(self, method: str, settings: Any) -> Record:
         """Return the record of a picture."""
@@ -246,14 +237,14 @@ class Shared:
             self._record = scene_record(self.scene, {"dtype": self.frame.dtype.name, **self._common.options})
         return {**self._record, **method_record(method, settings)}
 
-    def _traced(self, settings: TruthSettings) -> Reference:
+    def _traced(self, name: str, settings: TruthSettings) -> Reference:
         chosen = canonical_json([code_key("refgi.truth:trace_truth", "refgi.frame:Frame"),
                                  {key: plain(settings)[key] for key in STOPS}])
         how = hashlib.sha256(chosen.encode()).hexdigest()
         folder = self._common.store / "truths" / how[:DIGITS] / self._key[:DIGITS]
         folder.mkdir(parents=True, exist_ok=True)
         with _alone_in(folder):
-            return traced(self.frame, dataclasses.replace(settings, checkpoint=folder), self._tell)
+            return traced(self.frame, dataclasses.replace(settings, checkpoint=folder), self._tell, name)
 
     def _write(self, name: str, settings: TruthSettings, reference: Reference) -> None:
         """Write a reference's picture unless the same is there."""
@@ -261,9 +252,7 @@ class Shared:
         record = self.record(TRUTH, settings)
         if _record_in(file) != record:
             file.parent.mkdir(parents=True, exist_ok=True)
-            planes = linear_planes(reference.radiance, reference.mean, reference.variance, reference.samples,
-                                   **reference.lobe_planes)
-            write_exr(file, planes, record)
+            write_exr(file, reference.planes, record)
             Writer(Place(self._common.folder, f"{FOLDER}/{self.shot.name}"), self.scene, self.frame).write_ids()
 
 

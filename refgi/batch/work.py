@@ -45,10 +45,7 @@ _left: list[_Left] = []  # of the last filtered job of this process
 
 
 def blended(job: Job, common: Common, shared: Shared, irradiance: Array) -> Filtered:
-    """Blend a frame's irradiance, (3, h, w), W/m^2, with that of the frame before, and leave it to the next.
-
-    That of the first frame stays as it was. InputError if the frame before gave no picture.
-    """
+    """Blend a frame's irradiance, (3, h, w), W/m^2, with that of the frame before, and leave it to the next."""
     assert job.temporal is not None
     frame, geometry = shared.frame, shared.scene.geometry
     history = None if job.before is None else _history(job, common)
@@ -98,10 +95,7 @@ _kept: dict[tuple[Shot, str, Common], Shared] = {}  # of this process: what the 
 
 
 def run_chunk(chunk: Chunk, tell: Tell = lambda *_: None) -> int:
-    """Do jobs without a result one after the other; return how many were done.
-
-    Errors of a job are its result. InputError if a result cannot be written.
-    """
+    """Do jobs without a result one after the other; return how many. Errors of a job are its result."""
     done = 0
     with contextlib.chdir(chunk.working_folder), threads(chunk.common.threads), warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)  # of each of many settings with each seed

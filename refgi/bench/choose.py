@@ -64,10 +64,7 @@ class Found(NamedTuple):
 
 
 def for_error(tracks: Sequence[Track], wish: float, small: JudgedPictures, full: JudgedPictures) -> Found:
-    """Find the fastest choice whose error, RMSE over the truth's mean, is at most a wish.
-
-    `small` is searched; the best is of what was judged at `full` size.
-    """
+    """Find the fastest choice whose error is at most a wish: `small` is searched, the best judged at `full` size."""
     walk = _Walk(tracks, wish, small)
     queue = [(full.seconds(track.rungs[rung]), number, rung)
              for number, (track, rung) in enumerate(walk.starts) if math.isfinite(full.seconds(track.rungs[rung]))]
@@ -93,10 +90,7 @@ def for_error(tracks: Sequence[Track], wish: float, small: JudgedPictures, full:
 
 
 def for_time(tracks: Sequence[Track], wish: float, small: JudgedPictures, full: JudgedPictures) -> Found:
-    """Find the choice of least error whose frame takes at most a wish, s.
-
-    `small` is ranked; the best is of what was timed and judged at `full` size.
-    """
+    """Find the choice of least error whose frame takes at most a wish, s; `small` is ranked, `full` judges."""
     reached = _reached(tracks, TIME_MARGIN * wish, full) or _reached(tracks, wish, full)
     ranked = sorted((Probe(choice, small.seconds(choice), small.error(choice)) for choice in reached),
                     key=lambda one: one.error)
@@ -268,10 +262,7 @@ def choose(
 
 
 class Pictures:
-    """A scene at one size: runs choices and judges them by a truth that is traced once.
-
-    Each choice runs `rounds` times, with the seeds from `first_seed` on.
-    """
+    """A scene at one size: runs each choice with several seeds, and judges it by a truth that is traced once."""
 
     def __init__(self, scene: Scene, truth: TruthSettings, rounds: int, tell: Tell, frame_options: dict[str, Any],
                  first_seed: int = 0) -> None:
@@ -282,7 +273,7 @@ class Pictures:
                "a view past all of it")
         self._size = f"{self.frame.width}x{self.frame.height}"
         self._reference = traced(self.frame, truth, lambda what, done: tell(f"{self._size}: {what}", done))
-        self.truth, self.doubt = self._reference.statement, self._reference.doubt
+        self.truth, self.doubt = self._reference.statement, self._reference.whole_doubt
         self._known: dict[Choice, _Run] = {}
 
     def seconds(self, choice: Choice) -> float:
@@ -311,7 +302,7 @@ class Pictures:
     def _judged(self, choice: Choice) -> "_Run":
         runs = [timed(Frame(self._scene, **self._options), choice.method, with_seed(choice.settings, seed))
                 for seed in self._seeds]
-        known = error_of([one.picture for one in runs], self._reference.mean, self._reference.variance,
+        known = error_of([one.picture for one in runs], self._reference.irradiance, self._reference.variance,
                          self.frame.gbuffer.covered)
         return _Run(statistics.median(one.seconds for one in runs), without_noise(known.rmse, known.noise),
                     runs[0].skips)

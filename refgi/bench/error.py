@@ -81,10 +81,7 @@ Point = tuple[float, float]  # s, error
 
 
 def front(points: Sequence[Point]) -> list[bool]:
-    """Return for each point (time, error) whether no other is as fast and nearer, or as near and faster (Pareto).
-
-    Points that are not finite are never on the front.
-    """
+    """Return for each point (time, error) whether none is as fast and nearer, or as near and faster (Pareto)."""
     def beaten(seconds: float, error: float) -> bool:
         return any(s <= seconds and e <= error and (s, e) != (seconds, error) for s, e in points)
 

@@ -38,11 +38,7 @@ def folders_of(folder: Path) -> list[Path]:
 
 
 def remake(folder: Path, folders: Sequence[Path], refresh: int | None = None) -> list[Held]:
-    """Write the pages of folders with results, and the index over them where they lie in a common folder.
-
-    A browser reads the pages again each `refresh` seconds unless they are in use; never where absent. InputError if
-    results or pictures cannot be read, or a page not written.
-    """
+    """Write the pages of folders with results, and the index over them; browsers read them each `refresh` seconds."""
     held = [Held(one, read_result(one / RESULTS)) for one in folders]
     for one in held:
         write_page(one.result, one.folder, refresh)
@@ -52,10 +48,7 @@ def remake(folder: Path, folders: Sequence[Path], refresh: int | None = None) ->
 
 
 def index_page(folder: Path, held: Sequence[Held], refresh: int | None = None) -> str:
-    """Return the HTML page over all scenes of several folders below `folder`; it leads to their own pages.
-
-    A browser reads it again each `refresh` seconds unless it is in use; never where absent.
-    """
+    """Return the HTML page over all scenes of several folders below `folder`; it leads to their own pages."""
     places = [Place(scene, f"{quote(one.folder.name)}/{INDEX}#scene{number}")
               for one in held for number, scene in enumerate(one.result.scenes, 1)]
     made = [{"name": one.folder.name, "machine": machine(one.result.environment),
@@ -66,10 +59,7 @@ def index_page(folder: Path, held: Sequence[Held], refresh: int | None = None) -
 
 
 def watch(folder: Path, say: Say, wait: Callable[[float], None] = time.sleep) -> None:
-    """Keep pages of the folders that `folders_of` gives up to date until interrupted; the last ones do not refresh.
-
-    `say` is called with a line each time pages were made, or why they were not; `wait` with seconds between looks.
-    """
+    """Keep pages of folders up to date until interrupted; `say` gets a line a time, `wait` seconds between looks."""
     known: dict[Path, int] = {}
     try:
         while True:

@@ -55,10 +55,7 @@ class Place(NamedTuple):
 
 
 def overview(places: Sequence[Place]) -> dict[str, Any]:
-    """Return the table and the plot over all scenes, in the page's order.
-
-    `methods`; `rows`, one a scene, with a cell a method; `plot`, an ``<svg>`` element.
-    """
+    """Return `methods`, `rows` (one a scene, a cell a method) and `plot` over all scenes, in the page's order."""
     methods = list(dict.fromkeys(run.method for place in places for run in place.scene.runs))
     rows = [{"scene": place.scene.scene, "link": place.link, "size": f"{place.scene.width} x {place.scene.height}",
              "cells": [_cell([run for run in place.scene.runs if run.method == name]) for name in methods]}
@@ -190,19 +187,12 @@ HOW = ("Each round runs every choice once on a frame of its own, buffers include
 
 
 def write_page(result: Result, folder: Path, refresh: int | None = None) -> None:
-    """Write index.html into a folder that holds the pictures, whole or not at all.
-
-    A browser reads it again each `refresh` seconds unless it is in use; never where absent. InputError if it cannot be
-    written, or a picture is damaged.
-    """
+    """Write index.html beside its pictures; a browser reads it again each `refresh` seconds unless in use."""
     write_text(folder / "index.html", page(result, folder, refresh))
 
 
 def page(result: Result, folder: Path, refresh: int | None = None) -> str:
-    """Return the page of a bench as HTML that refers to nothing outside itself; the same for equal input.
-
-    Pictures that `folder` lacks are left out; `refresh` as in `write_page`.
-    """
+    """Return the page of a bench as HTML, the same for equal input; pictures that `folder` lacks are left out."""
     views = {number: found for number, scene in enumerate(result.scenes, 1)
              if (found := view_of(scene, number, folder)) is not None}
     pictures = album([view for view, _ in views.values()])
@@ -239,11 +229,7 @@ def _ms(seconds: float) -> str:
 
 
 def plot_of(scene: SceneResult, position: int = 1) -> str:
-    """Draw one curve a method, and the path tracer's dashed; bars are 95 % intervals, marks lead to pictures.
-
-    An ``<svg>`` element, points of a method in the order of their times; nothing where no error is known. `position`:
-    of the scene on the page.
-    """
+    """Draw one curve a method, the path tracer's dashed; bars are 95 % intervals, marks lead to pictures."""
     if not any(0 < run.rmse < math.inf for run in (*scene.runs, *scene.line)):
         return ""
     runs = named(scene, position)
@@ -254,10 +240,7 @@ def plot_of(scene: SceneResult, position: int = 1) -> str:
 
 
 def said_of(scene: SceneResult) -> Iterator[str]:
-    """Yield what the curves say: each method's nearest picture, and whether the path tracer is better in that time.
-
-    A sentence a method, in the order of their errors.
-    """
+    """Yield a sentence a method: its nearest picture, and whether the path tracer is better in that time."""
     best = {run.method: run for run in sorted(scene.runs, key=lambda one: -one.rmse)}
     for method, run in sorted(best.items(), key=lambda one: one[1].rmse):
         text = (f"{method} comes to {in_percent(run.errors[TRUTH].rmse)} % in {number(1e3 * run.seconds)} ms "

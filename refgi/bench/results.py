@@ -21,11 +21,7 @@ LEAST = 0.01  # of the mean square: what is taken back and not said
 
 
 def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
-    """Return a row for each part and one for the whole, by `COLUMNS`, over the truth's mean.
-
-    Change of the mean, root mean square and spread over seeds of what the part changes, its share of the whole's mean
-    square, then the whole's RMSE and change of the mean with it switched off.
-    """
+    """Return a row by `SPLIT_COLUMNS` for each part and one for the whole, over the truth's mean."""
     parts = [(part.name, percent(part.mean), percent(part.error.rmse), percent(part.error.spread),
               percent(part.share), percent(part.alone.rmse if part.alone else None),
               percent(_mean_without(split, part))) for part in split.parts]
@@ -33,10 +29,7 @@ def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
 
 
 def said_of_split(split: "Split") -> str:
-    """Return what a split says: the largest share and what takes most back, how squares add up, what helps most.
-
-    The settings alone where nothing is known.
-    """
+    """Return what a split says: its largest share, what takes most back, how squares add up, what helps most."""
     known = [part for part in split.parts if part.share is not None]
     if not known or split.squares is None or split.cross is None:
         return f"{split.label}: not known."
@@ -85,11 +78,13 @@ COLUMNS = ("scene", "method", "settings", "seconds", "fastest", "slowest", "rmse
            "ssim", "against_truth_in_equal_time", "on_the_front", "refgi_format")
 
 
-class _Strict(pydantic.BaseModel):
+class Strict(pydantic.BaseModel):
+    """Data of which every key is known."""
+
     model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
 
 
-class Figures(_Strict):
+class Figures(Strict):
     """Errors over the mean of the reference (`refgi.bench.error.Error`); None where not known."""
 
     in_doubt: bool = False  # the reference's own error is not to be trusted
@@ -102,7 +97,7 @@ class Figures(_Strict):
     noise: float | None
 
 
-class Work(_Strict):
+class Work(Strict):
     """What a frame takes beside time (`refgi.bench.measure`)."""
 
     pairs: int  # of light, or other sender, and receiver that sums are given, before skips within a sum
@@ -111,7 +106,7 @@ class Work(_Strict):
     peak_bytes: int  # most memory of arrays and objects above that of the scene
 
 
-class Run(_Strict):
+class Run(Strict):
     """One method with one choice of settings on one scene."""
 
     method: str
@@ -168,7 +163,7 @@ class Run(_Strict):
         return next((rmse_against(self, name) for name in reversed(LIMITED) if name in self.errors), None)
 
 
-class Alone(_Strict):
+class Alone(Strict):
     """What switching one approximation off alone does, the truth's noise taken out; None where not known."""
 
     rmse: float | None  # without it
@@ -176,7 +171,7 @@ class Alone(_Strict):
     mean: float | None  # change of the mean that it makes
 
 
-class Part(_Strict):
+class Part(Strict):
     """What one approximation changes in the picture of those before it, over the mean of the truth."""
 
     name: str
@@ -187,7 +182,7 @@ class Part(_Strict):
     alone: Alone | None = None  # None for what no approximation accounts for
 
 
-class Split(_Strict):
+class Split(Strict):
     """The error of one method and setting as a sum of its approximations, over the mean of the truth."""
 
     method: str
@@ -209,7 +204,7 @@ class Split(_Strict):
         return f"{self.method}, {', '.join(self.changes) or 'default'}{' (knee)' if self.knee else ''}"
 
 
-class SceneResult(_Strict):
+class SceneResult(Strict):
     """All runs on one scene."""
 
     scene: str
@@ -232,7 +227,7 @@ class SceneResult(_Strict):
                 "figures against it" for name in names]
 
 
-class PathResult(_Strict):
+class PathResult(Strict):
     """One method with one choice of settings over all frames of a path (`refgi.batch.outcome`)."""
 
     scene: str
@@ -249,7 +244,7 @@ class PathResult(_Strict):
         return ", ".join(self.changes) or "default"
 
 
-class Result(_Strict):
+class Result(Strict):
     """results.json."""
 
     refgi: str = FORMAT

@@ -4,6 +4,9 @@ A method renders the scene with all skips on, which counts what each has to leav
 compares bits and loads kernels. Then come rounds: a picture with all on before each one without, so that a slow moment
 of the machine falls on both. Beside that stand things that could be left out at the cost of a difference, with the
 setting to type, and skips that have no switch, with the reason.
+
+No setting leaves dim lights out: lights stand for equal shares of the maps, and `lights.count` draws fewer that stand
+for more each. A light's part is its irradiance over sampled pixels, clamped as the method clamps it, unoccluded.
 """
 
 import hashlib
@@ -11,13 +14,12 @@ import statistics
 import time
 import warnings
 from collections.abc import Callable, Sequence
-from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
-import pydantic
 
 from refgi import skips
+from refgi.bench.results import Strict
 from refgi.errors import InputError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
@@ -31,14 +33,15 @@ from refgi.scene import Scene
 from refgi.settings import Settings, from_text
 from refgi.types import Array, Tell
 
-SHARE = 0.999
+Clock = Callable[[], float]  # s
+Times = tuple[tuple[float, ...], tuple[float, ...]]  # s, a round each: of the plain picture, and of one right after
+
+SHARE = 0.999  # of the light without visibility, that the lights carry that are kept
 MOST = 8192  # lights that are summed one by one
 
 
-class DimLights(pydantic.BaseModel):
+class DimLights(Strict):
     """Lights that carry nearly all of a picture's light without visibility."""
-
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
 
     lights: int
     carrying: int  # the fewest that carry `share`
@@ -50,7 +53,7 @@ class DimLights(pydantic.BaseModel):
 
 
 def dim_lights(
-    frame: Frame, settings: Settings, rounds: int, *, share: float = SHARE, clock: Callable[[], float] = perf_counter
+    frame: Frame, settings: Settings, rounds: int, *, share: float = SHARE, clock: Clock = time.perf_counter
 ) -> DimLights | None:
     """Measure what leaving out the dimmest pixel lights would save and cost; at least `share` of the light is kept.
 
@@ -72,27 +75,19 @@ def dim_lights(
         return None
     some = (receivers, selected(lights, kept), pairs, None if footprint is None else footprint[kept])
     every = (receivers, lights, pairs, footprint)
-    times: tuple[list[float], list[float]] = ([], [])
     right, without = irradiance(*every), irradiance(*some)
-    for _ in range(rounds):
-        for took, arguments in zip(times, (every, some), strict=True):
-            started = clock()
-            irradiance(*arguments)
-            took.append(clock() - started)
+    ((times, times_carrying),) = in_turn(lambda: irradiance(*every), [lambda: irradiance(*some)], rounds, clock)
     difference = (without - right)[:, receivers.covered].astype(np.float64)
     mean = float(right[:, receivers.covered].mean(dtype=np.float64))
     return DimLights(lights=len(parts), carrying=len(kept), count=max(1, round(chosen.count * len(kept) / len(parts))),
-                     share=share, times=tuple(times[0]),
-                     times_carrying=tuple(times[1]), error=float(np.sqrt((difference**2).mean())) / mean)
+                     share=share, times=times, times_carrying=times_carrying,
+                     error=float(np.sqrt((difference**2).mean())) / mean)
 
 
 def parts_of_lights(
     receivers: Receivers, lights: PixelLights, pairs: PairSettings, footprint: Array | None = None
 ) -> Array:
-    """Return the irradiance, W/m^2, that each of N lights adds to the mean over sampled pixels and channels, (N,).
-
-    Without visibility; `footprint`: surface area that each light stands for, m^2.
-    """
+    """Return the irradiance, W/m^2, that each of N lights adds to the mean over sampled pixels, unoccluded, (N,)."""
     sample = sample_for(receivers, lights)
     return np.array([light_at(sample, selected(lights, [k]), pairs, None if footprint is None else footprint[[k]])
                      for k in range(lights.flux.shape[1])])
@@ -125,10 +120,8 @@ TRADES: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
 }
 
 
-class Trade(pydantic.BaseModel):
+class Trade(Strict):
     """A change of settings, measured."""
-
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
 
     meaning: str
     changes: tuple[str, ...]  # "key=value", as --set takes them
@@ -146,10 +139,7 @@ class Change(NamedTuple):
 
 
 def changes_of(method: str, settings: Settings, lights: DimLights | None) -> list[Change]:
-    """Return what a method could leave out and does not yet.
-
-    Those of `TRADES` that go with the other settings, after fewer lights.
-    """
+    """Return what a method could leave out and does not yet: fewer lights, and those of `TRADES` that go."""
     fewer = () if lights is None else (
         (f"lights: as many as carry {lights.share:.1%}, drawn anew", (f"lights.count={lights.count}",)),)
     made = []
@@ -164,18 +154,13 @@ def changes_of(method: str, settings: Settings, lights: DimLights | None) -> lis
 
 
 def difference(picture: Picture, plain: Picture) -> float | None:
-    """Return the RMSE between the irradiance of two pictures over all pixels with a surface, over the second's mean.
-
-    None where the second is black.
-    """
+    """Return the RMSE between two pictures' irradiance over the second's mean; None where that is black."""
     covered = plain.frame.gbuffer.covered
     made, right = (one.irradiance[:, covered].astype(np.float64) for one in (picture, plain))
     mean = float(right.mean()) if right.size else 0.0
     return float(np.sqrt(((made - right) ** 2).mean())) / mean if mean > 0 else None
 
 
-Clock = Callable[[], float]  # s
-Times = tuple[tuple[float, ...], tuple[float, ...]]  # s, a round each: of the plain picture, and of one right after
 
 
 class Kernel(NamedTuple):
@@ -206,11 +191,7 @@ UNMEASURED = (
 )
 
 
-class _Strict(pydantic.BaseModel):
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
-
-
-class MeasuredSkip(_Strict):
+class MeasuredSkip(Strict):
     """One skip that has something to leave out."""
 
     name: str
@@ -233,14 +214,14 @@ class MeasuredSkip(_Strict):
         return statistics.median(self.saved)
 
 
-class Unmeasured(_Strict):
+class Unmeasured(Strict):
     """A skip without a switch."""
 
     meaning: str
     reason: str
 
 
-class SkipReport(_Strict):
+class SkipReport(Strict):
     """All skips of a method on a scene."""
 
     scene: str
@@ -263,11 +244,10 @@ def measure_skips(
     scene: Scene, method: str, settings: Settings | None = None, *, rounds: int = 3,
     clock: Clock = time.perf_counter, tell: Tell = lambda *_: None, **frame_options: Any,
 ) -> SkipReport:
-    """Measure what each skip saves on a scene, and whether the picture has the same bits without it.
+    """Measure what each skip saves on a scene at its camera's size, and whether the picture has the same bits without.
 
-    The scene's camera has the size of the picture; the method's default settings where absent. `clock` in s:
-    `time.process_time` is that of processors alone, for machines that do other work as well. Skips that have nothing to
-    leave out are not in the report. InputError if scene, method or settings are not usable, or there is no round.
+    `clock`: `time.process_time` is that of processors alone, for machines that do other work as well. Skips that have
+    nothing to leave out are not in the report. InputError if something is not usable, or there is no round.
     """
     expect(rounds >= 1, "rounds", "1 or more", rounds)
     chosen = find_method(method).settings() if settings is None else settings
@@ -282,7 +262,7 @@ def measure_skips(
         jobs = [*(plain._replace(off=(name,)) for name in names),
                 *(plain._replace(settings=change.settings) for change in changes)]
         comparisons = _compared(jobs, first, tell)
-        times = _in_turn(plain, jobs, rounds, clock, tell)
+        times = in_turn(plain.run, [job.run for job in jobs], rounds, clock, tell)
     results = list(zip(times, comparisons, strict=True))
     return SkipReport(
         scene=scene.name, method=method, width=first.frame.width, height=first.frame.height,
@@ -326,15 +306,16 @@ def _compared(jobs: Sequence[_Job], plain: Picture, tell: Tell) -> list[_Compari
     return made
 
 
-def _in_turn(plain: _Job, jobs: Sequence[_Job], rounds: int, clock: Clock, tell: Tell) -> list[Times]:
-    """Return for each job the times of the plain picture right before it, and its own."""
-    times: list[tuple[list[float], list[float]]] = [([], []) for _ in jobs]
+def in_turn(plain: Callable[[], object], others: Sequence[Callable[[], object]], rounds: int, clock: Clock,
+            tell: Tell = lambda *_: None) -> list[Times]:
+    """Return for each of some calls the times of the plain one right before it, and its own; a round each."""
+    times: list[tuple[list[float], list[float]]] = [([], []) for _ in others]
     for turn in range(rounds):
-        for number, job in enumerate(jobs):
-            tell("timing", (turn + number / len(jobs)) / rounds)
-            for one, took in zip((plain, job), times[number], strict=True):
+        for number, other in enumerate(others):
+            tell("timing", (turn + number / len(others)) / rounds)
+            for one, took in zip((plain, other), times[number], strict=True):
                 started = clock()
-                one.run()
+                one()
                 took.append(clock() - started)
     return [(tuple(before), tuple(own)) for before, own in times]
 

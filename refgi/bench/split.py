@@ -74,11 +74,7 @@ class Chain(NamedTuple):
 
 
 class Renderer:
-    """Makes pictures of one view, each once.
-
-    Each truth has a seed of its own, so that their noise is not alike. `still` gives the frames of the resting scene
-    that a method with a temporal filter blends.
-    """
+    """Makes pictures of one view, each once; each truth has a seed of its own, so that their noise is not alike."""
 
     def __init__(
         self, scene: Scene, truth: TruthSettings | None = None, tell: Tell = lambda *_: None, *,
@@ -133,11 +129,7 @@ class Renderer:
 def chain_of(
     renderer: Renderer, choice: Choice, seeds: int, tell: Tell = lambda *_: None, *, alone: bool = True
 ) -> Chain:
-    """Make the pictures of one method and choice of settings, `seeds` of each kind.
-
-    Approximations that the settings do not make are left out, and those that `from_truth` takes in. With `alone` they
-    are switched off one by one as well.
-    """
+    """Make the pictures of one method and choice, `seeds` of each kind; `alone`: each switched off by itself too."""
     kept = [one for one in METHODS[choice.method].approximations if _is_made(one, choice.settings, renderer.options)]
     limits = [one for one in kept if one.shared_by(choice.settings)]
     others = [one for one in kept if one not in limits]
@@ -181,10 +173,7 @@ def _is_made(one: Approximation, settings: Any, options: Mapping[str, Any]) -> b
 
 
 def _pictures(renderer: Renderer, choice: Choice, off: Sequence[Approximation], seeds: int) -> tuple[Array, ...]:
-    """Return pictures without some approximations, a seed each.
-
-    The first in the pipeline is switched off first: what stands on it is gone with it.
-    """
+    """Return pictures without some approximations, a seed each; the first in the pipeline is switched off first."""
     made, still = [], renderer.options.get("still")
     for seed in range(seeds):
         first = seed * (1 if still is None else still.frames)  # each frame of a resting scene has the next seed
@@ -242,10 +231,7 @@ def small_size(width: int, height: int) -> tuple[int, int]:
 
 
 def chosen_for_split(runs: Sequence[Run], grid: Grid, *, defaults: bool = True) -> list[tuple[Choice, bool]]:
-    """Return what is split, each with whether it is the knee of its curve.
-
-    The knee of each method and, with `defaults`, its default where that is another.
-    """
+    """Return each method's knee and, with `defaults`, its default if that is another; and which of them is the knee."""
     chosen = []
     for method in dict.fromkeys(run.method for run in runs):
         curve = [run for run in runs if run.method == method]
@@ -260,11 +246,7 @@ def chosen_for_split(runs: Sequence[Run], grid: Grid, *, defaults: bool = True) 
 
 
 def split_of(chain: Chain, choice: Choice, at_knee: bool = False, statement: str = "") -> Split:
-    """Measure the pictures of a chain, from the truth to the method as it is used.
-
-    Figures are over the mean of the truth; None where that is 0 or a picture is not finite. `statement` says how well
-    the truth is known.
-    """
+    """Measure the pictures of a chain over the mean of the truth; None where that is 0 or a picture not finite."""
     first, last, covered = chain.links[0], chain.links[-1], chain.covered
     scale = float(first.pictures[0][:, covered].mean(dtype=np.float64))
     whole = _changes(first, last, covered)

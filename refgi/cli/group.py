@@ -31,10 +31,7 @@ THREADS, MOST_THREADS = "NUMBA_NUM_THREADS", 4096  # a million end the process
 
 
 def require_threads() -> None:
-    """Refuse (InputError) a value of NUMBA_NUM_THREADS that Numba cannot read or start.
-
-    It is no whole number, or too small or large.
-    """
+    """Refuse (InputError) a value of NUMBA_NUM_THREADS that is no whole number, or that Numba cannot start."""
     asked = os.environ.get(THREADS)
     usable = asked is None or (asked.strip().isdecimal() and 1 <= int(asked[:20]) <= MOST_THREADS)
     expect(usable, THREADS, f"a whole number from 1 to {MOST_THREADS}", asked)
@@ -83,10 +80,7 @@ class Terminated(KeyboardInterrupt):
 
 
 def fault_of(error: BaseException, *, debug: bool = False) -> Fault:
-    """Return what went wrong, for people and for programs: one line of message, or one for each fault of a file.
-
-    With `debug` the traceback is shown anyway.
-    """
+    """Return what went wrong: a line of message, or one for each fault of a file; `debug` shows the traceback."""
     if isinstance(error, Terminated):
         return Fault(TERMINATED, "terminated")
     if isinstance(error, click.exceptions.Abort | KeyboardInterrupt):
@@ -114,10 +108,7 @@ def _option(error: click.UsageError) -> str | None:
 
 
 def _place(error: RefgiError) -> tuple[str | None, str | None]:
-    """Return file and key of an error, as far as it or one that it arose from says them.
-
-    A file's error names file and key at the start of its message: `file: key: expected ...`.
-    """
+    """Return file and key of an error or one that it arose from, or of a message `file: key: expected ...`."""
     said = [one for one in _chain(error) if isinstance(one, InputError)]
     file = next((one.file for one in said if one.file is not None), None)
     key = next((one.key for one in said if one.key is not None), None)

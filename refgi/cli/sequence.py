@@ -127,10 +127,7 @@ class FrameFiles(NamedTuple):
                                               lobe_variance), record)
 
     def done(self, frames: int) -> int:
-        """Return how many of `frames`, from the first on, are there: up to one with a file missing or EXR damaged.
-
-        InputError if a frame found is one of another sequence.
-        """
+        """Return how many frames from the first on are whole; InputError if one is of another sequence."""
         from refgi.errors import InputError
         from refgi.image import read_exr
         from refgi.provenance.frames import same_sequence
@@ -175,10 +172,7 @@ def _is_damaged(file: Path) -> bool:
 
 
 def _resumed(sequence: "Sequence", files: FrameFiles, done: int) -> "Iterator[SequenceFrame]":
-    """Render the frames of a sequence after the first `done`, to the bit as if it had not been interrupted.
-
-    InputError if the frame before cannot be had back to the bit from its file.
-    """
+    """Render the frames after the first `done`, to the bit as if there had been no interruption."""
     rest = iter(sequence.scenes)
     history = _history_after(sequence, next(islice(rest, done - 1, None)), files, done - 1) if done else None
     yield from sequence.over(rest, done, history)

@@ -50,10 +50,7 @@ class Session:
             alike.append(text)
 
     def result(self, text: str, content: dict[str, Any]) -> None:
-        """Print the result to stdout: the text, or with --json one object that also has the warnings.
-
-        A warning that came with several percentages is said once more, with their range.
-        """
+        """Print the result to stdout, with --json as one object with all warnings; say ranges of percentages."""
         for texts in self._warned.values():
             if len(texts) > 1:
                 say(f"warning, over the whole run: {_with_range(texts)}")

@@ -41,10 +41,7 @@ FACE_BYTES = 460  # vertices, faces, clusters, Embree's tree
 
 
 def settings_for(method: str, pairs: Iterable[str], seed: int | None = None, preset: str = "default") -> Any:
-    """Make a method's settings from a preset and texts such as ``lights=1024`` or ``as_published=sii_no_pi``.
-
-    `seed`: value of the key ``seed``. An InputError names all unknown keys and values that are not usable.
-    """
+    """Make a method's settings from a preset and texts; an InputError names all that is not usable."""
     known = find_method(method)
     try:
         return from_text(known.preset(preset), [*pairs, *([] if seed is None else [f"seed={seed}"])])
@@ -58,10 +55,7 @@ def has_seed(method: str) -> bool:
 
 
 def still_frames(methods: Iterable[str], frames: int | None, pairs: Sequence[str]) -> "StillFrames | None":
-    """Return how many frames of a resting scene methods blend, and by which filter; None where --frames is absent.
-
-    InputError if none of the methods has a temporal filter, or a setting is wrong or of no use.
-    """
+    """Return how many frames of a resting scene methods blend, and by which filter; None without --frames."""
     if frames is None:
         expect(not pairs, "--temporal", "--frames beside it", " ".join(pairs))
         return None
@@ -96,10 +90,7 @@ def named_methods(text: str | None) -> list[str] | None:
 
 
 def read_lights(texts: Sequence[str]) -> list[Light] | None:
-    """Make lights from texts such as ``spot:position=0,2,0:target=0,0,0:outer_deg=35:intensity=20``; None without any.
-
-    InputError, which names the light, if a kind, key or value is not usable.
-    """
+    """Make lights from texts such as ``point:position=0,2,0:intensity=20``; None without any."""
     return [_read(text) for text in texts] if texts else None
 
 
@@ -168,10 +159,7 @@ def _number(key: str, text: str) -> float:
 
 
 def scene_of(asked: Asked) -> Scene:
-    """Return the scene with camera, of the picture's size, and lights changed as the options of `SEEN` ask for it.
-
-    InputError if the scene, the camera or a light is not usable.
-    """
+    """Return the scene with camera, size and lights changed as the options of `SEEN` ask for it."""
     changes = {key: value for key in ("eye", "target", "up") if (value := getattr(asked, key, None)) is not None}
     if getattr(asked, "vfov_deg", None) is not None:
         changes["vfov"] = math.radians(asked.vfov_deg)
@@ -250,10 +238,7 @@ def map_count(scene: Scene) -> int:
 
 def require_memory(scene: Scene, dtype: str, rsm_resolution: int, *, traced: bool = False, compared: int = 0,
                    settings: Mapping[str, Any] | None = None) -> None:
-    """Refuse a picture of the camera's size that will not fit; an InputError names what is needed and available.
-
-    Arguments as of `needed_bytes`; `settings` are those of each method, which run one after the other.
-    """
+    """Refuse a picture that will not fit; `settings` are those of each method, which run one after the other."""
     width, height = scene.camera.width, scene.camera.height
     float_bytes = 8 if dtype == "float64" else 4
     needed = needed_bytes(scene, width, height, float_bytes=float_bytes, rsm_resolution=rsm_resolution, traced=traced,

@@ -150,10 +150,7 @@ class SurfaceFit:
         self._sums = np.zeros((4, *shape))  # of E, L, E^2, E L
 
     def add(self, irradiance: Array, radiance: Array) -> None:
-        """Count a picture: indirect irradiance, W/m^2, and the radiance that the camera receives.
-
-        Pixels that are not finite do not count.
-        """
+        """Count a picture: irradiance, W/m^2, and radiance that the camera receives; only pixels that are finite."""
         expect(irradiance.shape == radiance.shape == self._sums.shape[1:], "picture", f"shape {self._sums.shape[1:]}",
                irradiance.shape)
         e, light = irradiance.astype(np.float64), radiance.astype(np.float64)
@@ -175,10 +172,7 @@ class SurfaceFit:
 
 
 def follows(irradiance: Array, radiance: Array, surface: tuple[Array, Array]) -> bool:
-    """Return whether a picture's radiance is what the surface, L_0 and k, makes of its irradiance.
-
-    True where every finite pixel differs by less than a rounding to half floats.
-    """
+    """Return whether a picture's radiance is what L_0 and k make of its irradiance, up to a rounding to halves."""
     emitted, reflectance = surface
     finite = np.isfinite(irradiance) & np.isfinite(radiance)
     made = np.where(finite, emitted + reflectance * np.where(finite, irradiance, 0.0), 0.0)

@@ -125,15 +125,13 @@ class _Runner:
     def reference(self, name: str, settings: Any) -> Reference:
         from refgi.truth import trace_truth
 
-        shortest = dataclasses.replace(settings, samples=1, seconds=None, target_error=None, checkpoint=None)
-        self._warm_up(trace_truth, shortest)
-        truth = METHODS[TRUTH]
-        made, seconds, runs = self._timed(name, lambda frame: (trace_truth(frame, settings),
-                                                               *truth.compute_lobes(frame, settings)))
-        result, shown, lobes = made
-        radiance = self.frame.radiance(np.asarray(result.mean, self.frame.dtype), shown)
-        return Reference(name, settings, result.mean, result.variance_of_mean, result.picture_variance, result.samples,
-                         radiance, seconds, runs, estimate_record(result, lobes), lobes, result.doubt)
+        self._warm_up(trace_truth, dataclasses.replace(settings, samples=1, seconds=None, target_error=None,
+                                                       checkpoint=None))
+        self._tell(name, 0.0)
+        made = trace_reference(self._fresh_frame(self.frame.width, self.frame.height), name, settings,
+                               self._inner_progress(name), self.frame)
+        self._tell(name, 1.0)
+        return made
 
     def method(
         self, name: str, settings: Any, references: Mapping[str, Reference], *, accounts: bool,
@@ -195,6 +193,21 @@ class _Runner:
             self.progress(what, done)
 
 
+def trace_reference(frame: Frame, name: str, settings: Any, progress: Tell | None = None,
+                    shown: Frame | None = None) -> Reference:
+    """Trace what pictures are judged by: the truth, or what else its settings say; its radiance by a frame `shown`."""
+    from refgi.truth import trace_truth
+
+    with stages.observe(progress=progress) as log:
+        started = time.perf_counter()
+        found = trace_truth(frame, settings)
+        light, lobes = METHODS[TRUTH].compute_lobes(frame, settings)
+        seconds = time.perf_counter() - started
+    radiance = (shown or frame).radiance(np.asarray(found.mean, frame.dtype), light)
+    return Reference(name, settings, found.mean, found.variance_of_mean, found.picture_variance, found.samples,
+                     radiance, seconds, tuple(log.runs), estimate_record(found, lobes), lobes, found.doubt)
+
+
 def _over_all(lobes: Any, covered: Any) -> Any:
     """Return the variance of the mean of lobes over all pixels that see a surface; theirs is over glossy ones."""
     return lobes.picture_variance * (lobes.block_pixels.sum() / covered.sum()) ** 2
@@ -221,10 +234,7 @@ def _settings(names: Sequence[str], truth: Any, given: Mapping[str, Any]) -> dic
 
 
 def limited(settings: Any, name: str, limits: Mapping[str, Any]) -> Any:
-    """Return how a truth is traced that shares limits of a method, such as `WITHOUT_VISIBILITY`.
-
-    With a checkpoint file of its own, named by `name`, where there is one.
-    """
+    """Return how a truth is traced that shares limits of a method, with a checkpoint file of its own by `name`."""
     checkpoint = settings.checkpoint
     if checkpoint and not Path(checkpoint).is_dir():  # a folder has a file for each
         checkpoint = f"{checkpoint}.{name}"

@@ -42,10 +42,7 @@ class Seen(NamedTuple):
 
 
 def findings(irradiance: Array, mean: Array, variance: Array, covered: Array) -> tuple[Finding, ...]:
-    """Return what stands out in a picture's error: findings whose figure reaches its threshold.
-
-    Irradiance, the reference that it converges to and the variance of the reference's mean are (3, h, w), W/m^2.
-    """
+    """Return what stands out in irradiance, (3, h, w), W/m^2, against a reference's mean and its variance."""
     error = luminance(irradiance) - luminance(mean)
     counted = covered & np.isfinite(error)
     seen = Seen(np.where(counted, error, 0.0), np.where(counted, luminance(mean), 0.0),
@@ -75,10 +72,7 @@ def streaks(seen: Seen) -> Iterator[Finding]:
 
 
 def spikes(seen: Seen) -> Iterator[Finding]:
-    """Yield how many pixels in 10,000 are far too bright and alone.
-
-    Their error is several times the second largest around them, and more than the reference itself and its noise.
-    """
+    """Yield how many pixels in 10,000 are far too bright and alone: several times the errors around them."""
     height, width = seen.error.shape
     wide = np.pad(np.abs(seen.error), 1)
     around = [wide[1 + y:1 + y + height, 1 + x:1 + x + width] for y in (-1, 0, 1) for x in (-1, 0, 1) if x or y]
@@ -90,10 +84,7 @@ def spikes(seen: Seen) -> Iterator[Finding]:
 
 
 def blocks(seen: Seen) -> Iterator[Finding]:
-    """Yield how much larger steps of the error are between blocks than inside them, along x and y alike.
-
-    Of the block size with the largest steps.
-    """
+    """Yield how much larger the error's steps are between blocks than inside, of the size where they are largest."""
     size, figure = max(((period, min(_step_ratio(seen, period), _step_ratio(_turned(seen), period)))
                         for period in PERIODS), key=lambda pair: pair[1])
     yield Finding(f"blocks of {size} x {size}", figure, BLOCKS, "steps of the error between blocks over those inside")

@@ -35,10 +35,7 @@ class Flip(NamedTuple):
 
 
 def flip(image: Array, reference: Array, covered: Array) -> Flip:
-    """Compare two pictures, (3, h, w), linear radiance, as a viewer would, over a range of exposures.
-
-    Negative values count as 0; the mean is over covered pixels. The mean and the map, or the reason why there is none.
-    """
+    """Compare two pictures, (3, h, w), linear radiance, as a viewer would; the mean is over covered pixels."""
     if importlib.util.find_spec("flip_evaluator") is None:
         return Flip(skipped="flip-evaluator is not installed: pip install 'refgi[flip]'")
     if bad := count_non_finite(image, covered) + count_non_finite(reference, covered):

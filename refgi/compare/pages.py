@@ -117,20 +117,14 @@ class Axes(NamedTuple):
 
 
 def time_against_error(points: list[Point], noise: float, error_name: str = "relMSE") -> str:
-    """Draw methods by run time and error, both logarithmic, and the truth's noise as a dashed line where positive.
-
-    As `figure_svg`; points whose time or error is not a positive finite number are left out.
-    """
+    """Draw methods by run time and error, both logarithmic, and the truth's noise as a dashed line where positive."""
     axes = Axes("run time, s", f"{error_name} of indirect irradiance", log_x=True, log_y=True)
     shown = [p for p in points if _drawable(p.seconds, p.error, axes)]
     return _svg(lambda plot: _draw_points(plot, shown, noise), axes, 7.6, "Run time against error")
 
 
 def curves_plot(curves: Sequence[Curve], axes: Axes) -> str:
-    """Draw curves with a legend beside them, as `figure_svg`.
-
-    Points that are not finite, or not positive on a logarithmic axis, are left out.
-    """
+    """Draw curves with a legend beside them, without points that an axis cannot show."""
     svg = _svg(lambda plot: _draw_curves(plot, curves, axes), axes, 9.2, f"{axes.y} over {axes.x}")
     return _linked(svg, dict(link for curve in curves for link in curve.links))
 

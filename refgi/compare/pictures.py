@@ -45,18 +45,12 @@ def linear_planes(radiance: Array, irradiance: Array, variance: Array | None = N
 
 
 def write_preview(path: Path, radiance: Array, record: Record) -> None:
-    """Write radiance as a PNG, tone-mapped at the exposure of its record, whole or not at all.
-
-    InputError if the file cannot be written.
-    """
+    """Write radiance as a PNG, tone-mapped at the exposure of its record, whole or not at all."""
     write_png(path, np.moveaxis(radiance, 0, -1), record["exposure"], record)
 
 
 def auto_exposure(radiance: Array) -> float:
-    """Return the factor that makes a percentile of a picture white: of the largest channel of all that is not black.
-
-    Above 0; 1 where the picture is black.
-    """
+    """Return the factor that makes the 98th percentile of the largest channel white; 1 for a black picture."""
     brightest = radiance.max(axis=0)
     lit = brightest[np.isfinite(brightest) & (brightest > 0)]
     return float(1.0 / np.percentile(lit.astype(np.float64), EXPOSED)) if len(lit) else 1.0
@@ -99,10 +93,7 @@ def luminance(rgb: Array) -> Array:
 
 
 def indirect_exposure(reference: Array, covered: Array) -> float:
-    """Return the factor before the sRGB curve at which a reference's irradiance, (3, h, w), just fits.
-
-    1 for a black picture.
-    """
+    """Return the factor at which a reference's irradiance, (3, h, w), just fits; 1 for a black picture."""
     values = luminance(reference)[covered]
     values = values[np.isfinite(values)]
     bright = float(np.percentile(values, 99)) if values.size else 0.0
@@ -110,10 +101,7 @@ def indirect_exposure(reference: Array, covered: Array) -> float:
 
 
 def error_scale(errors: list[Array], covered: Array) -> Scale:
-    """Choose one symmetric scale for all maps, (h, w), of signed luminance errors.
-
-    From -s to s; s is 1, 2 or 5 times a power of ten and holds 95 % of the covered pixels.
-    """
+    """Choose one scale from -s to s for all maps; s, 1, 2 or 5 times a power of ten, holds 95 % of the errors."""
     magnitudes = np.abs(np.concatenate([error[covered] for error in errors] or [np.zeros(1)]))
     magnitudes = magnitudes[np.isfinite(magnitudes)]
     reach = float(np.percentile(magnitudes, SCALE_PERCENTILE)) if magnitudes.size else 0.0
@@ -122,10 +110,7 @@ def error_scale(errors: list[Array], covered: Array) -> Scale:
 
 
 def luminance_scale(reference: Array, covered: Array) -> Scale:
-    """Choose one logarithmic scale for all false-colour pictures.
-
-    Six stops up to the 99.5th percentile of the luminance of the truth's irradiance, (3, h, w), over covered pixels.
-    """
+    """Choose one logarithmic scale: six stops up to the 99.5th percentile of the truth's luminance."""
     values = luminance(reference)[covered]
     values = values[np.isfinite(values) & (values > 0)]
     high = _round_up(float(np.percentile(values, 99.5))) if values.size else 1.0

@@ -74,10 +74,7 @@ def page(comparison: Comparison) -> str:
 
 
 def ledger_cells(ledger: Any) -> list[tuple[str, ...]]:
-    """Write a ledger as cells of a table: name, R, G, B in W, percent of the first row, meaning.
-
-    The last row is what the sum is off by.
-    """
+    """Write a ledger as cells: name, R, G, B in W, percent of the first row, meaning; last what the sum is off by."""
     whole = float(np.sum(ledger.rows[0].watts))
     rows = [(row.name.replace("_", " "), row.watts, row.meaning) for row in ledger.rows]
     rows.append(("difference", ledger.difference, "of emitted and the sum of its parts"))

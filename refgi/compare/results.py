@@ -4,7 +4,6 @@ results.json is the record: whatever the page and the table show is in it. Numbe
 known, not defined) or the words "inf" and "-inf".
 """
 
-import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,7 @@ import numpy as np
 
 from refgi import stages
 from refgi.compare import pictures as maps
-from refgi.compare.flip import Flip
-from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, Measurement, MethodResult, Reference
+from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference
 from refgi.compare.pictures import linear_planes, write_preview
 from refgi.image import canonical_json, write_encoded, write_exr, write_text
 from refgi.provenance import UNITS, Record, method_record, plain
@@ -24,10 +22,7 @@ SCHEMA = 1
 
 
 def write_results(comparison: Comparison, folder: Path) -> None:
-    """Write an EXR and a PNG a method and reference, maps a method, and at last results.json.
-
-    InputError if a file cannot be written.
-    """
+    """Write an EXR and a PNG a method and reference, maps a method, and at last results.json."""
     for reference in comparison.references.values():
         _write_picture(comparison, folder, reference)
     scale = error_scale(comparison)
@@ -77,25 +72,19 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
 def record_of(comparison: Comparison, made: Reference | MethodResult) -> Record:
     """Return the record of one picture of a comparison: all that is needed to make it again."""
     if isinstance(made, Reference):
-        return {**comparison.record, **method_record(TRUTH, made.settings), **made.estimate}
+        return {**comparison.record, **made.record}
     still = {} if made.still is None else made.still.record
     return {**comparison.record, **method_record(made.name, made.settings), **still}
 
 
 def ledger_json(ledger: Any) -> dict[str, Any]:
-    """Return a ledger as JSON values.
-
-    The rows by name, R, G, B in W; which of them sum to the first; and what the sum is off by.
-    """
+    """Return a ledger as JSON: rows by name in W, which of them sum to the first, what the sum is off by."""
     return {"rows": {row.name: row.watts for row in ledger.rows},
             "parts": [row.name for row in ledger.rows if row.is_part], "difference": ledger.difference}
 
 
 def signed_error(comparison: Comparison, result: MethodResult, judge: str = TRUTH) -> Array:
-    """Return the luminance of a method's indirect irradiance less that of the reference named `judge`, (h, w), W/m^2.
-
-    Positive where the method is too bright.
-    """
+    """Return the luminance of a method's irradiance less that of a reference, (h, w), W/m^2; above 0: too bright."""
     return maps.luminance(result.irradiance) - maps.luminance(comparison.references[judge].irradiance)
 
 
@@ -108,13 +97,9 @@ def error_scale(comparison: Comparison) -> maps.Scale:
 def _write_picture(comparison: Comparison, folder: Path, made: Reference | MethodResult) -> Record:
     """Write EXR and PNG, and return the record that they hold."""
     record = record_of(comparison, made)
-    if isinstance(made, Reference):
-        spread: dict[str, Any] = {"variance": made.variance, "samples": made.samples}
-        if made.lobes is not None:
-            spread |= {"lobes": made.lobes.mean, "lobe_variance": made.lobes.variance_of_mean}
-    else:
-        spread = {"frames": made.frames, "lobes": made.lobes}
-    write_exr(folder / f"{made.name}.exr", linear_planes(made.radiance, made.irradiance, **spread), record)
+    planes = made.planes if isinstance(made, Reference) else linear_planes(
+        made.radiance, made.irradiance, frames=made.frames, lobes=made.lobes)
+    write_exr(folder / f"{made.name}.exr", planes, record)
     write_preview(folder / f"{made.name}.png", made.radiance, record)
     return record
 
@@ -144,22 +129,12 @@ def _method(result: MethodResult) -> dict[str, Any]:
     return {
         "summary": result.summary, "settings": result.settings, "seconds": result.seconds,
         "stages": _stages(result.runs),
-        "against": {judge: _measurement(m) for judge, m in result.against.items()},
-        **({"lobes_against": {judge: _measurement(m) for judge, m in result.lobes_against.items()}}
-           if result.lobes_against else {}),
-        "flip": _flip(result.flip),
+        "against": result.against, **({"lobes_against": result.lobes_against} if result.lobes_against else {}),
+        "flip": {key: getattr(result.flip, key) for key in ("mean", "exposures", "skipped")},
         "ledger": None if result.ledger is None else ledger_json(result.ledger),
         "files": [f"{result.name}.exr", f"{result.name}.png", _false_colour_name(result.name),
                   *(_error_name(result.name, judge) for judge in result.against)],
     }
-
-
-def _measurement(measurement: Measurement) -> dict[str, Any]:
-    return {field.name: getattr(measurement, field.name) for field in dataclasses.fields(measurement)}
-
-
-def _flip(flip: Flip) -> dict[str, Any]:
-    return {"mean": flip.mean, "exposures": flip.exposures, "skipped": flip.skipped}
 
 
 def _stages(runs: tuple[stages.Run, ...]) -> list[dict[str, Any]]:

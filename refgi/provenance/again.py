@@ -1,10 +1,14 @@
-"""A picture made again from its record: the same scene, looked for where it may lie now, and the same settings."""
+"""A picture made again from its record: the same scene, looked for where it may lie now, and the same settings.
+
+A record comes with an EXR, which may be a stranger's: before anything is done by it, its keys and the kinds and sizes
+of what is taken as it is are judged. Scene, camera, lights and settings are judged where they are made.
+"""
 
 import dataclasses
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -121,10 +125,7 @@ class PictureRecord(_Entry):
 
 
 def require_sound(record: Mapping[str, Any], path: Path) -> None:
-    """Raise InputError, with all keys that are missing, unknown or of another kind, if a picture's record is not whole.
-
-    `path`: the picture, for messages.
-    """
+    """Raise InputError, with all keys that are missing, unknown or of another kind, if a record is not whole."""
     try:
         PictureRecord.model_validate(dict(record))
     except ValidationError as error:
@@ -255,37 +256,14 @@ def _found(source: str | None, path: Path) -> str:
         raise InputError(f"{path}: the scene was made in Python; --scene names one in a file", key="scene")
     if source.partition(":")[0] in builtin_scenes():
         return source
-    for place in _places(source, path):
+    for place in (Path(source), *(folder / source for folder in path.resolve().parents)):
         if is_there(place):
             return str(place)
     raise InputError(f"{path}: {source}: not there, neither from the current folder nor from one above the "
                      "picture (--scene says where a scene is)", key="scene")
 
 
-def _places(source: str, path: Path) -> Iterator[Path]:
-    yield Path(source)
-    for folder in path.resolve().parents:
-        yield folder / source
-
-
-def _settings(wanted: type[Any], values: Mapping[str, Any], path: Path) -> Any:
-    from pydantic import ConfigDict, TypeAdapter, ValidationError
-
-    if issubclass(wanted, Settings):
-        return _composed(wanted, values, path)
-    hints, names = get_type_hints(wanted), [field.name for field in dataclasses.fields(wanted)]
-    if set(values) != set(names):
-        raise InputError(f"{path}: {wanted.__name__}: expected {', '.join(names)}; got {', '.join(values)}",
-                         key="settings")
-    try:
-        read = {key: TypeAdapter(hints[key], config=ConfigDict(extra="forbid")).validate_python(value)
-                for key, value in values.items()}
-    except ValidationError as error:
-        raise InputError(f"{path}: {wanted.__name__}: {error.errors()[0]['msg']}", key="settings") from error
-    return wanted(**read)
-
-
-def _composed(wanted: type[Settings], values: Mapping[str, Any], path: Path) -> Settings:
+def _settings(wanted: type[Settings], values: Mapping[str, Any], path: Path) -> Any:
     """Return settings of a record, which holds every key of their tree."""
     try:
         made = of_record(wanted, values)

@@ -39,18 +39,12 @@ class StillFrames(NamedTuple):
 
 
 def path_record(path: str, of: int, temporal: TemporalSettings | None) -> Record:
-    """Return, as JSON values, what all `of` frames of a sequence share beyond scene and method.
-
-    `path`: TOML file of the path; `temporal`: the temporal filter.
-    """
+    """Return what all `of` frames of a sequence share beyond scene and method: the path's file and the filter."""
     return {"path": {"source": path, "sha256": _digest(path)}, "of": of, "temporal": plain(temporal)}
 
 
 def frame_record(scene: Scene, way: Way, number: int, of: int) -> Record:
-    """Return, as JSON values, what one frame adds: its number, its camera and its lights in full.
-
-    `scene`: without the path `way`.
-    """
+    """Return what one frame adds: its number, camera and lights in full; `scene`: without the path `way`."""
     camera, lights = camera_and_lights(scene, way, number, of)
     return {"frame": number, "at_frame": {"camera": plain(camera), "lights": [light_json(light) for light in lights]}}
 
@@ -73,10 +67,7 @@ def same_sequence(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[str]:
 
 
 def require_repeatable(settings: Any) -> None:
-    """Refuse settings by which frames of a sequence would not be the same when they are made again.
-
-    Raises InputError if frames end by the clock, or would share a checkpoint.
-    """
+    """Refuse settings by which frames of a sequence end by the clock or share a checkpoint: none comes twice alike."""
     for key, why in (("seconds", "as the clock ends no frame of a sequence twice alike: say samples"),
                      ("checkpoint", "as a file holds the passes of one frame alone")):
         value = getattr(settings, key, None)
@@ -84,12 +75,7 @@ def require_repeatable(settings: Any) -> None:
 
 
 def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame, options: Mapping[str, Any]) -> Picture:
-    """Render one frame of a sequence, after those before it where the temporal filter needs them.
-
-    `scene`: without the path; `settings`: the method's in the first frame; `options`: of every `Frame`. The picture is
-    the same to the bit as in the whole sequence. Raises InputError if the path is not usable, or frames end by the
-    clock.
-    """
+    """Render one frame of a sequence to the bit as in the whole of it, after those that its temporal filter needs."""
     require_repeatable(settings)
     way, _ = read_path(frame.path, scene)
     first = frame.number if frame.temporal is None else 0
@@ -103,11 +89,7 @@ def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame,
 
 
 def render_still(scene: Scene, method: str, settings: Any, still: StillFrames, options: Mapping[str, Any]) -> Picture:
-    """Render the last frame of a resting scene, by a method and its temporal filter.
-
-    `settings`: the method's in the first frame; `options`: of every `Frame`, `shadows` by default those of
-    `usual_shadows`. Raises InputError if the method has no temporal filter.
-    """
+    """Render the last frame of a resting scene by a method and its temporal filter; InputError if it has none."""
     require_filter([method])
     options = {**options, "shadows": options.get("shadows") or usual_shadows(settings)}
     light = KeepingEstimate(find_method(method))

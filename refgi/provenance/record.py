@@ -1,8 +1,6 @@
-"""The record of a picture: all that is needed to make it again.
+"""The record of a picture: all that is needed to make it again, as one JSON object in every EXR, PNG and results.json.
 
-One JSON object, written into every EXR and PNG and, for what all pictures of a comparison share, into results.json.
-
-Which refgi this is: its version, the commit of its source tree, and the versions of what it stands on.
+What a scene consists of as JSON values and back, digests of its surfaces, and which refgi on which machine this is.
 """
 
 import dataclasses
@@ -65,10 +63,7 @@ def plain(value: Any) -> Any:
 
 
 def geometry_digest(scene: Scene) -> str:
-    """Return SHA-256 over all triangles, their normals, texture coordinates and which material each has.
-
-    Equal on every machine.
-    """
+    """Return SHA-256 over triangles, normals, texture coordinates and materials by number; equal on every machine."""
     shape, digest = scene.geometry, hashlib.sha256()
     for array, kind in ((shape.vertices, "<f8"), (shape.faces, "<i4"), (shape.material_of_face, "<i4"),
                         (shape.vertex_normals, "<f8")):
@@ -82,10 +77,7 @@ def geometry_digest(scene: Scene) -> str:
 
 
 def materials_digest(scene: Scene) -> str:
-    """Return SHA-256 over all materials, their names and their order, and every texel of their images.
-
-    Equal on every machine.
-    """
+    """Return SHA-256 over all materials in order, with every texel of their images; equal on every machine."""
     return hashlib.sha256(canonical_json([_material_json(one) for one in scene.materials]).encode()).hexdigest()
 
 
@@ -108,10 +100,7 @@ def _material_json(material: Material) -> dict[str, Any]:
 
 
 def light_json(light: Light) -> dict[str, Any]:
-    """Return a light's type and fields as JSON values, angles in rad, so that no bit is lost.
-
-    A spot's falloff is left out where it is the smoothstep.
-    """
+    """Return a light's type and fields as JSON values, angles in rad; the smoothstep falloff is left out."""
     kind = next(name for name, one in LIGHTS.items() if isinstance(light, one))
     fields: dict[str, Any] = plain(light)
     if isinstance(light, SpotLight) and light.falloff == SpotLight.falloff:  # as in earlier versions

@@ -79,10 +79,7 @@ def unsound(light: Array) -> int:
 
 
 def same_surface(before: Seen, after: Seen, changed: Changed) -> Array:
-    """Return which pixels of the part show the same place in both pictures, (h, w).
-
-    Depths within 1e-4 of each other, and the same albedo.
-    """
+    """Return which pixels of the part, (h, w), show the same place in both: depths within 1e-4, the same albedo."""
     depth, albedo = before.depth[changed.part], before.albedo[:, *changed.part]
     other = changed.back(after.depth, light=False) / changed.length
     colour = changed.back(after.albedo, light=False)
@@ -118,10 +115,7 @@ def rmse_apart(before: Seen, after: Seen, changed: Changed) -> float:
 
 
 def means_apart(before: Seen, after: Seen, changed: Changed) -> float:
-    """Return how far the means over pixels with a surface are apart, over that before; pictures of any size.
-
-    Infinity where only one of the two is black.
-    """
+    """Return how far the means over surfaces are apart, over that before; infinity where only one is black."""
     first, second = (seen.light[:, np.isfinite(seen.depth)].astype(np.float64) for seen in (before, after))
     if not first.any() and not second.any():
         return 0.0

@@ -4,15 +4,14 @@ import json
 import subprocess
 
 import pytest
-from click.testing import CliRunner
 
 from refgi.batch import code, schedule, work
 from refgi.bench import measure
 from refgi.bench.results import Result
-from refgi.cli.group import VerbGroup
 from refgi.compare.flip import Flip
 from refgi.errors import InputError
 from refgi.image import is_from_refgi
+from tests.cli.command import runner
 
 PLAN = """
 [batch]
@@ -26,10 +25,7 @@ lights = [16, 64]
 [gather]
 samples = 20
 """
-
-
-def run(*arguments):
-    return CliRunner().invoke(VerbGroup.refgi(), ["batch", *map(str, arguments)])
+run = runner("batch")
 
 
 @pytest.fixture(autouse=True)

@@ -6,10 +6,8 @@ import os
 import imageio.v3
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from refgi.cli import view as memory
-from refgi.cli.group import VerbGroup
 from refgi.cli.view import read_lights
 from refgi.cluster import ValSettings
 from refgi.errors import RefgiWarning
@@ -18,22 +16,11 @@ from refgi.methods import Picture, find_method, render
 from refgi.scene import Camera, PointLight, SpotLight, load_scene
 from refgi.settings import of
 from refgi.splat import SiiSettings
+from tests.cli.command import refused, runner
 
 TINY = ["--size", "12x10", "--rsm-resolution", "16", "--set", "lights=16"]
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # of clamps: tests/pairs/test_loss
-
-
-def run(*arguments):
-    return CliRunner().invoke(VerbGroup.refgi(), ["render", *(str(a) for a in arguments)])
-
-
-def refused(result, *words):
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    assert result.stderr.count("\n") == 1
-    for word in words:
-        assert word in result.stderr
-    return True
+run = runner("render")
 
 
 @pytest.fixture

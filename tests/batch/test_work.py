@@ -1,6 +1,7 @@
 """Jobs done: figures are those of a bench, buffers and truths are shared, errors are results."""
 
 import contextlib
+import dataclasses
 import importlib
 import warnings
 
@@ -12,7 +13,7 @@ from refgi.batch import work
 from refgi.batch.jobs import jobs_of
 from refgi.batch.outcome import is_done, read_outcome, read_outcomes, result_of
 from refgi.batch.plan import read_plan
-from refgi.batch.shared import Common
+from refgi.batch.shared import Common, digest_of, hashes_of
 from refgi.batch.work import Chunk, forget, run_chunk
 from refgi.bench import measure
 from refgi.bench.measure import bench_scene
@@ -25,6 +26,7 @@ from refgi.scene.path import scenes_along
 from refgi.scene.pathfile import read_path
 from refgi.sssil import HssilSettings
 from refgi.sssil.temporal import Sequence, TemporalSettings
+from refgi.stages import observe, stage
 from refgi.truth import TruthSettings
 from tests.batch.made import PLAN as SMALL_PLAN
 from tests.batch.made import run_of
@@ -278,3 +280,56 @@ def let_go():
 def no_flip(monkeypatch):
     """FLIP starts a process for each picture."""
     monkeypatch.setattr(measure, "flip", lambda *_: Flip(0.25))
+
+
+@dataclasses.dataclass
+class Pair:
+    left: object
+    right: object
+
+
+@stage("test_digest.inner")
+def inner(value):
+    return value + 1
+
+
+@stage("test_digest.outer")
+def outer(value):
+    return inner(value) * inner(value + 1)
+
+
+@stage("test_digest.last")
+def last(value):
+    return np.full(3, value)
+
+
+def test_a_digest_is_of_all_that_a_value_holds():
+    a = np.arange(6, dtype=np.float32)
+    values = [a, a.reshape(2, 3), a.astype(np.float64), a + np.float32(1e-6), (a,), [a], (a, a), None, 1, 1.0, True,
+              "1", {"a": 1}, {"b": 1}, {"a": 2}, Pair(1, 2), Pair(2, 1), {"a": a}, np.float32(1),
+              (1, (2, 3)), ((1, 2), 3)]
+    assert len({digest_of(value) for value in values}) == len(values)
+    assert digest_of(a[::-1]) == digest_of(a[::-1].copy())
+    assert digest_of({"a": 1, "b": 2}) == digest_of({"b": 2, "a": 1})
+
+
+def test_stages_come_in_the_order_in_which_they_end():
+    with observe(record=True) as log:
+        outer(2)
+        last(5)
+    assert hashes_of(log, {}) == (
+        ("test_digest.inner", digest_of(3)), ("test_digest.inner", digest_of(4)), ("test_digest.outer", digest_of(12)),
+        ("test_digest.last", digest_of(np.full(3, 5))))
+
+
+def test_a_shared_buffer_counts_alike_whether_it_ran_or_not():
+    with observe(record=True) as log:
+        last(1)
+        outer(2)
+        outer(3)
+        last(5)
+    buffers = {"test_digest.outer": ["first", "second"]}
+    assert hashes_of(log, buffers) == (
+        ("test_digest.last", digest_of(np.full(3, 1))), ("test_digest.outer", "first"), ("test_digest.outer", "second"),
+        ("test_digest.last", digest_of(np.full(3, 5))))
+    assert buffers == {"test_digest.outer": ["first", "second"]}

@@ -3,7 +3,6 @@
 import contextlib
 import dataclasses
 import importlib
-import warnings
 
 import numpy as np
 import pytest
@@ -18,7 +17,7 @@ from refgi.batch.work import Chunk, forget, run_chunk
 from refgi.bench import measure
 from refgi.bench.measure import bench_scene
 from refgi.compare.flip import Flip
-from refgi.errors import InputError, RefgiWarning
+from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.image import read_exr
 from refgi.scene import load_scene
@@ -30,6 +29,8 @@ from refgi.stages import observe, stage
 from refgi.truth import TruthSettings
 from tests.batch.made import PLAN as SMALL_PLAN
 from tests.batch.made import run_of
+
+pytestmark = pytest.mark.filterwarnings("ignore::refgi.errors.RefgiWarning")
 
 PLAN = SMALL_PLAN + "[vpl]\nlights = 16\n"
 
@@ -70,10 +71,8 @@ def test_figures_are_those_of_a_bench(tmp_path):
     jobs, common = jobs_of(plan), common_of(tmp_path, plan)
     assert done(jobs, common) == 3
     got = result_of(common.folder, jobs, read_outcomes(common.folder, jobs)).scenes[0]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)
-        expected = bench_scene(load_scene("cornell_box"), plan.grid, rounds=2, truth=plan.truth, width=24, height=18,
-                               **common.options)
+    expected = bench_scene(load_scene("cornell_box"), plan.grid, rounds=2, truth=plan.truth, width=24, height=18,
+                           **common.options)
     assert (got.scene, got.width, got.height, got.covered, got.mean, got.truth) == (
         "cornell_box", 24, 18, expected.covered, expected.mean, expected.truth)
     for one, other in zip((*got.runs, *got.line), (*expected.runs, *expected.line), strict=True):
@@ -139,9 +138,7 @@ def test_pictures_and_what_they_say(tmp_path):
     frame = Frame(load_scene("cornell_box"), width=24, height=18, **common.options)
     from refgi.splat import SiiSettings, sii
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)
-        light = sii(frame, jobs[0].choice.settings)
+    light = sii(frame, jobs[0].choice.settings)
     assert isinstance(jobs[0].choice.settings, SiiSettings)
     planes, record = read_exr(common.folder / jobs[0].picture)
     radiance = frame.radiance(light)
@@ -231,10 +228,8 @@ def test_a_temporal_filter_goes_on_from_frame_to_frame_also_in_another_process(t
     done(way[:1], common_of(tmp_path, plan, "other"))  # after which this process knows another frame, as any might
     done(way[2:], common)
     scene = load_scene("cornell_box").with_camera(width=24, height=18)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)
-        steps = list(Sequence(scenes_along(scene, read_path(tmp_path / "way.toml", scene)[0], 3), HssilSettings(),
-                              TemporalSettings(weight=0.7), **common.options))
+    steps = list(Sequence(scenes_along(scene, read_path(tmp_path / "way.toml", scene)[0], 3), HssilSettings(),
+                          TemporalSettings(weight=0.7), **common.options))
     for job, step in zip(way, steps, strict=True):
         planes, record = read_exr(common.folder / job.picture)
         assert np.array_equal(np.stack([planes[f"irradiance.{c}"] for c in "RGB"]), step.irradiance)

@@ -43,11 +43,6 @@ def wedge():
     return load_scene(WEDGE)
 
 
-@pytest.fixture(scope="module")
-def box():
-    return load_scene(BOX)
-
-
 @pytest.fixture
 def impatient(monkeypatch):
     """A skip of pixels without surface that leaves out a row of those with one as well."""

@@ -11,8 +11,7 @@ from refgi.cli.group import VerbGroup
 from refgi.compare import compare
 from refgi.compare.pages import number
 from refgi.compare.pictures import linear_planes
-from refgi.compare.report import page
-from refgi.compare.results import as_json, write_results
+from refgi.compare.report import as_json, page, write_results
 from refgi.frame import Frame
 from refgi.image import read_exr
 from refgi.methods import render

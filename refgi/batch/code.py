@@ -23,7 +23,7 @@ from refgi.methods import BUILT_IN, GROUP
 
 # what every result depends on beside its method: the buffers, the truth and what judges
 SHARED = ("refgi.frame:Frame", "refgi.truth:trace_truth", "refgi.bench.error:error_of", "refgi.compare.outcome:measure",
-          "refgi.compare.flip:flip")
+          "refgi.compare.metrics:flip")
 RUNNERS = ("refgi.bench.measure", "refgi.batch.work")  # by themselves: what else they import changes no result
 BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")  # fields that hold statements
 

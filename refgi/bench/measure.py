@@ -27,7 +27,7 @@ from refgi.bench.grid import TRUTH, Choice, Grid
 from refgi.bench.pictures import TRUTH_FILES, Place, Writer
 from refgi.bench.results import Run, SceneResult, Work, figures_of, known
 from refgi.compare.comparison import WARM_UP_SIZE, WITHOUT_VISIBILITY, limited, trace_reference
-from refgi.compare.flip import flip
+from refgi.compare.metrics import flip
 from refgi.compare.outcome import UNOCCLUDED, Reference, measure
 from refgi.errors import RefgiError, RefgiWarning, expect
 from refgi.frame import Frame

@@ -94,7 +94,7 @@ def _explain(session: Session, asked: Asked) -> int:
     from refgi import stages
     from refgi.bench.skips import measure_skips
     from refgi.cli.view import on_threads, require_memory, scene_of, settings_for, warm_up
-    from refgi.compare.results import ledger_json
+    from refgi.compare.report import ledger_json
     from refgi.errors import RefgiWarning
 
     method = asked.method

@@ -59,8 +59,8 @@ def _left() -> int | None:
 
 
 # by name the module of this package that has it
-VERBS = {"scenes": "short", "render": "render", "sequence": "sequence", "compare": "compare", "bench": "bench",
-         "batch": "batch", "choose": "bench", "report": "short", "vectors": "vectors", "check": "compare",
+VERBS = {"scenes": "short", "render": "render", "sequence": "sequence", "compare": "judge", "bench": "judge",
+         "batch": "batch", "choose": "judge", "report": "short", "vectors": "vectors", "check": "judge",
          "stress": "short", "explain": "explain", "settings": "short", "warm": "short", "info": "short"}
 HELP = """Indirect light by four published methods on the CPU, judged by path tracing.
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from refgi import stages
-from refgi.compare.flip import flip
+from refgi.compare.metrics import flip
 from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference, measure
 from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
@@ -250,8 +250,7 @@ def require_folder(folder: Path) -> None:
 
 
 def _write(comparison: Comparison, folder: Path, progress: Tell | None) -> None:
-    from refgi.compare.report import write_report
-    from refgi.compare.results import write_results
+    from refgi.compare.report import write_report, write_results
 
     for what, write in (("pictures and results.json", write_results), ("index.html", write_report)):
         if progress is not None:

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from refgi import stages
-from refgi.compare.flip import Flip
 from refgi.compare.metrics import (
     METRICS,
+    Flip,
     checked_mask,
     count_non_finite,
     decibels,

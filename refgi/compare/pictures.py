@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from refgi.compare.flip import LUMINANCE
+from refgi.compare.metrics import LUMINANCE
 from refgi.image import NOT_FINITE, write_png
 from refgi.provenance import Record
 from refgi.types import Array

@@ -16,7 +16,7 @@ from refgi.batch.shared import Common, digest_of, hashes_of
 from refgi.batch.work import Chunk, forget, run_chunk
 from refgi.bench import measure
 from refgi.bench.measure import bench_scene
-from refgi.compare.flip import Flip
+from refgi.compare.metrics import Flip
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.image import read_exr

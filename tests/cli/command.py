@@ -17,12 +17,16 @@ def runner(verb):
     return functools.partial(invoke, verb)
 
 
-def refused(result, *words, lines=1):
-    """Exit code 2, so many lines on stderr with these words, nothing on stdout."""
+def refused(result, *words):
+    """Exit code 2, lines on stderr with these words, nothing on stdout."""
     assert result.exit_code == 2, result.output
     assert result.stdout == ""
     assert result.stderr.startswith("refgi: ")
-    assert lines is None or result.stderr.count("\n") == lines
     for word in words:
         assert word in result.stderr, result.stderr
     return True
+
+
+def refused_in_a_line(result, *words):
+    assert result.stderr.count("\n") == 1, result.stderr
+    return refused(result, *words)

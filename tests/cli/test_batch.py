@@ -8,7 +8,7 @@ import pytest
 from refgi.batch import code, schedule, work
 from refgi.bench import measure
 from refgi.bench.results import Result
-from refgi.compare.flip import Flip
+from refgi.compare.metrics import Flip
 from refgi.errors import InputError
 from refgi.image import is_from_refgi
 from tests.cli.command import runner
@@ -157,9 +157,16 @@ def test_thresholds_and_a_baseline_fail_the_batch(tmp_path, plan, did):
 
 def test_since_a_commit_only_what_reaches_changed_code(tmp_path, plan, did, monkeypatch):
     repository = tmp_path / "repository"
-    monkeypatch.setattr(code, "PACKAGE", repository)
-    monkeypatch.setattr(code, "file_of", lambda name: repository / f"{name}.py")
-    monkeypatch.setattr(code, "reached", lambda place: {"shared", place.partition(":")[0].rpartition(".")[2]})
+    changed = code.changed_methods
+
+    def changed_there(*arguments):
+        with monkeypatch.context() as patch:
+            patch.setattr(code, "PACKAGE", repository)
+            patch.setattr(code, "file_of", lambda name: repository / f"{name}.py")
+            patch.setattr(code, "reached", lambda place: {"shared", place.partition(":")[0].rpartition(".")[2]})
+            return changed(*arguments)
+
+    monkeypatch.setattr(code, "changed_methods", changed_there)
     repository.mkdir()
     for name in ("sii", "gather", "shared"):
         (repository / f"{name}.py").write_text("x = 1\n")

@@ -16,8 +16,9 @@ from refgi.cli import session as module
 from refgi.cli.group import VERBS
 from refgi.cli.session import progress
 from refgi.image import read_exr
-from tests.cli.command import TINY, refused
+from tests.cli.command import TINY
 from tests.cli.command import invoke as run
+from tests.cli.command import refused_in_a_line as refused
 
 HELP_SECONDS = 0.3  # the aim; the test allows a busy machine three times as much
 

@@ -7,8 +7,9 @@ import pytest
 
 from refgi.cli.destination import Permission, make, picture_files
 from refgi.image import is_from_refgi, write_exr, write_png
-from tests.cli.command import TINY, refused
+from tests.cli.command import TINY
 from tests.cli.command import invoke as run
+from tests.cli.command import refused_in_a_line as refused
 
 WAY = "frames = 2\ncamera = [{at = 0.0, vfov_deg = 30.0}]"
 VERBS = {

@@ -18,7 +18,8 @@ from refgi.scene import Camera, PointLight, SpotLight, load_scene
 from refgi.settings import of
 from refgi.splat import SiiSettings
 from refgi.vectors.rows import edited
-from tests.cli.command import refused, runner
+from tests.cli.command import refused_in_a_line as refused
+from tests.cli.command import runner
 from tests.scene.test_emissive_lamps import room
 
 TINY = ["--size", "12x10", "--rsm-resolution", "16", "--set", "lights=16"]

@@ -14,7 +14,7 @@ import refgi
 import refgi.methods
 from refgi.compare import compare
 from refgi.compare import comparison as module
-from refgi.compare.flip import Flip
+from refgi.compare.metrics import Flip
 from refgi.errors import InputError, RefgiWarning
 from refgi.frame import Frame
 from refgi.method import Method

@@ -15,7 +15,7 @@ import pytest
 from pydantic import ConfigDict, create_model
 
 from refgi.compare import pictures
-from refgi.compare.results import as_json, file_names, signed_error, write_results
+from refgi.compare.report import as_json, file_names, signed_error, write_results
 from refgi.image import is_from_refgi, read_exr, read_png_attributes
 from refgi.provenance import plain
 
@@ -167,7 +167,7 @@ spec = importlib.util.spec_from_file_location("by_hand", sys.argv[1])
 by_hand = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(by_hand)
 from refgi.compare.report import write_report
-from refgi.compare.results import write_results
+from refgi.compare.report import write_results
 comparison = by_hand.make_comparison(by_hand.make_scene())
 print("ready", flush=True)
 while True:

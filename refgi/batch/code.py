@@ -1,9 +1,7 @@
 """Which sources a method's pictures depend on: the modules that its imports reach, name by name.
 
 `from refgi.scene import Scene` reaches the module that defines `Scene` and not whatever else the package's `__init__`
-imports, so that methods of one package depend on each other only where one uses the other. Imports inside functions
-count, those for type checkers do not. A source counts by its syntax tree without docstrings: comments, line breaks and
-documentation change nothing.
+imports. Imports inside functions count, those for type checkers do not, comments and docstrings change nothing.
 """
 
 import ast

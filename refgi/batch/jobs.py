@@ -1,9 +1,7 @@
-"""Jobs of a plan, each named by what its result depends on.
+"""Jobs of a plan, each named by what its result depends on: one method and choice of settings on one frame of a scene.
 
-A job runs one method with one choice of settings on one frame of one scene, with every seed. Its name is a SHA-256 of
-the scene as that frame shows it, the picture's size, all settings of the method and of the truth that judges it, the
-seeds, the sources that they reach (`refgi.batch.code`) and the packages that compute. What has the same name has the
-same result, whatever plan asked for it.
+The name is a SHA-256 of the scene as that frame shows it, the picture's size, all settings of the method and of its
+truth, the seeds, the sources that they reach (`refgi.batch.code`) and the packages that compute.
 """
 
 import dataclasses

@@ -1,14 +1,8 @@
 """Results of jobs: one as a file, all as a bench's, flicker and lag of a sequence, and those of an earlier batch.
 
-Symbols: x_k a method's picture of frame k, r_k the truth, v_k the variance of its mean; the truths of two frames have
-different seeds, so that their noise is independent. Means are over the pixels with light in both frames, of the picture
-or of the truth, and over all frames.
-
-- flicker^2 = mean |(x_k - x_k-1) - (r_k - r_k-1)|^2: what changes beside what should. A perfect picture has
-  mean (v_k + v_k-1) of it, the truth's own noise.
-- lag d makes x_k nearest to r_k + d (r_k-1 - r_k): d = (mean (x_k - r_k)(r_k-1 - r_k) - v) / (mean (r_k-1 - r_k)^2 - w)
-  with v = mean v_k and w = mean (v_k + v_k-1), which the noise of r adds to each mean. A light that grows steadily and
-  is shown d frames late has the lag d, and a blend with the share a of the frame before a / (1 - a).
+x_k is a method's picture of frame k, r_k the truth, v_k the variance of its mean, w = v_k + v_k-1; truths of two frames
+have independent noise. flicker^2 = mean |(x_k - x_k-1) - (r_k - r_k-1)|^2, of a perfect picture mean w; lag
+d = (mean (x_k - r_k)(r_k-1 - r_k) - v) / (mean (r_k-1 - r_k)^2 - w), a / (1 - a) of a blend with the share a.
 """
 
 import contextlib

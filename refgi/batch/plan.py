@@ -1,10 +1,7 @@
-"""PLAN.toml: a grid of settings with the scenes, the frames and the thresholds of a batch.
+"""PLAN.toml: a grid of settings with the scenes, the frames and the thresholds of a batch (docs/batch.md).
 
-`[batch]` names the scenes and what is seen of them, `[expect]` the thresholds; every other table is one of the grid
-(`refgi.bench.grid`). Files are named from the plan's folder.
-
-A threshold's key is scene, method, the setting as tables label it where one alone is meant, and figure, with dots
-between. Without a setting all of the method's have to hold, and a scene on a path stands for each of its frames.
+`[batch]` names the scenes and what is seen of them, `[expect]` the thresholds by scene, method, setting and figure;
+every other table is one of the grid (`refgi.bench.grid`). Files are named from the plan's folder.
 """
 
 import operator

@@ -1,13 +1,7 @@
 """Jobs spread over processes of this machine or over machines, and what they will take.
 
-On one machine, a worker that dies, by the system or by a fault of compiled code, takes no other job along: the jobs
-that may have ended it run again, each in a process of its own, and one that ends that too has failed.
-
-Over machines, a worker that dies loses what it was at; dask gives its chunk to another one, which goes on after the
-jobs that have a result. A job that ends several workers has failed.
-
-For an estimate, one run at each size comes before the timed one, for its kernels. What does not grow with the picture,
-RSMs above all, is in the part that two sizes tell apart; noise of the clock never makes a time fall with the size.
+A worker that dies, by the system or by a fault of compiled code, takes no other job along: on one machine those that
+may have ended it run again, each in a process of its own; over machines dask gives its chunk to another one.
 """
 
 import contextlib

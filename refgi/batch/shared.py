@@ -1,8 +1,7 @@
 """What all jobs of one frame share: scene, buffers and the truth.
 
-Truths stay in a store that batches share: a folder for each choice of
-how they are traced and by which sources, in it a checkpoint for each scene. A process that needs a truth which another
-one is tracing waits for it.
+Each buffer is computed once in a process, with all its channels; its time counts for each job that uses it. Truths stay
+in a store that batches share, by how they are traced and by which sources; who needs one that is traced waits for it.
 """
 
 import contextlib

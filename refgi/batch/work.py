@@ -1,11 +1,8 @@
 """Jobs done one after the other in one process, each leaving its picture and then its result.
 
-A job first runs once with every stage recorded: that loads its kernels, fills the buffers it shares and gives the
-digests of its stages. Then it runs once a seed, timed; its time is that of its own stages and of the buffers it used,
-whichever job computed them.
-
-The temporal filter's state stays in the process that does the frames in turn; a process that goes on in the middle of a
-path makes it again from the picture of the frame before.
+A job runs once with every stage recorded, which loads kernels and fills buffers, then once a seed, timed: its time has
+that of the buffers it used, whichever job computed them. A process that goes on in the middle of a path makes the
+temporal filter's state again from the picture of the frame before.
 """
 
 import contextlib

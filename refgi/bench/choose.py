@@ -1,14 +1,8 @@
-"""`choose`: the cheapest method and settings that meet a wish on a scene, found without running all.
+"""`choose`: the cheapest method and settings that meet a wish on a scene, found without running all (docs/choose.md).
 
-Along a track error falls and time grows. For an error, the walk goes up all tracks at once on a small picture, always
-to the probe that promises to be fastest, and ends where that one would take longer than what was found. Between a probe
-that meets the wish and the one before it lies the first rung that does. A track is left where it would miss the wish
-even if its error went on falling as it did last: it falls ever slower. Each find is timed at full size and judged
-there, the fastest first: one that misses moves up its track as far as its slope says, one that meets moves down while
-it does.
-
-For a time, each track is followed at full size up to that time, the small picture ranks where they come to, and the
-first few are judged at full size.
+For an error, the walk goes up all tracks at once on a small picture, always to the probe that promises to be fastest.
+A track is left where it would miss the wish even if its error went on falling as it did last: it falls ever slower.
+Each find is judged at full size, the fastest first. For a time, each track is followed at full size up to that time.
 """
 
 import dataclasses

@@ -48,21 +48,18 @@ def said_of_split(split: "Split") -> str:
     return f"{text} With {name} alone switched off RMSE would be {percent(rmse)} %."
 
 
-def tables_of(splits: "Sequence[Split]") -> list[str]:
-    """Return the tables of a scene's splits as lines of Markdown; none without splits."""
-    return [line for split in splits for line in _table(split)]
+def tables_of(splits: "Sequence[Split]") -> Iterator[str]:
+    """Yield the tables of a scene's splits as lines of Markdown."""
+    for split in splits:
+        yield from ("", f"Error split of {split.label}, {split.width} x {split.height}:", "")
+        yield from (f"| {' | '.join(SPLIT_COLUMNS)} |", f"|---|{'--:|' * (len(SPLIT_COLUMNS) - 1)}")
+        yield from (f"| {' | '.join(row)} |" for row in rows_of_split(split))
+        yield from ("", said_of_split(split))
 
 
 def percent(value: float | None) -> str:
     """Return a share in %, with its sign; nothing where it is not known."""
     return "" if value is None else number(100 * value)
-
-
-def _table(split: "Split") -> Iterator[str]:
-    yield from ("", f"Error split of {split.label}, {split.width} x {split.height}:", "")
-    yield from (f"| {' | '.join(SPLIT_COLUMNS)} |", f"|---|{'--:|' * (len(SPLIT_COLUMNS) - 1)}")
-    yield from (f"| {' | '.join(row)} |" for row in rows_of_split(split))
-    yield from ("", said_of_split(split))
 
 
 def _mean_without(split: "Split", part: "Part") -> float | None:

@@ -1,19 +1,14 @@
 """What each skip saves on a scene, measured, with the proof that it changes no bit of the picture.
 
-A method renders the scene with all skips on, which counts what each has to leave out, and with each of these off, which
-compares bits and loads kernels. Then come rounds: a picture with all on before each one without, so that a slow moment
-of the machine falls on both. Beside that stand things that could be left out at the cost of a difference, with the
-setting to type, and skips that have no switch, with the reason.
-
-No setting leaves dim lights out: lights stand for equal shares of the maps, and `lights.count` draws fewer that stand
-for more each. A light's part is its irradiance over sampled pixels, clamped as the method clamps it, unoccluded.
+Rounds have a picture with all skips on before each one without, so that a slow moment of the machine falls on both.
+Beside that stand things that could be left out at the cost of a difference, with the setting to type, lights too dim to
+matter, which no setting leaves out, and skips that have no switch, with the reason.
 """
 
-import hashlib
 import statistics
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,11 +50,7 @@ class DimLights(Strict):
 def dim_lights(
     frame: Frame, settings: Settings, rounds: int, *, share: float = SHARE, clock: Clock = time.perf_counter
 ) -> DimLights | None:
-    """Measure what leaving out the dimmest pixel lights would save and cost; at least `share` of the light is kept.
-
-    None for a method without pixel lights, with rays for them or more than `MOST`, and for a dark picture. `clock` in
-    s.
-    """
+    """Measure what leaving out the dimmest lights saves and costs, `share` of the light kept; None without any."""
     chosen = getattr(settings, "lights", None)
     pairs = getattr(settings, "effective_pairs", None)
     if not isinstance(chosen, LightSettings) or pairs is None:
@@ -163,32 +154,31 @@ def difference(picture: Picture, plain: Picture) -> float | None:
 
 
 
-class Kernel(NamedTuple):
-    """A skip inside of a kernel, without a switch."""
+class Unmeasured(Strict):
+    """A skip without a switch."""
 
-    methods: frozenset[str]
     meaning: str
     reason: str
 
 
-SPLATTING = frozenset({"sii", "multires", "val"})
-UNMEASURED = (
-    Kernel(SPLATTING, "lights without diffuse flux, or without lobe beside others that have one",
-           "float32 sums close after every 64 lights: dark ones among them would move where"),
-    Kernel(SPLATTING | {"gather", "vpl"}, "five of six faces of a spot light's map",
-           "a cube's texels lie elsewhere: other pixel lights, other bits"),
-    Kernel(frozenset({"val"}), "visibility at the receivers of a tile that get no light",
-           "those with light move together inside of the kernel that also lights them"),
-    Kernel(frozenset({"val"}), "triangles wholly behind a map's hemisphere", "inside of the rasterizer"),
-    Kernel(frozenset({"val"}), "the basis of a map's texels where it is empty",
-           "they are all alike, and copied inside of the kernel that filters the others"),
-    Kernel(frozenset({"multires"}), "cells of subsplats without surface", "the list of leaves is made without them"),
-    Kernel(frozenset({"hssil"}), "samples that are dark for a whole strip of a level",
-           "the others are summed in twos: dark ones among them would move which"),
-    Kernel(frozenset({"truth"}), "shadow rays of samples that give no light",
-           "the kernel that draws samples sorts them out"),
-    Kernel(frozenset({"truth", "vpl"}), "pixels without surface", "rays start on triangles, which these have not"),
-)
+SPLATTING = {"sii", "multires", "val"}
+# skips inside of kernels: of which methods, what they leave out, and why there is no switch
+UNMEASURED: tuple[tuple[frozenset[str], Unmeasured], ...] = tuple(
+    (frozenset(methods), Unmeasured(meaning=meaning, reason=reason)) for methods, meaning, reason in (
+        (SPLATTING, "lights without diffuse flux, or without lobe beside others that have one",
+         "float32 sums close after every 64 lights: dark ones among them would move where"),
+        (SPLATTING | {"gather", "vpl"}, "five of six faces of a spot light's map",
+         "a cube's texels lie elsewhere: other pixel lights, other bits"),
+        ({"val"}, "visibility at the receivers of a tile that get no light",
+         "those with light move together inside of the kernel that also lights them"),
+        ({"val"}, "triangles wholly behind a map's hemisphere", "inside of the rasterizer"),
+        ({"val"}, "the basis of a map's texels where it is empty",
+         "they are all alike, and copied inside of the kernel that filters the others"),
+        ({"multires"}, "cells of subsplats without surface", "the list of leaves is made without them"),
+        ({"hssil"}, "samples that are dark for a whole strip of a level",
+         "the others are summed in twos: dark ones among them would move which"),
+        ({"truth"}, "shadow rays of samples that give no light", "the kernel that draws samples sorts them out"),
+        ({"truth", "vpl"}, "pixels without surface", "rays start on triangles, which these have not")))
 
 
 class MeasuredSkip(Strict):
@@ -212,13 +202,6 @@ class MeasuredSkip(Strict):
     def saves(self) -> float:
         """Median of what it saves, s."""
         return statistics.median(self.saved)
-
-
-class Unmeasured(Strict):
-    """A skip without a switch."""
-
-    meaning: str
-    reason: str
 
 
 class SkipReport(Strict):
@@ -261,19 +244,20 @@ def measure_skips(
         changes = changes_of(method, chosen, lights)
         jobs = [*(plain._replace(off=(name,)) for name in names),
                 *(plain._replace(settings=change.settings) for change in changes)]
-        comparisons = _compared(jobs, first, tell)
+        comparisons = list(_compared(jobs, first, tell))
         times = in_turn(plain.run, [job.run for job in jobs], rounds, clock, tell)
     results = list(zip(times, comparisons, strict=True))
     return SkipReport(
         scene=scene.name, method=method, width=first.frame.width, height=first.frame.height,
         times=tuple(seconds for on, _ in times for seconds in on),
-        skips=tuple(_measured(name, counts[name], *result) for name, result in zip(names, results, strict=False)),
+        skips=tuple(MeasuredSkip(name=name, **skips.SKIPS[name]._asdict(), **counts[name]._asdict(), times=on,
+                                 times_without=off, same_bits=same)
+                    for name, ((on, off), (same, _)) in zip(names, results, strict=False)),
         trades=tuple(Trade(meaning=change.meaning, changes=change.changes, times=on, times_changed=changed,
-                           difference=one.difference)
-                     for change, ((on, changed), one) in zip(changes, results[len(names) :], strict=True)),
+                           difference=off)
+                     for change, ((on, changed), (_, off)) in zip(changes, results[len(names) :], strict=True)),
         dim_lights=lights,
-        unmeasured=tuple(Unmeasured(meaning=one.meaning, reason=one.reason) for one in UNMEASURED
-                         if method in one.methods))
+        unmeasured=tuple(one for methods, one in UNMEASURED if method in methods))
 
 
 class _Job(NamedTuple):
@@ -290,20 +274,14 @@ class _Job(NamedTuple):
             return render(self.scene, self.method, self.settings, **self.options)
 
 
-class _Comparison(NamedTuple):
-    """A picture beside the plain one."""
-
-    same_bits: bool
-    difference: float | None
-
-
-def _compared(jobs: Sequence[_Job], plain: Picture, tell: Tell) -> list[_Comparison]:
-    bits, made = _hash(plain), []
+def _compared(jobs: Sequence[_Job], plain: Picture, tell: Tell) -> Iterator[tuple[bool, float | None]]:
+    """Yield for each job whether its picture has the bits of the plain one, and by how much it is off."""
     for number, job in enumerate(jobs):
         tell("comparing bits", number / len(jobs))
         picture = job.run()
-        made.append(_Comparison(_hash(picture) == bits, difference(picture, plain)))
-    return made
+        same = picture.irradiance.tobytes() == plain.irradiance.tobytes() and (
+            picture.radiance.tobytes() == plain.radiance.tobytes())
+        yield same, difference(picture, plain)
 
 
 def in_turn(plain: Callable[[], object], others: Sequence[Callable[[], object]], rounds: int, clock: Clock,
@@ -318,15 +296,3 @@ def in_turn(plain: Callable[[], object], others: Sequence[Callable[[], object]],
                 one()
                 took.append(clock() - started)
     return [(tuple(before), tuple(own)) for before, own in times]
-
-
-def _measured(name: str, count: skips.Count, times: Times, one: _Comparison) -> MeasuredSkip:
-    return MeasuredSkip(name=name, **skips.SKIPS[name]._asdict(), **count._asdict(), times=times[0],
-                        times_without=times[1], same_bits=one.same_bits)
-
-
-def _hash(picture: Picture) -> bytes:
-    digest = hashlib.sha256()
-    for plane in (picture.irradiance, picture.radiance):
-        digest.update(np.ascontiguousarray(plane).tobytes())
-    return digest.digest()

@@ -1,20 +1,8 @@
 """The error of a method, split into its approximations: pictures from the truth to the method, one more in each.
 
-The chain starts at the truth. Then come truths that leave out what the method cannot do without, such as unseen
-senders; then the method with all other approximations switched off; then one after the other is switched on, in the
-order of the method's pipeline. Beside the chain stands the method with each switched off alone.
-
-Every picture is made with each of several seeds. One that draws no random numbers is made once.
-
-x_0 is the truth, x_n the picture of the method as it is used, x_k has one approximation more than x_k-1. Its step is
-d_k = x_k - x_k-1, the whole error e = x_n - x_0 = d_1 + ... + d_n. How parts add up:
-
-- changes of the mean add up exactly: mean e = sum of mean d_k;
-- mean squares do so with their cross terms: mean e^2 = sum of mean d_k^2 + 2 sum over j < k of mean d_j d_k;
-- shares, mean d_k e / mean e^2, add up to 1: each has its own square and half of its cross terms with others; a share
-  below 0 takes back what others did.
-
-Switched off alone, approximations do not add up: what is missing is `cross_alone`.
+x_0 is the truth, x_n the picture of the method as it is used; d_k = x_k - x_k-1 is a step, e = d_1 + ... + d_n the
+whole error. Changes of the mean add up, mean squares with their cross terms, shares mean d_k e / mean e^2 to 1; what is
+missing where each is switched off alone is `cross_alone` (docs/error_split.md).
 """
 
 import dataclasses
@@ -196,12 +184,7 @@ def with_splits(
     result: SceneResult, scene: Scene, grid: Grid, *, seeds: int, truth: TruthSettings | None = None,
     tell: Tell = lambda *_: None, defaults: bool = True, still: StillFrames | None = None, **frame_options: Any,
 ) -> SceneResult:
-    """Split the error of each method at the knee of its curve and, with `defaults`, at its defaults.
-
-    `seeds` pictures of each kind: from two on bias and variance are told apart. Without width and height the longer
-    side has `SIDE` pixels at most. Splits are by method in the order of the runs; what could not be split is among the
-    failures. `still`: frames of the resting scene that methods with a temporal filter blend.
-    """
+    """Split the error of each method at the knee of its curve and, with `defaults`, at its defaults; `seeds` each."""
     splits, failures = [], dict(result.failures)
     size = dict(zip(("width", "height"), small_size(result.width, result.height), strict=True))
     renderer = Renderer(scene, truth, tell, still=still, **{**size, **frame_options})

@@ -27,10 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _open_standard_files() -> None:
-    """Put the null device where stdin, stdout or stderr are closed: the next file to be opened would take the number.
-
-    What a library prints would then end up in a picture.
-    """
+    """Put the null device where stdin, stdout or stderr are closed, lest a picture's file takes their number."""
     for number in range(3):
         try:
             os.fstat(number)

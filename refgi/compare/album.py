@@ -1,13 +1,9 @@
 """The pictures of a page as data for its script: irradiance to radiance, worst places, planes as text.
 
-All pictures of a view share L_0 (emission and reflected direct light) and k (albedo / pi), so a page holds them once
-and each picture's irradiance alone. Both are found from the pictures by least squares, with 0 <= k <= 1 / pi.
-
-A plane is divided by a power of two that brings its largest number just below 2^15: no number overflows, and all above
-2^-29 of the largest keep 11 bits of a half float. Halves are compared as the integers of their bits, which grow with
-the logarithm of the number: what is stored is the difference to the second channel (channels differ by a nearly
-constant factor, noise included), then to the pixel on the left; high bytes stand before low bytes. Planes over the
-limit of a page are replaced by means over blocks of 2 x 2, 4 x 4 ... pixels, the least important ones first.
+All pictures of a view share L_0 (emission and reflected direct light) and k (albedo / pi), 0 <= k <= 1 / pi, fitted by
+least squares: a page holds them once and each picture's irradiance alone. Planes are half floats of a power of two,
+compared as integers: what is stored is the difference to the second channel, then to the pixel on the left. Over the
+limit of a page, the least important become means over blocks of pixels first.
 """
 
 import base64

@@ -1,11 +1,8 @@
 """One comparison: every method on one scene, judged against path tracing.
 
-A method that knows nothing of what blocks indirect light does not converge to the truth but to the truth without
-visibility; both are traced, and each such method is measured against both. Figures are of the indirect irradiance,
-the quantity that the methods compute; FLIP is of the radiance, the picture that a viewer sees.
-
-Each method runs twice: once on a few pixels, so that compiling is not timed, then on a frame of its own, whose buffers
-(G-buffer, RSM) are part of its time.
+A method that knows nothing of what blocks indirect light converges to the truth without visibility, and is measured
+against both. Figures are of the indirect irradiance, FLIP is of the radiance. Each method runs on a few pixels, so that
+compiling is not timed, then on a frame of its own, whose buffers (G-buffer, RSM) are part of its time.
 """
 
 import contextlib

@@ -152,10 +152,7 @@ class Crop(NamedTuple):
 
 
 def worst_crops(error: Array, covered: Array) -> tuple[Crop, ...]:
-    """Return up to `PLACES` squares with the most squared error, (h, w), worst first, none over another.
-
-    An error that is not finite counts as the largest that is; no square where there is no error on covered pixels.
-    """
+    """Return up to `PLACES` squares with the most squared error, worst first, none over another; NaN counts most."""
     squares = _squares(error, covered)
     side = min(*error.shape, max(LEAST_SIDE, min(error.shape) // SHARE_OF_SIDE))
     sums, whole = _window_sums(squares, side), float(squares.sum())

@@ -3,14 +3,10 @@
 Both are linear RGB, (3, h, w); only pixels of `covered`, (h, w) bool, count, all where it is absent; sums are float64.
 InputError if shapes differ, no pixel is covered, or a compared pixel is NaN or infinite (with their count).
 
-SSIM (Wang, Bovik, Sheikh and Simoncelli 2004) is of linear values: Gaussian windows of 11x11 pixels and sigma 1.5
-around every covered pixel; weights of pixels outside the picture or the mask are zero and the rest is normalised again,
-so border and mask are treated alike. Population variances, K1 = 0.01, K2 = 0.03. The dynamic range is the reference's
-maximum, since linear values have no fixed white.
-
-FLIP, the visible difference (Andersson et al. 2020, 2021), is by the flip-evaluator package, which is optional and runs
-in a child process, because it ends its whole process on input it dislikes. Exposures are always given: left to itself
-it derives dozens of absurd ones from the dark references that are usual here.
+SSIM (Wang, Bovik, Sheikh and Simoncelli 2004) is of linear values, so the dynamic range is the reference's maximum;
+border and mask are treated alike: weights of pixels outside are zero and the rest is normalised again. FLIP (Andersson
+et al. 2020, 2021) is by the optional flip-evaluator, in a child process, because it ends its process on input it
+dislikes; left to itself it derives dozens of absurd exposures from dark references.
 """
 
 import importlib.util
@@ -75,19 +71,13 @@ def bias(image: Array, reference: Array, covered: Array | None = None) -> float:
 
 
 def psnr(image: Array, reference: Array, covered: Array | None = None) -> float:
-    """Return the peak signal-to-noise ratio, 10 log10(max(r)^2 / MSE), dB.
-
-    Infinite for equal pictures, nan for a wholly black reference.
-    """
+    """Return the peak signal-to-noise ratio, 10 log10(max(r)^2 / MSE), dB: infinite if equal, nan for a black r."""
     x, r = samples(image, reference, covered)
     return decibels(float(r.max()), float(np.mean((x - r) ** 2)))
 
 
 def ssim(image: Array, reference: Array, covered: Array | None = None) -> float:
-    """Return the mean structural similarity over covered pixels and channels.
-
-    1 for equal pictures; nan where the reference's maximum is not positive.
-    """
+    """Return the mean structural similarity over covered pixels and channels, 1 for equal pictures; nan if r <= 0."""
     mask = checked_mask(image, reference, covered)
     samples(image, reference, mask)
     c1, c2 = _constants(reference, mask)
@@ -254,10 +244,7 @@ def flip(image: Array, reference: Array, covered: Array) -> Flip:
 
 
 def choose_exposures(reference: Array, covered: Array) -> tuple[float, float, int] | None:
-    """Choose exposures from one that keeps the brightest 1 % at white to one that lifts the median there.
-
-    First and last in stops and how many, over covered pixels that are not black; None for a black reference.
-    """
+    """Choose exposures, first and last in stops and how many: from the brightest 1 % at white to the median there."""
     luminance = np.tensordot(LUMINANCE, reference[:, covered].astype(np.float64), 1)
     lit = luminance[luminance > 0]
     if not lit.size:

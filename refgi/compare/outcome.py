@@ -1,10 +1,7 @@
-"""What a comparison found: references, methods judged against them, and how it was made.
-
-All figures of a picture at once, each beside what the reference's own noise gives.
+"""What a comparison found: references, methods judged against them, each figure beside what noise alone gives.
 
 A perfect picture compared with a noisy reference does not score zero: its MSE is the mean of v, the variance of the
-reference's mean. That expectation stands beside each figure, and a figure that does not rise above it says nothing
-about the picture.
+reference's mean. A figure that does not rise above that expectation says nothing about the picture.
 """
 
 import dataclasses

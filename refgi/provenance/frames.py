@@ -56,10 +56,7 @@ def whole_record(scene: Scene, frame: SequenceFrame) -> Record:
 
 
 def same_sequence(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[str]:
-    """Return in which keys two records of frames are not of one sequence, those of objects after a dot.
-
-    How scene and path were named, and what an estimate came to, does not count.
-    """
+    """Return in which keys two frames' records are not of one sequence; names of files and estimates do not count."""
     same = {"estimate": None}
     left, right = (_flat({**one, **same, **{key: {**one.get(key, {}), "source": None} for key in ("scene", "path")}})
                    for one in (a, b))

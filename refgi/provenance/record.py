@@ -186,11 +186,7 @@ def program() -> dict[str, str]:
 
 @functools.cache
 def git_id(package: Path) -> str | None:
-    """Return the commit of the checkout that a package's folder is part of, with "-dirty" where a file in it differs.
-
-    None where git does not keep the folder: a package installed inside another project's checkout is not of that
-    project.
-    """
+    """Return the commit of the checkout that keeps a package, with "-dirty" where a file differs; None without one."""
     if not _git(package, "ls-files", "__init__.py"):
         return None
     commit = _git(package, "rev-parse", "HEAD")

@@ -1,8 +1,7 @@
 """Promises of numerical stability: each with its settings and limit, and what was found of it, as data and table.
 
-Bits are promised where a change rounds nothing, or names the same triangles otherwise. Where numbers round anew, the
-limit is twice the worst that was observed on scenes that stand in docs/precision.md. Lights that are drawn from a map
-are other lights after some changes, so there every texel is a light.
+Bits are promised where a change rounds nothing, or names the same triangles otherwise; where numbers round anew, twice
+the worst that was observed (docs/precision.md). Where other lights would be drawn, every texel is a light.
 """
 
 import builtins

@@ -99,10 +99,7 @@ def bits_apart(before: Seen, after: Seen, changed: Changed) -> int:
 
 
 def rmse_apart(before: Seen, after: Seen, changed: Changed) -> float:
-    """Return the RMSE over all pixels that show the same place, over the mean of the picture before.
-
-    Infinity where the picture before is black and that after is not, and where no pixel shows the same place.
-    """
+    """Return the RMSE over pixels that show the same place, over the mean before; infinity where none does."""
     first = before.light[:, *changed.part].astype(np.float64)
     apart = changed.back(after.light.astype(np.float64)) - first
     kept = same_surface(before, after, changed)
@@ -137,18 +134,11 @@ PART = "pictures"
 SIGMAS = 4.0  # of an estimate, that it may lie above what light can bring
 
 
-class Shown(NamedTuple):
-    """What a person sees of a row: the same pixels before and after, W/m^2."""
-
-    before: Array  # (3, h, w)
-    after: Array
-
-
 class Found(NamedTuple):
     """A row, and its pictures where it has some."""
 
     row: Row
-    shown: Shown | None = None
+    shown: tuple[Array, Array] | None = None  # (3, h, w) W/m^2: the same pixels before and after
 
 
 class Silence(NamedTuple):
@@ -227,7 +217,7 @@ class _Method:
             figure, degrees = estimates_apart(before, after, changed)
             limit = float(student.isf(UNLIKELY / 6, degrees))  # either side of three channels
             doubt = before.estimate.doubt or after.estimate.doubt
-        shown = None if how.promise == "mean" else Shown(before.light[:, *changed.part], changed.back(after.light))
+        shown = None if how.promise == "mean" else (before.light[:, *changed.part], changed.back(after.light))
         yield Found(self._row(change.name, how._replace(limit=limit), math.nan if doubt else figure, unit,
                               f"{change.about}; {doubt}" if doubt else change.about), shown)
 

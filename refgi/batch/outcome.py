@@ -21,6 +21,7 @@ from refgi.batch.plan import Finding, figure_of, place_of
 from refgi.bench.grid import TRUTH
 from refgi.bench.measure import compared
 from refgi.bench.results import PathResult, Result, Run, SceneResult, Strict, known
+from refgi.compare.pictures import rgb_of
 from refgi.image import is_dead, read_exr, write_text
 from refgi.provenance.record import environment
 from refgi.types import Array
@@ -148,13 +149,9 @@ def _path(folder: Path, way: Sequence[Job]) -> PathResult:
 def _still(folder: Path, job: Job) -> Still:
     picture = read_exr(folder / job.picture)[0]
     truth = read_exr((folder / job.picture).with_name(f"{TRUTH}.exr"))[0]
-    light, right, variance = (_rgb(planes, name) for planes, name in (
-        (picture, "irradiance"), (truth, "irradiance"), (truth, "variance")))
+    light, right, variance = (rgb_of(planes, name).astype(np.float64) for planes, name in (
+        (picture, "irradiance."), (truth, "irradiance."), (truth, "variance.")))
     return Still(light, right, variance, ((light != 0) | (right != 0)).any(axis=0))
-
-
-def _rgb(planes: dict[str, Array], name: str) -> Array:
-    return np.stack([planes[f"{name}.{channel}"] for channel in "RGB"]).astype(np.float64)
 
 
 def _sums(still: Still, before: Still, both: Array) -> Array:

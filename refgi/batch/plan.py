@@ -28,6 +28,8 @@ OVER_TIME = ("flicker", "lag")
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
 
+COMPARISON = re.compile(r"\s*(<=|>=|<|>)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
+
 
 class Threshold(NamedTuple):
     """What is expected of one figure."""
@@ -65,12 +67,10 @@ def read_threshold(key: str, text: object, scenes: Collection[str], methods: Col
     figure = middle.pop() if middle else ""
     known = (*FIGURES, *OVER_TIME)
     expect(figure in known, where, f"a figure at the end, one of {', '.join(known)}", figure)
-    found = re.fullmatch(r"\s*(<=|>=|<|>)\s*([-+\d.eE]+)\s*", text) if isinstance(text, str) else None
-    bound = _number(found[2]) if found else None
-    expect(bound is not None, where, 'a comparison such as "<= 0.31"', text)
+    found = COMPARISON.fullmatch(text) if isinstance(text, str) else None
+    expect(found is not None, where, 'a comparison such as "<= 0.31"', text)
     assert found is not None
-    assert bound is not None
-    return Threshold(key, scene, method, ".".join(middle) or None, figure, found[1], bound)
+    return Threshold(key, scene, method, ".".join(middle) or None, figure, found[1], float(found[2]))
 
 
 def broken(thresholds: Collection[Threshold], result: Result, *, whole: bool = True) -> list[Finding]:
@@ -132,13 +132,6 @@ def _in_doubt(run: Run, figure: str) -> bool:
 
 def _runs(scene: SceneResult) -> tuple[Run, ...]:
     return (*scene.runs, *scene.line)
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
 
 
 BATCH, EXPECT = "batch", "expect"

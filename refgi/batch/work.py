@@ -10,8 +10,6 @@ import os
 import warnings
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from refgi import stages
 from refgi.batch.jobs import Job, Shot, picture_of, scene_at
 from refgi.batch.outcome import Outcome, failed, is_done, write_outcome
@@ -19,7 +17,7 @@ from refgi.batch.shared import BUFFERS, Buffers, Common, Shared, hashes_of, with
 from refgi.bench.grid import TRUTH
 from refgi.bench.measure import Made, judged, timed, with_seed
 from refgi.compare.outcome import UNOCCLUDED
-from refgi.compare.pictures import linear_planes
+from refgi.compare.pictures import linear_planes, rgb_of
 from refgi.errors import RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.image import read_exr, write_exr
@@ -76,7 +74,7 @@ def _history(job: Job, common: Common) -> History:
         light = METHODS[job.choice.method].function(frame, with_seed(job.choice.settings, shot.frame))
     else:
         channels = read_exr(file)[0]
-        light = with_frames(np.stack([channels[f"irradiance.{c}"] for c in "RGB"]), channels.get("frames"))
+        light = with_frames(rgb_of(channels, "irradiance."), channels.get("frames"))
     return history_of(frame, scene.geometry, light)
 
 

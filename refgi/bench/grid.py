@@ -75,10 +75,16 @@ def chosen(grid: Grid, methods: Sequence[str] | None) -> Grid:
     """Return the part of a grid that is of some methods, all where absent; InputError if it has none of one."""
     if methods is None:
         return grid
-    names = {find_method(name).name for name in methods}
-    missing = names - {choice.method for choice in grid.choices}
-    expect(not missing, "methods", "some that the grid has settings of", ", ".join(sorted(missing)))
+    names = _found(methods, grid.choices, "some that the grid has settings of")
     return grid._replace(choices=tuple(choice for choice in grid.choices if choice.method in names))
+
+
+def _found(methods: Sequence[str], there: Iterable[Any], expected: str) -> set[str]:
+    """Return names of methods, all of which are those of something that is there."""
+    names = {find_method(name).name for name in methods}
+    missing = names - {one.method for one in there}
+    expect(not missing, "methods", expected, ", ".join(sorted(missing)))
+    return names
 
 
 def _passes(table: Mapping[str, Any], file: Path) -> tuple[int, ...]:
@@ -146,9 +152,7 @@ def built_in_tracks(methods: Sequence[str] | None = None) -> tuple[Track, ...]:
     tracks = read_tracks(FILES / "tracks.toml")
     if methods is None:
         return tracks
-    names = {find_method(name).name for name in methods}
-    missing = names - {track.method for track in tracks}
-    expect(not missing, "methods", "some that have tracks", ", ".join(sorted(missing)))
+    names = _found(methods, tracks, "some that have tracks")
     return tuple(track for track in tracks if track.method in names)
 
 

@@ -120,8 +120,9 @@ def _explain(session: Session, asked: Asked) -> int:
         report = None if not asked.measure else measure_skips(
             whole, method, settings, rounds=asked.rounds, clock=CLOCKS[asked.clock], tell=tell, **frame_options)
     content = {"scene": scene.name, "method": method, "settings": settings,
-               "stages": [dataclasses.asdict(line) for line in summed(first)],
-               "animation": {row: {line.name: line.what for line in summed(runs)} for row, runs in animation.items()},
+               "stages": summed(first),
+               "animation": {row: {line["name"]: _what(line) for line in summed(runs)}
+                             for row, runs in animation.items()},
                "ledger": None if ledger is None else ledger_json(ledger)}
     if report is not None:
         content["measured"] = report.model_dump(mode="json")
@@ -129,34 +130,22 @@ def _explain(session: Session, asked: Asked) -> int:
     return DONE if report is None or report.same_bits else FAILED
 
 
-@dataclasses.dataclass(frozen=True)
-class Line:
-    """What became of all calls of one stage."""
-
-    name: str
-    depth: int
-    ran: int
-    reused: int
-    skipped: int
-    reason: str
-
-    @property
-    def what(self) -> str:
-        """In a word or two."""
-        counts = {"runs": self.ran, "reused": self.reused, "skipped": self.skipped}
-        return ", ".join(f"{word} x{n}" if n > 1 else word for word, n in counts.items() if n)
-
-
-def summed(runs: "list[Run]") -> list[Line]:
+def summed(runs: "list[Run]") -> list[dict[str, Any]]:
     """Add up the calls of each stage, in the order of first appearance."""
-    lines: dict[str, Line] = {}
+    lines: dict[str, dict[str, Any]] = {}
     for run in runs:
-        line = lines.get(run.name, Line(run.name, run.depth, 0, 0, 0, ""))
-        reason = run.reason if run.status == "skipped" else line.reason
-        lines[run.name] = dataclasses.replace(
-            line, ran=line.ran + (run.status == "ran"), reused=line.reused + (run.status == "reused"),
-            skipped=line.skipped + (run.status == "skipped"), reason=reason)
+        line = lines.setdefault(run.name, {"name": run.name, "depth": run.depth, "ran": 0, "reused": 0, "skipped": 0,
+                                           "reason": ""})
+        line[run.status] += 1
+        if run.status == "skipped":
+            line["reason"] = run.reason
     return list(lines.values())
+
+
+def _what(line: dict[str, Any]) -> str:
+    """Return what became of all calls of a stage, in a word or two."""
+    counts = {"runs": line["ran"], "reused": line["reused"], "skipped": line["skipped"]}
+    return ", ".join(f"{word} x{n}" if n > 1 else word for word, n in counts.items() if n)
 
 
 def _small(scene: "Scene") -> "Scene":
@@ -227,7 +216,7 @@ def _text(content: dict[str, Any]) -> str:
     settings = ", ".join(f"{key}={value}" for key, value in plain(content["settings"]).items())
     head = f"{content['method']} on {content['scene']}\n{settings}"
     lines = [("stage", "", "why")]
-    lines += [("  " * line["depth"] + line["name"], Line(**line).what, line["reason"]) for line in content["stages"]]
+    lines += [("  " * line["depth"] + line["name"], _what(line), line["reason"]) for line in content["stages"]]
     names = list(dict.fromkeys(name for row in content["animation"].values() for name in row))
     rows = [("next frame", *content["animation"])]
     rows += [(name, *(row.get(name, "-") for row in content["animation"].values())) for name in names]

@@ -31,16 +31,10 @@ def linear_planes(radiance: Array, irradiance: Array, variance: Array | None = N
     many estimates each pixel has; frames: how many its light is blended of.
     """
     planes = rgb_planes("", radiance) | rgb_planes("irradiance.", irradiance)
-    if variance is not None:
-        planes |= rgb_planes("variance.", variance)
-    if samples is not None:
-        planes["samples"] = np.asarray(samples, np.float32)
-    if frames is not None:
-        planes["frames"] = np.asarray(frames, np.float32)
-    if lobes is not None:
-        planes |= rgb_planes("lobes.", lobes)
-    if lobe_variance is not None:
-        planes |= rgb_planes("lobe_variance.", lobe_variance)
+    for name, values in (("variance", variance), ("samples", samples), ("frames", frames), ("lobes", lobes),
+                         ("lobe_variance", lobe_variance)):
+        if values is not None:
+            planes |= {name: np.asarray(values, np.float32)} if values.ndim == 2 else rgb_planes(f"{name}.", values)
     return planes
 
 

@@ -84,6 +84,7 @@ def test_the_page_is_one_whole_file(html):
     assert "&lt;grid&gt;" in html
     assert "no &amp; way" in html
     assert "data-refresh" not in html
+    assert html.count('class="front"') == 4  # two of each scene
 
 
 def test_settings_stages_and_files_are_told(html):

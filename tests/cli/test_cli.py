@@ -219,15 +219,6 @@ def test_compare_writes_everything_and_prints_a_table(tmp_path):
     assert read_exr(folder / "sii.exr")[0]["R"].shape == (10, 12)
 
 
-def test_compare_as_json_prints_what_results_json_holds():
-    result = run("compare", "cornell_box", *TINY, "--methods", "sii", "--set", "sii.lights=16", "--set",
-                 "truth.samples=24", "--json")
-    content = json.loads(result.stdout)
-    assert content["schema"] == 1
-    assert content["sound"] is True
-    assert content["out"] is None
-
-
 @pytest.mark.parametrize(("arguments", "words"), [
     (["--methods", "sii,nothing"], ["nothing"]), (["--methods", "truth"], ["--methods"]),
     (["--methods", "sii", "--set", "lights=3"], ["METHOD.key=value"]),

@@ -61,8 +61,7 @@ def test_frames_are_what_python_computes(way, tmp_path):
     assert (attributes["frame"], attributes["of"], attributes["settings"]["lights.count"]) == (3, 4, 16)
 
 
-@pytest.mark.parametrize(("method", "asked", "used"), [("vpl", [], "exact"), ("sii", [], "map"),
-                                                       ("vpl", ["--shadows", "map"], "map")])
+@pytest.mark.parametrize(("method", "asked", "used"), [("vpl", [], "exact"), ("vpl", ["--shadows", "map"], "map")])
 def test_frames_have_exact_shadows_where_the_method_traces_rays(way, tmp_path, method, asked, used):
     result = run("cornell_box", way, *TINY, "--method", method, "--set", "lights=4", *asked, "--frames", 1, "--format",
                  "exr", "--out", tmp_path / "out", "--json")

@@ -14,7 +14,8 @@ from pathlib import Path
 
 from benchmarks.accuracy import standalone
 from refgi.bench.error import front
-from refgi.bench.results import Run, SceneResult, read_result
+from refgi.bench.folder import read_result
+from refgi.bench.results import Run, SceneResult
 from refgi.compare.pages import Axes, Curve, curves_plot
 from refgi.image import write_text
 

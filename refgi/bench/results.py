@@ -1,19 +1,14 @@
 """What a bench found, as data: results.json by its schema, tables as CSV and Markdown, sentences of split errors."""
 
-import csv
-import io
 import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 from typing import Any, Self
 
 import pydantic
 
 from refgi.bench.error import Error
 from refgi.compare.pages import number, require_environment
-from refgi.errors import InputError
-from refgi.image import write_text
 
 SPLIT_COLUMNS = ("approximation", "mean, %", "RMS, %", "spread, %", "share, %", "RMSE without, %", "mean without, %")
 ALL = "all together"
@@ -70,9 +65,6 @@ def _mean_without(split: "Split", part: "Part") -> float | None:
 
 FORMAT = "bench 1"
 LIMITED = ("unoccluded", "seen", "seen_unoccluded")  # truths of which nothing blocks light, whose senders are in view
-COLUMNS = ("scene", "method", "settings", "seconds", "fastest", "slowest", "rmse", "low", "high", "bias", "spread",
-           "noise", "in_doubt", *(f"rmse_{name}" for name in LIMITED), "pairs", "rays", "bytes", "peak_bytes", "flip",
-           "ssim", "against_truth_in_equal_time", "on_the_front", "refgi_format")
 
 
 class Strict(pydantic.BaseModel):
@@ -271,46 +263,10 @@ def schema_text() -> str:
     return json.dumps(Result.model_json_schema(), indent=1, sort_keys=True) + "\n"
 
 
-def rows_of(result: Result) -> Iterable[dict[str, Any]]:
-    """Yield one row a run by `COLUMNS`, the path tracer's among them; None where there is nothing to say."""
-    for scene in result.scenes:
-        for run in (*scene.runs, *scene.line):
-            yield {"scene": scene.scene, "method": run.method, "settings": run.label, "seconds": run.seconds,
-                   "fastest": min(run.times), "slowest": max(run.times), **run.errors["truth"].model_dump(),
-                   **{f"rmse_{name}": rmse_against(run, name) for name in LIMITED},
-                   **({} if run.work is None else run.work.model_dump()), "flip": run.flip, "ssim": run.ssim,
-                   "against_truth_in_equal_time": run.in_equal_time, "on_the_front": run.front,
-                   "refgi_format": result.refgi}
-
-
 def rmse_against(run: Run, reference: str) -> float | None:
     """Return the RMSE of a run against one of its references; None where it has no such reference."""
     known = run.errors.get(reference)
     return None if known is None else known.rmse
-
-
-def write_results(result: Result, folder: Path) -> None:
-    """Write results.json, results.csv and results.md, each whole or not at all; InputError where it cannot be done."""
-    table = io.StringIO()
-    writer = csv.DictWriter(table, COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows_of(result))
-    write_text(folder / "results.json", result.model_dump_json(indent=1) + "\n")
-    write_text(folder / "results.csv", table.getvalue())
-    write_text(folder / "results.md", markdown(result))
-
-
-def read_result(file: Path, option: str | None = None) -> Result:
-    """Read the results.json of a bench or batch; an InputError names the first key that is wrong, or an option."""
-    try:
-        return Result.model_validate_json(file.read_bytes())
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file), key=option) from error
-    except pydantic.ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(map(str, first["loc"])) or "JSON"
-        raise InputError(f"{file}: {key}: expected results of `refgi bench` or `refgi batch`, got another kind: "
-                         f"{first['msg'].lower()}", file=str(file), key=option or key) from error
 
 
 def markdown(result: Result) -> str:

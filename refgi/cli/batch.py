@@ -33,7 +33,7 @@ def _batch(session: Session, asked: Asked) -> int:
     from refgi.batch.jobs import jobs_of
     from refgi.batch.outcome import worse
     from refgi.batch.plan import broken, read_plan
-    from refgi.bench.results import read_result
+    from refgi.bench.folder import read_result
     from refgi.cli.destination import Permission, folder, make
 
     plan = read_plan(Path(asked.plan))
@@ -160,7 +160,7 @@ def _from_time_to_time(request: _Request) -> "Callable[[], None]":
 
 def _written(request: _Request) -> "Result":
     from refgi.batch.outcome import read_outcomes, result_of
-    from refgi.bench.results import write_results
+    from refgi.bench.folder import write_results
 
     folder = request.common.folder
     result = result_of(folder, request.all_jobs, read_outcomes(folder, request.all_jobs))

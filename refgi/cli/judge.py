@@ -184,11 +184,12 @@ def _bench(session: Session, asked: Asked) -> int:
     Methods run over a grid of settings beside the path tracer stopped early; errors are told apart into bias and
     spread over seeds. Results are written after each scene.
     """
+    from refgi.bench.folder import write_results
     from refgi.bench.grid import TRUTH, built_in, chosen, read_grid
     from refgi.bench.measure import bench_scene
     from refgi.bench.pictures import FOLDER, places
     from refgi.bench.report import said_of, write_page
-    from refgi.bench.results import Result, markdown, write_results
+    from refgi.bench.results import Result, markdown
     from refgi.bench.split import with_splits
     from refgi.cli.destination import Permission, folder
     from refgi.cli.view import named_methods, on_threads, scene_of, settings_for, still_frames

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refgi.batch.outcome import Still, first_change, over_time, worse
-from refgi.bench.results import read_result
+from refgi.bench.folder import read_result
 from refgi.errors import InputError
 from tests.batch.made import result_of, run_of, scene_of
 

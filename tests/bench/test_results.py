@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 import refgi.bench
+from refgi.bench.folder import rows_of, write_results
 from refgi.bench.report import said_of, write_page
-from refgi.bench.results import Figures, Result, Run, SceneResult, rows_of, schema_text, write_results
+from refgi.bench.results import Figures, Result, Run, SceneResult, schema_text
 from refgi.image import is_from_refgi
 
 FIGURES = Figures(rmse=0.5, low=0.4, high=0.6, bias=0.3, spread=0.4, noise=0.01)

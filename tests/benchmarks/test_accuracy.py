@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks.accuracy import BUILT_IN, LEVELS, REAL, cheapest_table, error_of, nearest_table
-from refgi.bench.results import Figures, Run, read_result
+from refgi.bench.folder import read_result
+from refgi.bench.results import Figures, Run
 
 ROOT = Path(__file__).parents[2]
 HELD = ROOT / "benchmarks" / "results"

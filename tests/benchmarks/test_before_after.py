@@ -3,7 +3,8 @@
 import pytest
 
 from benchmarks.before_after import fronts_plot, main, ratio_table
-from refgi.bench.results import Figures, Result, Run, SceneResult, write_results
+from refgi.bench.folder import write_results
+from refgi.bench.results import Figures, Result, Run, SceneResult
 from tests.batch.made import MACHINE
 
 

@@ -1,7 +1,6 @@
 """Changes of a scene: what they leave as it is, in closed form, and how a picture comes back."""
 
 import dataclasses
-import math
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ import pytest
 from refgi import load_scene
 from refgi.frame import Frame
 from refgi.rsm.raster.projection import camera_projection
-from refgi.scene import DirectionalLight, PointLight, SpotLight
+from refgi.scene import DirectionalLight, PointLight
 from refgi.scene.values import BRIGHTEST
 from refgi.stress import promises
 from refgi.stress.changes import CHANGES, Changed, NotPromisedError, mapped
@@ -148,14 +147,6 @@ def test_what_leaves_the_range_of_scenes_is_not_asked(box):
         after(box.with_lights(PointLight((0, 1, 0), (BRIGHTEST, 0, 0))), "flux x 2^27")
     with pytest.raises(NotPromisedError, match="1e\\+09"):
         after(mapped(box, lambda p: p * 100.0), "length x 2^27")
-
-
-def test_a_spots_power_may_grow_alone(box):
-    bright = mapped(box, lambda p: p, power=4.0).lights[0]
-    assert isinstance(bright, SpotLight)
-    assert dataclasses.replace(bright, intensity=box.lights[0].intensity) == box.lights[0]
-    assert bright.intensity[0] == 4 * box.lights[0].intensity[0]
-    assert math.isfinite(bright.outer_half_angle)
 
 
 SEEN = {"faces permuted": 0.0, "faces unwelded": 0.0, "faces doubled": 0.0, "faces split": 1e-6, "hidden plane": 0.0}

@@ -22,10 +22,10 @@ from refgi.provenance import plain
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 
-def strict(name, **fields):
+def strict(model, /, **fields):
     """A model of exactly these keys, one that may be absent with its default."""
     kinds = {key: kind if isinstance(kind, tuple) else (kind, ...) for key, kind in fields.items()}
-    return create_model(name, __config__=ConfigDict(extra="forbid", strict=name != "Results"), **kinds)
+    return create_model(model, __config__=ConfigDict(extra="forbid", strict=model != "Results"), **kinds)
 
 
 NUMBER = float | str | None

@@ -107,6 +107,7 @@ def test_a_comparison_judges_lobes(comparison, tmp_path):
     planes = read_exr(tmp_path / "truth.exr")[0]
     assert np.array_equal(lobes_of(planes), truth.mean.astype(np.float32))
     assert np.array_equal(lobes_of(planes, "lobe_variance"), truth.variance_of_mean.astype(np.float32))
+    assert comparison.truth.estimate["estimate"]["lobes"]["statement"] == truth.error_statement
 
 
 def render_like(comparison, lobes):

@@ -118,7 +118,7 @@ def test_a_truth_that_ended_by_its_error_is_made_again_by_its_passes(tmp_path):
     assert record["settings"]["target_error"] == 0.6
     assert record["estimate"]["passes"] >= 2
     assert made_again(file) == file.read_bytes()
-    rewritten(file, settings=record["settings"] | {"target_error": 0.2})
+    rewritten(file, settings=record["settings"] | {"target_error": 0.01})
     assert made_again(file)
 
 

@@ -173,7 +173,8 @@ class Failing:
 
 def test_a_new_process_takes_time_of_its_own_and_says_why_it_fails(tmp_path, monkeypatch):
     assert 0.2 < cold_seconds("cornell_box", "sii", SIZE) < 600
-    why = r"sii: a new process gave no frame of .*nothing\.json: .*nothing\.json"
+    monkeypatch.setattr(measure, "FIRST_FRAME", "import sys; sys.exit(f'first\\nno such file: {sys.argv[1]}')")
+    why = r"sii: a new process gave no frame of .*nothing\.json: no such file: .*nothing\.json"
     with pytest.raises(RefgiError, match=why) as caught:
         cold_seconds(str(tmp_path / "nothing.json"), "sii", SIZE)
 

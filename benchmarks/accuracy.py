@@ -15,15 +15,17 @@ from pathlib import Path
 
 from benchmarks.harness import real_scene
 from refgi.bench.error import without_noise
+from refgi.bench.folder import write_results
 from refgi.bench.grid import Grid, built_in
 from refgi.bench.measure import bench_scene
 from refgi.bench.report import Place, bars, overview, plot_of
-from refgi.bench.results import Result, Run, SceneResult, write_results
+from refgi.bench.results import Result, Run, SceneResult
 from refgi.bench.split import with_splits
 from refgi.cli.session import progress
-from refgi.compare.report import PAGE, environment, number
+from refgi.compare.pages import PAGE, number
 from refgi.errors import RefgiWarning
 from refgi.image import write_text
+from refgi.provenance.record import environment
 from refgi.scene import load_scene
 from refgi.truth import TruthSettings
 

@@ -16,7 +16,7 @@ from benchmarks.accuracy import standalone
 from refgi.bench.error import front
 from refgi.bench.folder import read_result
 from refgi.bench.results import Run, SceneResult
-from refgi.compare.plot import Axes, Curve, curves_plot
+from refgi.compare.pages import Axes, Curve, curves_plot
 from refgi.image import write_text
 
 AXES = Axes("time of a frame, ms", "RMSE / mean of the truth", log_x=True, log_y=True, decimal_x=True)

@@ -11,7 +11,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from refgi.compare.report import number
+from refgi.compare.pages import number
 from refgi.image import canonical_json
 
 PAGE = Path(__file__).with_name("papers.md")

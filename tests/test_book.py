@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from refgi.splat.multires.subsplats.detail import surface_detail
-from tests.compare.page.browser import clicked
+from tests.compare.browser import clicked
 
 pytest.importorskip("sphinx", reason="the docs extra is not installed")
 

@@ -9,9 +9,9 @@ from click.testing import CliRunner
 
 from refgi.cli.group import VerbGroup
 from refgi.compare import compare
+from refgi.compare.pages import number
 from refgi.compare.pictures import linear_planes
-from refgi.compare.report import number, page
-from refgi.compare.results import as_json, write_results
+from refgi.compare.report import as_json, page, write_results
 from refgi.frame import Frame
 from refgi.image import read_exr
 from refgi.methods import render
@@ -107,6 +107,7 @@ def test_a_comparison_judges_lobes(comparison, tmp_path):
     planes = read_exr(tmp_path / "truth.exr")[0]
     assert np.array_equal(lobes_of(planes), truth.mean.astype(np.float32))
     assert np.array_equal(lobes_of(planes, "lobe_variance"), truth.variance_of_mean.astype(np.float32))
+    assert comparison.truth.estimate["estimate"]["lobes"]["statement"] == truth.error_statement
 
 
 def render_like(comparison, lobes):

@@ -31,14 +31,15 @@ from benchmarks.papers.records import (
 )
 from benchmarks.papers.workbench import FULL, QUICK, Scale, Workbench
 from refgi.cli.destination import Permission, folder
-from refgi.cli.options import on_threads
 from refgi.cli.session import FAILED, progress, say, table
+from refgi.cli.view import on_threads
 from refgi.compare.comparison import require_folder
-from refgi.compare.report import PAGE as COMMON
-from refgi.compare.report import TIMES, environment, machine, number, templates
+from refgi.compare.pages import PAGE as COMMON
+from refgi.compare.pages import TIMES, machine, number, page_of
 from refgi.errors import RefgiError, RefgiWarning
 from refgi.image import canonical_json, png_bytes, write_exr, write_png, write_text
 from refgi.provenance import plain, program
+from refgi.provenance.record import environment
 
 PAGE = Path(__file__).with_name("page")
 
@@ -53,14 +54,13 @@ def page(made: Reproduction) -> str:
     style = (COMMON / "style.css").read_text("utf-8") + (PAGE / "paper.css").read_text("utf-8")
     lead = (f"{made.paper.citation}. Its figures and tables, made again and set beside the numbers that were printed. "
             "Times are ratios within each machine\N{RIGHT SINGLE QUOTATION MARK}s own run.")
-    return templates(PAGE).get_template("paper.html.j2").render(
-        style=Markup(style), script=Markup((PAGE / "lightbox.js").read_text("utf-8")),
-        kind=f"papers · {made.paper.name}", title=made.paper.title, lead=lead, facts=_facts(made),
+    return page_of(
+        "paper.html.j2", made.environment, PAGE, style=Markup(style),
+        script=Markup((PAGE / "lightbox.js").read_text("utf-8")), kind=f"papers · {made.paper.name}",
+        title=made.paper.title, lead=lead, facts=_facts(made),
         verdict=_verdict(made), failures=[(outcome.entry.label, f"could not be made: {outcome.failure}")
                                           for outcome in made.outcomes if outcome.figure is None],
-        figures=[_figure(outcome, outcome.figure) for outcome in made.outcomes if outcome.figure is not None],
-        versions=made.environment["versions"], machine=machine(made.environment),
-    )
+        figures=[_figure(outcome, outcome.figure) for outcome in made.outcomes if outcome.figure is not None])
 
 
 def _facts(made: Reproduction) -> list[str]:

@@ -10,8 +10,8 @@ import numpy as np
 from benchmarks.papers.records import Picture
 from refgi.compare import pictures as maps
 from refgi.compare.metrics import mae, rmse
+from refgi.compare.pages import number
 from refgi.compare.pictures import linear_planes, rgb_planes
-from refgi.compare.report import number
 from refgi.frame import Frame
 from refgi.image import tone_map
 from refgi.scene import Scene, load_scene

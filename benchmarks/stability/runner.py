@@ -20,7 +20,7 @@ from pathlib import Path
 from rich.console import Console
 
 from benchmarks.stability.promise import Task
-from refgi.compare.report import environment
+from refgi.provenance.record import environment
 from refgi.stress.promises import Row, Stability, markdown, over_scenes, read_rows, write_rows
 
 WAITING = ("kernels", "kills")  # parts whose tasks leave a processor idle: two are run at once

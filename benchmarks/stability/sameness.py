@@ -15,7 +15,7 @@ from pathlib import Path
 
 from benchmarks.stability.promise import Task, Tell
 from refgi import Frame, load_scene
-from refgi.batch.buffers import hashes_of
+from refgi.batch.shared import hashes_of
 from refgi.errors import RefgiWarning
 from refgi.methods import BUILT_IN, find_method
 from refgi.stages import observe

@@ -20,8 +20,8 @@ from typing import Any, Self
 ROOT = Path(__file__).parents[2]
 PATIENCE = 120.0  # s
 POLL = 1e-4  # s; a file is written for a millisecond or longer, as it is flushed to the disk
-MODULES = ["refgi.cli.render", "refgi.cli.sequence", "refgi.cli.compare", "refgi.cli.job", "refgi.cli.view",
-           "refgi.cli.warm", "refgi.cli.sequence", "refgi.compare", "refgi.methods", "refgi.truth.truth",
+MODULES = ["refgi.cli.render", "refgi.cli.sequence", "refgi.cli.judge", "refgi.cli.view",
+           "refgi.cli.short", "refgi.compare", "refgi.methods", "refgi.truth.truth",
            "refgi.splat.sii", "refgi.rays", "refgi.scene.builtin", "refgi.provenance.frames", "pydantic", "OpenEXR",
            "scipy.spatial", "scipy.optimize", "scipy.ndimage", "scipy.stats", "trimesh"]
 

@@ -1,25 +1,27 @@
 """Which sources a method's pictures depend on: the modules that its imports reach, name by name.
 
 `from refgi.scene import Scene` reaches the module that defines `Scene` and not whatever else the package's `__init__`
-imports, so that methods of one package depend on each other only where one uses the other. Imports inside functions
-count, those for type checkers do not. A source counts by its syntax tree without docstrings: comments, line breaks and
-documentation change nothing.
+imports. Imports inside functions count, those for type checkers do not, comments and docstrings change nothing.
 """
 
 import ast
 import functools
 import hashlib
-from collections.abc import Iterator
+import os
+import subprocess
+from collections.abc import Iterable, Iterator
 from importlib.metadata import entry_points
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
 from typing import NamedTuple
 
+import refgi
+from refgi.errors import InputError
 from refgi.methods import BUILT_IN, GROUP
 
 # what every result depends on beside its method: the buffers, the truth and what judges
 SHARED = ("refgi.frame:Frame", "refgi.truth:trace_truth", "refgi.bench.error:error_of", "refgi.compare.outcome:measure",
-          "refgi.compare.flip:flip")
+          "refgi.compare.metrics:flip")
 RUNNERS = ("refgi.bench.measure", "refgi.batch.work")  # by themselves: what else they import changes no result
 BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")  # fields that hold statements
 
@@ -40,10 +42,7 @@ class Source(NamedTuple):
 
 
 def code_key(*places: str, alone: tuple[str, ...] = ()) -> str:
-    """Return a digest, 64 hexadecimal digits, of all sources that objects such as "refgi.splat.sii:METHOD" reach.
-
-    Equal where these are the same but for comments and docstrings. Modules `alone` count without what they import.
-    """
+    """Return a digest of all sources that objects reach, and of modules `alone` without what they import."""
     modules = sorted({*alone}.union(*(reached(place) for place in places)))
     text = "\n".join(f"{module} {_source(file_of(module)).digest}" for module in modules)
     return hashlib.sha256(text.encode()).hexdigest()
@@ -153,3 +152,46 @@ def _found(module: str) -> Path | None:
     place = base.parent.joinpath(*rest)
     files = (place / "__init__.py", place.with_suffix(".py"))
     return next((file for file in files if file.is_file()), None)
+
+
+PACKAGE = Path(refgi.__file__).parent
+
+
+def changed_methods(methods: Iterable[str], commit: str) -> dict[str, list[str]]:
+    """Return by method which modules of those that it reaches changed since a commit; methods without are left out."""
+    changed = _changed_files(commit)
+    found = {}
+    for method in methods:
+        modules = set(RUNNERS).union(*(reached(place) for place in (*SHARED, place_of(method))))
+        own = sorted(module for module in modules if file_of(module).resolve() in changed)
+        if own:
+            found[method] = own
+    return found
+
+
+def _changed_files(commit: str) -> set[Path]:
+    """Return files of the package whose code is not that of a commit."""
+    root = Path(_git(PACKAGE, "rev-parse", "--show-toplevel").strip())
+    _git(root, "rev-parse", "--verify", "--quiet", f"{commit}^{{commit}}")
+    named = _git(root, "diff", "--name-only", "-z", commit, "--", str(PACKAGE))
+    files = [name for name in named.split("\0") if name.endswith(".py")]  # one that imports a new file is among them
+    return {(root / name).resolve() for name in files if _differs(root, name, commit)}
+
+
+def _differs(root: Path, name: str, commit: str) -> bool:
+    file = root / name
+    try:
+        before = _git(root, "show", f"{commit}:{name}")
+    except InputError:
+        return True  # a new file
+    return not file.exists() or source_digest(file.read_bytes()) != source_digest(before.encode())
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    quiet = {key: value for key, value in os.environ.items() if not key.startswith("GIT_")}
+    try:
+        return subprocess.run(["git", *arguments], cwd=folder, env=quiet, capture_output=True, text=True,
+                              check=True).stdout
+    except (OSError, subprocess.CalledProcessError) as error:
+        said = " ".join((getattr(error, "stderr", "") or str(error)).split())
+        raise InputError(f"--since: git {' '.join(arguments)}: {said or 'no such commit'}", key="--since") from error

@@ -1,9 +1,7 @@
-"""Jobs of a plan, each named by what its result depends on.
+"""Jobs of a plan, each named by what its result depends on: one method and choice of settings on one frame of a scene.
 
-A job runs one method with one choice of settings on one frame of one scene, with every seed. Its name is a SHA-256 of
-the scene as that frame shows it, the picture's size, all settings of the method and of the truth that judges it, the
-seeds, the sources that they reach (`refgi.batch.code`) and the packages that compute. What has the same name has the
-same result, whatever plan asked for it.
+The name is a SHA-256 of the scene as that frame shows it, the picture's size, all settings of the method and of its
+truth, the seeds, the sources that they reach (`refgi.batch.code`) and the packages that compute.
 """
 
 import dataclasses
@@ -21,7 +19,7 @@ from refgi.errors import expect
 from refgi.image import canonical_json
 from refgi.methods import METHODS
 from refgi.provenance import plain, versions
-from refgi.provenance.content import geometry_digest, light_json, materials_digest
+from refgi.provenance.record import geometry_digest, light_json, materials_digest
 from refgi.scene import Scene, load_scene
 from refgi.scene.path import scenes_along
 from refgi.scene.pathfile import read_path
@@ -72,19 +70,13 @@ class Job(NamedTuple):
 
 
 def jobs_of(plan: Plan) -> list[Job]:
-    """Return all jobs of a plan in the order of scenes, frames and choices; its scenes are loaded.
-
-    InputError if a scene or path is not usable.
-    """
+    """Return all jobs of a plan in the order of scenes, frames and choices; its scenes are loaded."""
     _loaded.cache_clear()
     return [job for name, source in plan.scenes.items() for job in _of_scene(plan, name, source)]
 
 
 def scene_at(shot: Shot) -> Scene:
-    """Return the scene as the path leaves it at a frame, its camera of the picture's size.
-
-    InputError if scene or path are not usable.
-    """
+    """Return the scene as the path leaves it at a frame, its camera of the picture's size."""
     return next(itertools.islice(_scenes(shot), shot.frame, None))
 
 

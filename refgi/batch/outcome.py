@@ -1,14 +1,8 @@
 """Results of jobs: one as a file, all as a bench's, flicker and lag of a sequence, and those of an earlier batch.
 
-Symbols: x_k a method's picture of frame k, r_k the truth, v_k the variance of its mean; the truths of two frames have
-different seeds, so that their noise is independent. Means are over the pixels with light in both frames, of the picture
-or of the truth, and over all frames.
-
-- flicker^2 = mean |(x_k - x_k-1) - (r_k - r_k-1)|^2: what changes beside what should. A perfect picture has
-  mean (v_k + v_k-1) of it, the truth's own noise.
-- lag d makes x_k nearest to r_k + d (r_k-1 - r_k): d = (mean (x_k - r_k)(r_k-1 - r_k) - v) / (mean (r_k-1 - r_k)^2 - w)
-  with v = mean v_k and w = mean (v_k + v_k-1), which the noise of r adds to each mean. A light that grows steadily and
-  is shown d frames late has the lag d, and a blend with the share a of the frame before a / (1 - a).
+x_k is a method's picture of frame k, r_k the truth, v_k the variance of its mean, w = v_k + v_k-1; truths of two frames
+have independent noise. flicker^2 = mean |(x_k - x_k-1) - (r_k - r_k-1)|^2, of a perfect picture mean w; lag
+d = (mean (x_k - r_k)(r_k-1 - r_k) - v) / (mean (r_k-1 - r_k)^2 - w), a / (1 - a) of a blend with the share a.
 """
 
 import contextlib
@@ -26,19 +20,17 @@ from refgi.batch.jobs import FORMAT, Job, Shot
 from refgi.batch.plan import Finding, figure_of, place_of
 from refgi.bench.grid import TRUTH
 from refgi.bench.measure import compared
-from refgi.bench.results import PathResult, Result, Run, SceneResult, known
-from refgi.compare.report import environment
-from refgi.errors import InputError
+from refgi.bench.results import PathResult, Result, Run, SceneResult, Strict, known
+from refgi.compare.pictures import rgb_of
 from refgi.image import is_dead, read_exr, write_text
+from refgi.provenance.record import environment
 from refgi.types import Array
 
 SECONDS_OF_A_LEFTOVER = 3600.0
 
 
-class View(pydantic.BaseModel):
+class View(Strict):
     """What the results of one frame share."""
-
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
 
     width: int
     height: int
@@ -47,10 +39,8 @@ class View(pydantic.BaseModel):
     truth: str  # how well it is known
 
 
-class Outcome(pydantic.BaseModel):
+class Outcome(Strict):
     """jobs/NAME.json."""
-
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
 
     refgi: str = FORMAT
     job: str
@@ -85,10 +75,7 @@ def write_outcome(folder: Path, outcome: Outcome) -> None:
 
 
 def read_outcome(folder: Path, job: Job) -> Outcome | None:
-    """Return the result of a job from the batch's folder.
-
-    None where there is none, or a file that is not whole: whoever damaged it, the job is run again.
-    """
+    """Return the result of a job from the batch's folder; None without one, or where its file is not whole."""
     try:
         found = Outcome.model_validate_json(outcome_file(folder, job).read_bytes())
     except (OSError, pydantic.ValidationError):
@@ -126,10 +113,7 @@ class OverTime(NamedTuple):
 
 
 def over_time(frames: Iterator[Still]) -> OverTime:
-    """Judge a sequence of frames by that of the truth; two are held at a time.
-
-    Flicker and its noise, and lag; nan for fewer than two frames, and a lag of nan where the light rests.
-    """
+    """Judge a sequence of frames by that of the truth, two held at a time; nan for what cannot be told."""
     sums = np.zeros(6)  # of squared flicker, its noise, x - r along the change, v, squared change, r; a value each
     count, before = 0, None
     for still in frames:
@@ -146,10 +130,7 @@ def over_time(frames: Iterator[Still]) -> OverTime:
 
 
 def paths_of(folder: Path, jobs: Sequence[Job], outcomes: dict[str, Outcome]) -> tuple[PathResult, ...]:
-    """Return the figures of each choice whose frames are all there; nothing for scenes at rest.
-
-    The folder of the batch holds the pictures; `outcomes` are by name of the job.
-    """
+    """Return the figures of each choice whose frames are all there; nothing for scenes at rest."""
     ways: dict[Any, list[Job]] = {}
     for job in jobs:
         if job.shot.path is not None and job.choice.method != TRUTH:
@@ -168,13 +149,9 @@ def _path(folder: Path, way: Sequence[Job]) -> PathResult:
 def _still(folder: Path, job: Job) -> Still:
     picture = read_exr(folder / job.picture)[0]
     truth = read_exr((folder / job.picture).with_name(f"{TRUTH}.exr"))[0]
-    light, right, variance = (_rgb(planes, name) for planes, name in (
-        (picture, "irradiance"), (truth, "irradiance"), (truth, "variance")))
+    light, right, variance = (rgb_of(planes, name).astype(np.float64) for planes, name in (
+        (picture, "irradiance."), (truth, "irradiance."), (truth, "variance.")))
     return Still(light, right, variance, ((light != 0) | (right != 0)).any(axis=0))
-
-
-def _rgb(planes: dict[str, Array], name: str) -> Array:
-    return np.stack([planes[f"{name}.{channel}"] for channel in "RGB"]).astype(np.float64)
 
 
 def _sums(still: Still, before: Still, both: Array) -> Array:
@@ -193,10 +170,7 @@ def read_outcomes(folder: Path, jobs: Sequence[Job]) -> Outcomes:
 
 
 def result_of(folder: Path, jobs: Sequence[Job], outcomes: Outcomes) -> Result:
-    """Return what a batch has found so far, as a bench does: a scene for each frame of which there is some result.
-
-    The jobs of one frame are side by side.
-    """
+    """Return what a batch has found so far, as a bench does: a scene for each frame that has some result."""
     scenes = []
     for shot, group in groupby(jobs, lambda job: job.shot):
         found = [outcomes[job.name] for job in group if job.name in outcomes]
@@ -220,35 +194,15 @@ LESS_IS_BETTER = ("rmse", "rmse_unoccluded", "relmse", "flip")
 MORE_IS_BETTER = ("ssim",)
 
 
-def read_baseline(file: Path) -> Result:
-    """Read the results.json of an earlier batch or bench; InputError if it cannot be read or is something else."""
-    try:
-        return Result.model_validate_json(file.read_bytes())
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}", file=str(file), key="--baseline") from error
-    except pydantic.ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(map(str, first["loc"])) or "content"
-        raise InputError(f"{file}: {where}: expected results of a batch: {first['msg'].lower()}", file=str(file),
-                         key="--baseline") from error
-
-
 def worse(result: Result, baseline: Result, tolerance: float, folder: str = "") -> list[Finding]:
-    """Return figures of a batch that are worse than an earlier one's by more than `tolerance`, a share of that.
-
-    One finding a figure, with both pictures (the earlier ones in `folder`) and the first stage whose output is another.
-    What only one of the results holds is passed over.
-    """
+    """Return a finding for each figure worse than a baseline's by more than a share of it; `folder`: its pictures."""
     before = dict(_runs(baseline))
     return [finding for key, run in _runs(result) if key in before
             for finding in _worse(key, run, before[key], tolerance, folder)]
 
 
 def first_change(now: Run, before: Run) -> str | None:
-    """Return the first stage of one method and setting whose output is not what it was.
-
-    None where all are the same or one of the runs holds no digests.
-    """
+    """Return the first stage whose output is not what it was; None where all are the same or one has no digests."""
     if not (now.hashes and before.hashes):
         return None
     return next((one[0] if one else other[0] for one, other in zip_longest(now.hashes, before.hashes)

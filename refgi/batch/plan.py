@@ -1,10 +1,7 @@
-"""PLAN.toml: a grid of settings with the scenes, the frames and the thresholds of a batch.
+"""PLAN.toml: a grid of settings with the scenes, the frames and the thresholds of a batch (docs/batch.md).
 
-`[batch]` names the scenes and what is seen of them, `[expect]` the thresholds; every other table is one of the grid
-(`refgi.bench.grid`). Files are named from the plan's folder.
-
-A threshold's key is scene, method, the setting as tables label it where one alone is meant, and figure, with dots
-between. Without a setting all of the method's have to hold, and a scene on a path stands for each of its frames.
+`[batch]` names the scenes and what is seen of them, `[expect]` the thresholds by scene, method, setting and figure;
+every other table is one of the grid (`refgi.bench.grid`). Files are named from the plan's folder.
 """
 
 import operator
@@ -30,6 +27,8 @@ FIGURES = (*ERRORS, "relmse", "flip", "ssim", "seconds", "rmse_unoccluded")
 OVER_TIME = ("flicker", "lag")
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
+
+COMPARISON = re.compile(r"\s*(<=|>=|<|>)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 
 
 class Threshold(NamedTuple):
@@ -59,11 +58,7 @@ class Finding(NamedTuple):
 
 
 def read_threshold(key: str, text: object, scenes: Collection[str], methods: Collection[str], file: str) -> Threshold:
-    """Read one line of a plan's `[expect]`.
-
-    `key`: such as ``atrium.sii.relmse`` or ``atrium.val.clusters.count=8, lights=256.rmse``; `text`: such as ``<=
-    0.31``. An InputError, which names `file`, if scene, method, figure or comparison is unknown.
-    """
+    """Read a line of `[expect]`, such as ``"atrium.val.clusters.count=8, lights=256.rmse" = "<= 0.31"``."""
     where = f'{file}: expect."{key}"'
     scene = max((name for name in scenes if key.startswith(f"{name}.")), key=len, default="")
     expect(scene != "", where, f"a scene of the plan ({', '.join(scenes)}) first", key)
@@ -72,20 +67,14 @@ def read_threshold(key: str, text: object, scenes: Collection[str], methods: Col
     figure = middle.pop() if middle else ""
     known = (*FIGURES, *OVER_TIME)
     expect(figure in known, where, f"a figure at the end, one of {', '.join(known)}", figure)
-    found = re.fullmatch(r"\s*(<=|>=|<|>)\s*([-+\d.eE]+)\s*", text) if isinstance(text, str) else None
-    bound = _number(found[2]) if found else None
-    expect(bound is not None, where, 'a comparison such as "<= 0.31"', text)
+    found = COMPARISON.fullmatch(text) if isinstance(text, str) else None
+    expect(found is not None, where, 'a comparison such as "<= 0.31"', text)
     assert found is not None
-    assert bound is not None
-    return Threshold(key, scene, method, ".".join(middle) or None, figure, found[1], bound)
+    return Threshold(key, scene, method, ".".join(middle) or None, figure, found[1], float(found[2]))
 
 
 def broken(thresholds: Collection[Threshold], result: Result, *, whole: bool = True) -> list[Finding]:
-    """Return a finding for each threshold that does not hold.
-
-    Its figure is missed, or judged by a truth whose error is not to be trusted, or, where the `whole` plan is done, not
-    there.
-    """
+    """Return a finding for each threshold that is missed, in doubt or, of a `whole` plan, without a figure."""
     found = []
     for one in thresholds:
         values = list(_values(one, result))
@@ -145,13 +134,6 @@ def _runs(scene: SceneResult) -> tuple[Run, ...]:
     return (*scene.runs, *scene.line)
 
 
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
-
-
 BATCH, EXPECT = "batch", "expect"
 Pixels = Annotated[int, Field(ge=1, le=65536)]
 
@@ -199,10 +181,7 @@ class Plan(NamedTuple):
 
 
 def read_plan(file: Path) -> Plan:
-    """Read a plan from TOML; its scenes are not loaded yet.
-
-    InputError if the file cannot be read, or a table, a method, a key or a value is not usable.
-    """
+    """Read a plan from TOML; its scenes are not loaded yet. An InputError names what is not usable."""
     tables = read_toml(file)
     expect(BATCH in tables, str(file), "a table [batch] with the key scenes", ", ".join(tables) or "no table")
     table, thresholds = tables.pop(BATCH), tables.pop(EXPECT, {})

@@ -1,13 +1,7 @@
 """Jobs spread over processes of this machine or over machines, and what they will take.
 
-On one machine, a worker that dies, by the system or by a fault of compiled code, takes no other job along: the jobs
-that may have ended it run again, each in a process of its own, and one that ends that too has failed.
-
-Over machines, a worker that dies loses what it was at; dask gives its chunk to another one, which goes on after the
-jobs that have a result. A job that ends several workers has failed.
-
-For an estimate, one run at each size comes before the timed one, for its kernels. What does not grow with the picture,
-RSMs above all, is in the part that two sizes tell apart; noise of the clock never makes a time fall with the size.
+A worker that dies, by the system or by a fault of compiled code, takes no other job along: on one machine those that
+may have ended it run again, each in a process of its own; over machines dask gives its chunk to another one.
 """
 
 import contextlib
@@ -29,12 +23,13 @@ from typing import Any, NamedTuple
 
 from refgi.batch.jobs import Job, reference_settings, scene_at
 from refgi.batch.outcome import failed, is_done, write_outcome
-from refgi.batch.shared import Common, Tell, within
+from refgi.batch.shared import Common, within
 from refgi.batch.work import Chunk, forget, run_chunk
 from refgi.bench.grid import TRUTH
 from refgi.errors import InputError, RefgiError, RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import METHODS
+from refgi.types import Tell
 
 SECONDS_BETWEEN_LOOKS = 0.5
 DIED = "its process died: out of memory, or a fault of compiled code"
@@ -43,10 +38,7 @@ Written = Callable[[], None]
 
 
 def chunks_of(jobs: Sequence[Job], common: Common, workers: int) -> list[Chunk]:
-    """Cut jobs, those of one frame side by side, into chunks: a frame each, or parts of one each if workers are more.
-
-    All frames of one method behind a temporal filter are one chunk, in the order of frames.
-    """
+    """Cut jobs into chunks: a frame each, parts of one if workers are more, a filter's frames in their order."""
     alone = [list(group) for _, group in groupby((job for job in jobs if job.temporal is None), lambda job: job.shot)]
     ways: dict[object, list[Job]] = {}
     for job in jobs:
@@ -86,11 +78,7 @@ def follow(
     running: Sequence[tuple[Chunk, "Future[int]"]], tell: Tell, written: Written,
     died: Callable[[Chunk, BaseException], "Future[int] | None"] | None = None,
 ) -> None:
-    """Wait for submitted chunks and say how many jobs are done; `written` is called after each.
-
-    `died` is called with a chunk and what ended it; gives what runs in its place, or None where nothing is left of it.
-    Without it, what ended a chunk is raised.
-    """
+    """Wait for submitted chunks and say how many jobs are done; `died` gives what runs in place of one that ended."""
     of = {future: chunk for chunk, future in running}
     total = sum(len(chunk.jobs) for chunk in of.values())
     open_ = set(of)
@@ -159,11 +147,7 @@ SECONDS_TO_ANSWER = 10
 
 
 def run_on_cluster(address: str, jobs: Sequence[Job], common: Common, tell: Tell, written: Written) -> None:
-    """Do jobs, those of one frame side by side, on the workers of a scheduler, such as ``tcp://10.0.0.1:8786``.
-
-    Scenes and folders are there on every worker; `written` is called after each chunk. InputError if dask.distributed
-    is not installed or nobody answers at the address.
-    """
+    """Do jobs on the workers of a scheduler such as ``tcp://10.0.0.1:8786``, which see all scenes and folders."""
     try:
         distributed: Any = import_module("distributed")
     except ImportError as error:
@@ -206,10 +190,7 @@ class Estimate(NamedTuple):
 
 
 def estimate(jobs: Sequence[Job], common: Common, tell: Tell) -> Estimate:
-    """Estimate the time of jobs by measuring each choice on the first frame of each scene.
-
-    A choice that gives no picture there counts nothing.
-    """
+    """Estimate the time of jobs by running each choice on each scene's first frame; without a picture it is 0."""
     known: dict[Any, float] = {}
     seconds, truths, seen = 0.0, 0.0, set()
     for number, job in enumerate(jobs):

@@ -1,11 +1,8 @@
 """Jobs done one after the other in one process, each leaving its picture and then its result.
 
-A job first runs once with every stage recorded: that loads its kernels, fills the buffers it shares and gives the
-digests of its stages. Then it runs once a seed, timed; its time is that of its own stages and of the buffers it used,
-whichever job computed them.
-
-The temporal filter's state stays in the process that does the frames in turn; a process that goes on in the middle of a
-path makes it again from the picture of the frame before.
+A job runs once with every stage recorded, which loads kernels and fills buffers, then once a seed, timed: its time has
+that of the buffers it used, whichever job computed them. A process that goes on in the middle of a path makes the
+temporal filter's state again from the picture of the frame before.
 """
 
 import contextlib
@@ -13,17 +10,14 @@ import os
 import warnings
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from refgi import stages
-from refgi.batch.buffers import BUFFERS, Buffers, hashes_of
 from refgi.batch.jobs import Job, Shot, picture_of, scene_at
 from refgi.batch.outcome import Outcome, failed, is_done, write_outcome
-from refgi.batch.shared import Common, Shared, Tell, within
+from refgi.batch.shared import BUFFERS, Buffers, Common, Shared, hashes_of, within
 from refgi.bench.grid import TRUTH
 from refgi.bench.measure import Made, judged, timed, with_seed
 from refgi.compare.outcome import UNOCCLUDED
-from refgi.compare.pictures import linear_planes
+from refgi.compare.pictures import linear_planes, rgb_of
 from refgi.errors import RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.image import read_exr, write_exr
@@ -32,7 +26,7 @@ from refgi.method import Method
 from refgi.methods import METHODS
 from refgi.provenance import Record, plain
 from refgi.sssil.temporal_filter import Filtered, History, first_light, history_of, temporal_filter, with_frames
-from refgi.types import Array
+from refgi.types import Array, Tell
 
 
 class _Left(NamedTuple):
@@ -46,10 +40,7 @@ _left: list[_Left] = []  # of the last filtered job of this process
 
 
 def blended(job: Job, common: Common, shared: Shared, irradiance: Array) -> Filtered:
-    """Blend a frame's irradiance, (3, h, w), W/m^2, with that of the frame before, and leave it to the next.
-
-    That of the first frame stays as it was. InputError if the frame before gave no picture.
-    """
+    """Blend a frame's irradiance, (3, h, w), W/m^2, with that of the frame before, and leave it to the next."""
     assert job.temporal is not None
     frame, geometry = shared.frame, shared.scene.geometry
     history = None if job.before is None else _history(job, common)
@@ -83,7 +74,7 @@ def _history(job: Job, common: Common) -> History:
         light = METHODS[job.choice.method].function(frame, with_seed(job.choice.settings, shot.frame))
     else:
         channels = read_exr(file)[0]
-        light = with_frames(np.stack([channels[f"irradiance.{c}"] for c in "RGB"]), channels.get("frames"))
+        light = with_frames(rgb_of(channels, "irradiance."), channels.get("frames"))
     return history_of(frame, scene.geometry, light)
 
 
@@ -99,10 +90,7 @@ _kept: dict[tuple[Shot, str, Common], Shared] = {}  # of this process: what the 
 
 
 def run_chunk(chunk: Chunk, tell: Tell = lambda *_: None) -> int:
-    """Do jobs without a result one after the other; return how many were done.
-
-    Errors of a job are its result. InputError if a result cannot be written.
-    """
+    """Do jobs without a result one after the other; return how many. Errors of a job are its result."""
     done = 0
     with contextlib.chdir(chunk.working_folder), threads(chunk.common.threads), warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)  # of each of many settings with each seed

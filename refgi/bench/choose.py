@@ -1,14 +1,8 @@
-"""`choose`: the cheapest method and settings that meet a wish on a scene, found without running all.
+"""`choose`: the cheapest method and settings that meet a wish on a scene, found without running all (docs/choose.md).
 
-Along a track error falls and time grows. For an error, the walk goes up all tracks at once on a small picture, always
-to the probe that promises to be fastest, and ends where that one would take longer than what was found. Between a probe
-that meets the wish and the one before it lies the first rung that does. A track is left where it would miss the wish
-even if its error went on falling as it did last: it falls ever slower. Each find is timed at full size and judged
-there, the fastest first: one that misses moves up its track as far as its slope says, one that meets moves down while
-it does.
-
-For a time, each track is followed at full size up to that time, the small picture ranks where they come to, and the
-first few are judged at full size.
+For an error, the walk goes up all tracks at once on a small picture, always to the probe that promises to be fastest.
+A track is left where it would miss the wish even if its error went on falling as it did last: it falls ever slower.
+Each find is judged at full size, the fastest first. For a time, each track is followed at full size up to that time.
 """
 
 import dataclasses
@@ -16,7 +10,7 @@ import heapq
 import math
 import statistics
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from refgi.bench.error import error_of, without_noise
@@ -26,6 +20,7 @@ from refgi.errors import RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.scene import Scene
 from refgi.truth import TruthSettings
+from refgi.types import Tell
 
 STRIDE = 4  # rungs from probe to probe: a factor of 4
 SLACK = 3.0  # a probe may take as many times as long as what meets the wish: small pictures tell times roughly
@@ -63,10 +58,7 @@ class Found(NamedTuple):
 
 
 def for_error(tracks: Sequence[Track], wish: float, small: JudgedPictures, full: JudgedPictures) -> Found:
-    """Find the fastest choice whose error, RMSE over the truth's mean, is at most a wish.
-
-    `small` is searched; the best is of what was judged at `full` size.
-    """
+    """Find the fastest choice whose error is at most a wish: `small` is searched, the best judged at `full` size."""
     walk = _Walk(tracks, wish, small)
     queue = [(full.seconds(track.rungs[rung]), number, rung)
              for number, (track, rung) in enumerate(walk.starts) if math.isfinite(full.seconds(track.rungs[rung]))]
@@ -92,10 +84,7 @@ def for_error(tracks: Sequence[Track], wish: float, small: JudgedPictures, full:
 
 
 def for_time(tracks: Sequence[Track], wish: float, small: JudgedPictures, full: JudgedPictures) -> Found:
-    """Find the choice of least error whose frame takes at most a wish, s.
-
-    `small` is ranked; the best is of what was timed and judged at `full` size.
-    """
+    """Find the choice of least error whose frame takes at most a wish, s; `small` is ranked, `full` judges."""
     reached = _reached(tracks, TIME_MARGIN * wish, full) or _reached(tracks, wish, full)
     ranked = sorted((Probe(choice, small.seconds(choice), small.error(choice)) for choice in reached),
                     key=lambda one: one.error)
@@ -204,7 +193,6 @@ def _by_time(probes: Iterable[Probe]) -> tuple[Probe, ...]:
     return tuple(sorted(probes, key=lambda one: one.seconds))
 
 
-Tell = Callable[[str, float], None]
 
 SMALL = 128  # pixels along the longer side of the small picture
 SMALL_ROUNDS = 2
@@ -268,10 +256,7 @@ def choose(
 
 
 class Pictures:
-    """A scene at one size: runs choices and judges them by a truth that is traced once.
-
-    Each choice runs `rounds` times, with the seeds from `first_seed` on.
-    """
+    """A scene at one size: runs each choice with several seeds, and judges it by a truth that is traced once."""
 
     def __init__(self, scene: Scene, truth: TruthSettings, rounds: int, tell: Tell, frame_options: dict[str, Any],
                  first_seed: int = 0) -> None:
@@ -282,7 +267,7 @@ class Pictures:
                "a view past all of it")
         self._size = f"{self.frame.width}x{self.frame.height}"
         self._reference = traced(self.frame, truth, lambda what, done: tell(f"{self._size}: {what}", done))
-        self.truth, self.doubt = self._reference.statement, self._reference.doubt
+        self.truth, self.doubt = self._reference.statement, self._reference.whole_doubt
         self._known: dict[Choice, _Run] = {}
 
     def seconds(self, choice: Choice) -> float:
@@ -311,7 +296,7 @@ class Pictures:
     def _judged(self, choice: Choice) -> "_Run":
         runs = [timed(Frame(self._scene, **self._options), choice.method, with_seed(choice.settings, seed))
                 for seed in self._seeds]
-        known = error_of([one.picture for one in runs], self._reference.mean, self._reference.variance,
+        known = error_of([one.picture for one in runs], self._reference.irradiance, self._reference.variance,
                          self.frame.gbuffer.covered)
         return _Run(statistics.median(one.seconds for one in runs), without_noise(known.rmse, known.noise),
                     runs[0].skips)

@@ -35,11 +35,7 @@ def without_noise(rmse: float, noise: float) -> float:
 
 
 def error_of(pictures: Sequence[Array], reference: Array, variance: Array, covered: Array) -> Error:
-    """Judge pictures of several seeds, each (3, h, w), W/m^2, by a reference and the variance of its mean.
-
-    Figures are over the reference's mean; infinite where that is 0. InputError if there is no picture, or no pixel is
-    covered.
-    """
+    """Judge pictures of several seeds, each (3, h, w), W/m^2, over the reference's mean; infinite where that is 0."""
     expect(len(pictures) > 0, "pictures", "one or more", 0)
     expect(bool(covered.any()), "covered", "some pixel that shows a surface", "none")
     made = np.array([picture[:, covered] for picture in pictures], np.float64)
@@ -81,10 +77,7 @@ Point = tuple[float, float]  # s, error
 
 
 def front(points: Sequence[Point]) -> list[bool]:
-    """Return for each point (time, error) whether no other is as fast and nearer, or as near and faster (Pareto).
-
-    Points that are not finite are never on the front.
-    """
+    """Return for each point (time, error) whether none is as fast and nearer, or as near and faster (Pareto)."""
     def beaten(seconds: float, error: float) -> bool:
         return any(s <= seconds and e <= error and (s, e) != (seconds, error) for s, e in points)
 

@@ -53,10 +53,7 @@ def read_grid(file: Path) -> Grid:
 
 
 def grid_of(tables: Mapping[str, Any], file: Path) -> Grid:
-    """Return the grid of tables by method and that of the truth: choices in the tables' order, each once.
-
-    An InputError names all unknown methods and keys and values that are not usable; `file` is where they come from.
-    """
+    """Return the grid of tables by method, each choice once; an InputError names all that is not usable in `file`."""
     passes = _passes(tables.get(TRUTH, {}), file)
     choices: dict[tuple[str, tuple[str, ...]], Choice] = {}
     faults = []
@@ -75,16 +72,19 @@ def grid_of(tables: Mapping[str, Any], file: Path) -> Grid:
 
 
 def chosen(grid: Grid, methods: Sequence[str] | None) -> Grid:
-    """Return the part of a grid that is of some methods, all where absent.
-
-    InputError if a method is unknown or the grid has no setting of it.
-    """
+    """Return the part of a grid that is of some methods, all where absent; InputError if it has none of one."""
     if methods is None:
         return grid
-    names = {find_method(name).name for name in methods}
-    missing = names - {choice.method for choice in grid.choices}
-    expect(not missing, "methods", "some that the grid has settings of", ", ".join(sorted(missing)))
+    names = _found(methods, grid.choices, "some that the grid has settings of")
     return grid._replace(choices=tuple(choice for choice in grid.choices if choice.method in names))
+
+
+def _found(methods: Sequence[str], there: Iterable[Any], expected: str) -> set[str]:
+    """Return names of methods, all of which are those of something that is there."""
+    names = {find_method(name).name for name in methods}
+    missing = names - {one.method for one in there}
+    expect(not missing, "methods", expected, ", ".join(sorted(missing)))
+    return names
 
 
 def _passes(table: Mapping[str, Any], file: Path) -> tuple[int, ...]:
@@ -148,25 +148,16 @@ class Track(NamedTuple):
 
 
 def built_in_tracks(methods: Sequence[str] | None = None) -> tuple[Track, ...]:
-    """Return the tracks that refgi comes with, of all methods where absent.
-
-    InputError if a method is unknown or has no track.
-    """
+    """Return the tracks that refgi comes with, of some methods or all; InputError if one has none."""
     tracks = read_tracks(FILES / "tracks.toml")
     if methods is None:
         return tracks
-    names = {find_method(name).name for name in methods}
-    missing = names - {track.method for track in tracks}
-    expect(not missing, "methods", "some that have tracks", ", ".join(sorted(missing)))
+    names = _found(methods, tracks, "some that have tracks")
     return tuple(track for track in tracks if track.method in names)
 
 
 def read_tracks(file: Path) -> tuple[Track, ...]:
-    """Read tracks from TOML, in the file's order.
-
-    An array of tables a method, each with `along` (a key), `from` and `to` (its least and largest value), and other
-    keys with their values. InputError if the file cannot be read, a method or key is unknown or a value not usable.
-    """
+    """Read tracks from TOML: tables with `along` (a key), `from`, `to` (its range) and other keys' values."""
     found = []
     for name, tables in read_toml(file).items():
         for table in tables if isinstance(tables, list) else [tables]:

@@ -5,9 +5,16 @@ slow moment of the machine falls on all, and each picture counts for the spread 
 loaded, before the first round.
 """
 
+import contextlib
 import dataclasses
+import json
+import subprocess
+import sys
 import time
-from collections.abc import Callable, Mapping
+import tracemalloc
+import warnings
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -19,22 +26,84 @@ from refgi.bench.error import error_in, error_of, front
 from refgi.bench.grid import TRUTH, Choice, Grid
 from refgi.bench.pictures import TRUTH_FILES, Place, Writer
 from refgi.bench.results import Run, SceneResult, Work, figures_of, known
-from refgi.bench.work import first_frames, quietly, works_of
-from refgi.compare.comparison import WARM_UP_SIZE, WITHOUT_VISIBILITY, limited
-from refgi.compare.flip import flip
-from refgi.compare.outcome import UNOCCLUDED, measure
-from refgi.compare.pictures import linear_planes
-from refgi.errors import RefgiError, expect
+from refgi.compare.comparison import WARM_UP_SIZE, WITHOUT_VISIBILITY, limited, trace_reference
+from refgi.compare.metrics import flip
+from refgi.compare.outcome import UNOCCLUDED, Reference, measure
+from refgi.errors import RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.methods import METHODS
-from refgi.provenance import Record, estimate_record, method_record, plain
+from refgi.provenance import plain
 from refgi.scene import Scene
 from refgi.settings import Settings, from_text, leaves
-from refgi.truth import TruthSettings, trace_truth
-from refgi.truth.result import doubt_of_both
-from refgi.types import Array
+from refgi.truth import TruthSettings
+from refgi.types import Array, Tell
 
-Tell = Callable[[str, float], None]
+FIRST_FRAME = """
+import json, sys, warnings
+warnings.simplefilter("ignore")
+from refgi.methods import render
+render(sys.argv[1], sys.argv[2], **json.loads(sys.argv[3]))
+"""
+LONGEST = 600.0  # s that a new process may take
+
+
+def works_of(scene: Scene, choices: Sequence[Choice], options: Mapping[str, Any], tell: Tell) -> dict[int, Work]:
+    """Count what each of some choices takes, by its number; those that give no picture are left out."""
+    found = {}
+    for number, choice in enumerate(choices):
+        tell(f"counting {choice.method}: {choice.label}", number / len(choices))
+        with quietly():
+            found[number] = work_of(scene, choice, options)
+    return found
+
+
+def first_frames(source: str, methods: Sequence[str], options: Mapping[str, Any], tell: Tell) -> dict[str, float]:
+    """Return `cold_seconds` of each of some methods by name; those that give no picture are left out."""
+    found = {}
+    for number, name in enumerate(methods):
+        tell(f"new process: {name}", number / len(methods))
+        with quietly():
+            found[name] = cold_seconds(source, name, options)
+    return found
+
+
+@contextlib.contextmanager
+def quietly() -> Iterator[None]:
+    """Leave warnings and errors to the real run, which says them."""
+    with warnings.catch_warnings(), contextlib.suppress(RefgiError):
+        warnings.simplefilter("ignore", RefgiWarning)
+        yield
+
+
+def work_of(scene: Scene, choice: Choice, options: Mapping[str, Any]) -> Work:
+    """Count what one frame takes, buffers included; memory is that of arrays and objects above the scene's."""
+    running = tracemalloc.is_tracing()
+    if not running:
+        tracemalloc.start()
+    try:
+        tracemalloc.reset_peak()
+        before, _ = tracemalloc.get_traced_memory()
+        with stages.observe(counting=True) as log:
+            METHODS[choice.method].made(Frame(scene, **options), choice.settings)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        if not running:
+            tracemalloc.stop()
+    counts = log.counts or Counter()
+    return Work(pairs=counts["pairs"], rays=counts["rays"], bytes=counts["bytes"], peak_bytes=max(0, peak - before))
+
+
+def cold_seconds(source: str, method: str, options: Mapping[str, Any]) -> float:
+    """Return how long a new process takes to a method's first frame, s, kernels cached; RefgiError without one."""
+    command = [sys.executable, "-c", FIRST_FRAME, source, method, json.dumps(dict(options))]
+    started = time.perf_counter()
+    try:
+        subprocess.run(command, check=True, capture_output=True, text=True, timeout=LONGEST)
+    except (subprocess.SubprocessError, OSError) as error:
+        last = (getattr(error, "stderr", None) or str(error)).strip().splitlines()[-1:]
+        raise RefgiError(f"{method}: a new process gave no frame of {source}: {''.join(last)}") from error
+    return time.perf_counter() - started
+
 
 REFERENCE_SEED = 2**31  # of the truth: none of the rounds'
 SEEN, SEEN_UNOCCLUDED = "seen", "seen_unoccluded"  # names of references, beside those of a comparison
@@ -42,24 +111,6 @@ LIMITS: Mapping[str, Mapping[str, Any]] = MappingProxyType({  # what each furthe
     UNOCCLUDED: WITHOUT_VISIBILITY, SEEN: {"emitters": "visible"},
     SEEN_UNOCCLUDED: {**WITHOUT_VISIBILITY, "emitters": "visible"},
 })
-
-
-class Reference(NamedTuple):
-    """What pictures are judged by."""
-
-    mean: Array  # (3, h, w), W/m^2
-    variance: Array  # of the mean
-    radiance: Array
-    statement: str
-    samples: Array  # (h, w)
-    record: Record  # of its own
-    lobes: Any = None  # `TruthResult` of receivers' lobes by indirect light, W/m^2/sr, where a glossy surface is seen
-    doubt: str = ""  # why its error is not to be trusted, that of its lobes included
-
-    @property
-    def lobe_planes(self) -> dict[str, Array]:
-        """The lobes and their variance as arguments of `linear_planes`; none where there are no lobes."""
-        return {} if self.lobes is None else {"lobes": self.lobes.mean, "lobe_variance": self.lobes.variance_of_mean}
 
 
 class Made(NamedTuple):
@@ -88,7 +139,7 @@ def bench_scene(
     settings = dataclasses.replace(truth or TruthSettings(), seed=REFERENCE_SEED)
     names = {name: None for choice in grid.choices for name in references_of(choice) if name != TRUTH}
     references = {TRUTH: traced(frame, settings, tell)}
-    references |= {name: traced(frame, limited(settings, name, LIMITS[name]), tell) for name in names}
+    references |= {name: traced(frame, limited(settings, name, LIMITS[name]), tell, name) for name in names}
     stops = [stop(settings, passes) for passes in grid.passes]
     size = {"width": frame.width, "height": frame.height}
     made, failures = _in_turn(scene, [*grid.choices, *stops], rounds, {**frame_options, **size}, tell)
@@ -105,7 +156,7 @@ def bench_scene(
     others = [run for run in runs if run.method != TRUTH]
     line = [run for run in runs if run.method == TRUTH]
     return SceneResult(scene=scene.name, width=frame.width, height=frame.height, covered=int(covered.sum()),
-                       mean=float(references[TRUTH].mean[:, covered].mean(dtype=np.float64)),
+                       mean=float(references[TRUTH].irradiance[:, covered].mean(dtype=np.float64)),
                        truth=references[TRUTH].statement, runs=compared(others, line), line=tuple(line),
                        failures=failures, cold=cold)
 
@@ -119,26 +170,15 @@ def references_of(choice: Choice) -> list[str]:
     return [*names, SEEN if knows else SEEN_UNOCCLUDED] if limits.get("emitters") == "visible" else names
 
 
-def traced(frame: Frame, settings: TruthSettings, tell: Tell) -> Reference:
-    """Trace the truth, or what else its settings say, of a frame."""
-    with stages.observe(progress=lambda stage, done: tell(f"{TRUTH}: {stage}", done)):
-        found = trace_truth(frame, settings)
-        lobes, lobe_estimate = METHODS[TRUTH].compute_lobes(frame, settings)
-    radiance = frame.radiance(np.asarray(found.mean, frame.dtype), lobes)
-    statement = found.error_statement if lobe_estimate is None or not lobe_estimate.doubt else (
-        f"{found.error_statement}; lobes: {lobe_estimate.doubt}")
-    return Reference(found.mean, found.variance_of_mean, radiance, statement, found.samples,
-                     {**method_record(TRUTH, settings), **estimate_record(found, lobe_estimate)}, lobe_estimate,
-                     doubt_of_both(found, lobe_estimate))
+def traced(frame: Frame, settings: TruthSettings, tell: Tell, name: str = TRUTH) -> Reference:
+    """Trace a reference of a frame."""
+    return trace_reference(frame, name, settings, lambda stage, done: tell(f"{TRUTH}: {stage}", done))
 
 
 def _write(writer: Writer, references: Mapping[str, Reference]) -> None:
     for name, file in TRUTH_FILES.items():
-        if name not in references:
-            continue
-        one = references[name]
-        planes = linear_planes(one.radiance, one.mean, one.variance, one.samples, **one.lobe_planes)
-        writer.write(Path(file).stem, planes, one.record)
+        if name in references:
+            writer.write(Path(file).stem, references[name].planes, references[name].record)
     writer.write_ids()
 
 
@@ -236,10 +276,10 @@ def with_seed(settings: Settings, seed: int) -> Settings:
 def judged(choice: Choice, made: Made, references: Mapping[str, Reference], frame: Frame) -> Run:
     """Return all figures of a choice's pictures; `references` by name, the truth among them."""
     covered = frame.gbuffer.covered
-    errors = {name: figures_of(error_of(made.pictures, references[name].mean, references[name].variance, covered),
-                               in_doubt=bool(references[name].doubt))
+    errors = {name: figures_of(error_of(made.pictures, references[name].irradiance, references[name].variance, covered),
+                               in_doubt=bool(references[name].doubts))
               for name in references_of(choice) if name in references}
-    figures = measure(made.pictures[0], references[TRUTH].mean, references[TRUTH].variance, covered).figures
+    figures = measure(made.pictures[0], references[TRUTH].irradiance, references[TRUTH].variance, covered).figures
     seen = flip(frame.radiance(made.pictures[0], made.lobes), references[TRUTH].radiance, covered)
     return Run(method=choice.method, changes=choice.changes, settings=plain(choice.settings), times=tuple(made.times),
                stages=made.stages, errors=errors, flip=known(seen.mean), ssim=known(figures["ssim"].value),

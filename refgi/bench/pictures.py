@@ -12,11 +12,10 @@ import numpy as np
 
 from refgi.bench.grid import TRUTH
 from refgi.bench.results import Run, SceneResult, in_percent
+from refgi.compare.album import SECOND, THIRD, Judge, Picture, View
 from refgi.compare.outcome import UNOCCLUDED
-from refgi.compare.page.album import Judge, Picture, View
-from refgi.compare.page.floats import SECOND, THIRD
+from refgi.compare.pages import number
 from refgi.compare.pictures import linear_planes
-from refgi.compare.report import number
 from refgi.errors import expect
 from refgi.frame import Frame
 from refgi.image import read_exr, write_exr
@@ -59,10 +58,7 @@ class Writer(NamedTuple):
     frame: Frame  # what they show
 
     def write(self, stem: str, planes: Mapping[str, Array], record: Record) -> str:
-        """Write one EXR, whole or not at all; return its path from the folder of results.json.
-
-        `planes`: (h, w) by channel; `record`: what it holds beside the record of scene and frame.
-        """
+        """Write one EXR of planes, (h, w) by channel, whole or not at all; return its path from results.json."""
         frame, name = self.frame, self.place.name(f"{stem}.exr")
         file = self.place.out / name
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -71,11 +67,7 @@ class Writer(NamedTuple):
         return name
 
     def write_runs(self, runs: Sequence[tuple[str, Any, Array, Array | None]]) -> Iterator[str]:
-        """Write pictures of methods and yield each file, from the folder of results.json.
-
-        A run: method, all its settings, indirect irradiance (3, h, w), W/m^2, and receivers' lobes (3, h, w), W/m^2/sr,
-        or None.
-        """
+        """Write pictures (method, settings, irradiance W/m^2, lobes W/m^2/sr or None) and yield each file."""
         counts: Counter[str] = Counter()
         for method, settings, irradiance, lobes in runs:
             counts[method] += 1
@@ -98,11 +90,7 @@ def named(scene: SceneResult, position: int) -> list[tuple[str, Run]]:
 
 
 def view_of(scene: SceneResult, position: int, folder: Path) -> tuple[View, Record] | None:
-    """Return the pictures of a scene that are there, and the record of the truth's; `folder` is that of results.json.
-
-    None where the truth or every run has no picture. InputError if a picture is damaged, of another size, or outside
-    the folder.
-    """
+    """Return the pictures of a scene that are there and the truth's record; None without truth or any picture."""
     there = [(name, run, file) for name, run in named(scene, position)
              if (file := _file(run, folder)) is not None and file.is_file()]
     truth = there[0][2].with_name(TRUTH_FILES[TRUTH]) if there else None

@@ -24,9 +24,22 @@ from refgi.bench.results import (
     taken,
     times,
 )
-from refgi.compare.page.album import album
-from refgi.compare.plot import CARD, INK, LINE, METHOD_COLOURS, Axes, Curve, curves_plot, figure_svg, style_plot
-from refgi.compare.report import PAGE, machine, number, script, sort_key, templates
+from refgi.compare.album import album
+from refgi.compare.pages import (
+    CARD,
+    INK,
+    LINE,
+    METHOD_COLOURS,
+    Axes,
+    Curve,
+    curves_plot,
+    figure_svg,
+    markup,
+    number,
+    page_of,
+    sort_key,
+    style_plot,
+)
 from refgi.image import write_text
 from refgi.provenance import Record
 
@@ -42,17 +55,12 @@ class Place(NamedTuple):
 
 
 def overview(places: Sequence[Place]) -> dict[str, Any]:
-    """Return the table and the plot over all scenes, in the page's order.
-
-    `methods`; `rows`, one a scene, with a cell a method; `plot`, an ``<svg>`` element.
-    """
-    from markupsafe import Markup
-
+    """Return `methods`, `rows` (one a scene, a cell a method) and `plot` over all scenes, in the page's order."""
     methods = list(dict.fromkeys(run.method for place in places for run in place.scene.runs))
     rows = [{"scene": place.scene.scene, "link": place.link, "size": f"{place.scene.width} x {place.scene.height}",
              "cells": [_cell([run for run in place.scene.runs if run.method == name]) for name in methods]}
             for place in places]
-    return {"methods": methods, "rows": rows, "plot": Markup(_plot(places, methods))}
+    return {"methods": methods, "rows": rows, "plot": markup(_plot(places, methods))}
 
 
 def _cell(runs: Sequence[Run]) -> dict[str, str]:
@@ -92,11 +100,9 @@ SPLIT_HOW = (
 
 def splits_of(splits: Sequence[Split]) -> dict[str, Any] | None:
     """Return what the page's template shows of a scene's splits; None without splits."""
-    from markupsafe import Markup
-
     if not splits:
         return None
-    return {"how": SPLIT_HOW, "plot": Markup(bars(splits)), "columns": SPLIT_COLUMNS,
+    return {"how": SPLIT_HOW, "plot": markup(bars(splits)), "columns": SPLIT_COLUMNS,
             "tables": [{"said": said_of_split(split), "rows": rows_of_split(split)} for split in splits]}
 
 
@@ -181,21 +187,12 @@ HOW = ("Each round runs every choice once on a frame of its own, buffers include
 
 
 def write_page(result: Result, folder: Path, refresh: int | None = None) -> None:
-    """Write index.html into a folder that holds the pictures, whole or not at all.
-
-    A browser reads it again each `refresh` seconds unless it is in use; never where absent. InputError if it cannot be
-    written, or a picture is damaged.
-    """
+    """Write index.html beside its pictures; a browser reads it again each `refresh` seconds unless in use."""
     write_text(folder / "index.html", page(result, folder, refresh))
 
 
 def page(result: Result, folder: Path, refresh: int | None = None) -> str:
-    """Return the page of a bench as HTML that refers to nothing outside itself; the same for equal input.
-
-    Pictures that `folder` lacks are left out; `refresh` as in `write_page`.
-    """
-    from markupsafe import Markup
-
+    """Return the page of a bench as HTML, the same for equal input; pictures that `folder` lacks are left out."""
     views = {number: found for number, scene in enumerate(result.scenes, 1)
              if (found := view_of(scene, number, folder)) is not None}
     pictures = album([view for view, _ in views.values()])
@@ -203,21 +200,18 @@ def page(result: Result, folder: Path, refresh: int | None = None) -> str:
     scenes = [_scene(scene, number, shown.get(number), views[number][1] if number in views else {})
               for number, scene in enumerate(result.scenes, 1)]
     rows = overview([Place(scene, f"#scene{number}") for number, scene in enumerate(result.scenes, 1)])
-    return templates(FILES).get_template("bench.html.j2").render(
-        style=Markup((PAGE / "style.css").read_text("utf-8")), script=script(), kind="bench",
-        title="Run time against error", lead=", ".join(scene.scene for scene in result.scenes),
-        facts=[f"{sum(len(scene.runs) for scene in result.scenes)} runs"], verdict="", failures=[], scenes=scenes,
-        columns=COLUMNS, how=HOW, overview=rows if len(result.scenes) > 1 else None, album=pictures, refresh=refresh,
-        versions=result.environment["versions"], machine=machine(result.environment))
+    return page_of(
+        "bench.html.j2", result.environment, FILES, kind="bench", title="Run time against error",
+        lead=", ".join(scene.scene for scene in result.scenes), scenes=scenes, columns=COLUMNS, how=HOW,
+        facts=[f"{sum(len(scene.runs) for scene in result.scenes)} runs"], refresh=refresh, album=pictures,
+        overview=rows if len(result.scenes) > 1 else None)
 
 
 def _scene(scene: SceneResult, number: int, view: int | None, record: Record) -> dict[str, Any]:
-    from markupsafe import Markup
-
     runs = sorted(named(scene, number), key=lambda one: one[1].seconds)
     cold = {name: f"{one:.3g} s" for name, one in scene.cold.items()}
     return {"name": scene.scene, "number": number, "cold": cold, "size": f"{scene.width} x {scene.height}",
-            "truth": scene.truth, "doubts": scene.doubts, "plot": Markup(plot_of(scene, number)),
+            "truth": scene.truth, "doubts": scene.doubts, "plot": markup(plot_of(scene, number)),
             "splits": splits_of(scene.splits), "said": list(said_of(scene)), "failures": scene.failures, "view": view,
             "rows": [_row(name, run) for name, run in runs], "provenance": list(provenance_of(record)),
             "made": [_made(run) for _, run in runs]}
@@ -235,11 +229,7 @@ def _ms(seconds: float) -> str:
 
 
 def plot_of(scene: SceneResult, position: int = 1) -> str:
-    """Draw one curve a method, and the path tracer's dashed; bars are 95 % intervals, marks lead to pictures.
-
-    An ``<svg>`` element, points of a method in the order of their times; nothing where no error is known. `position`:
-    of the scene on the page.
-    """
+    """Draw one curve a method, the path tracer's dashed; bars are 95 % intervals, marks lead to pictures."""
     if not any(0 < run.rmse < math.inf for run in (*scene.runs, *scene.line)):
         return ""
     runs = named(scene, position)
@@ -250,10 +240,7 @@ def plot_of(scene: SceneResult, position: int = 1) -> str:
 
 
 def said_of(scene: SceneResult) -> Iterator[str]:
-    """Yield what the curves say: each method's nearest picture, and whether the path tracer is better in that time.
-
-    A sentence a method, in the order of their errors.
-    """
+    """Yield a sentence a method: its nearest picture, and whether the path tracer is better in that time."""
     best = {run.method: run for run in sorted(scene.runs, key=lambda one: -one.rmse)}
     for method, run in sorted(best.items(), key=lambda one: one[1].rmse):
         text = (f"{method} comes to {in_percent(run.errors[TRUTH].rmse)} % in {number(1e3 * run.seconds)} ms "

@@ -1,18 +1,14 @@
 """What a bench found, as data: results.json by its schema, tables as CSV and Markdown, sentences of split errors."""
 
-import csv
-import io
 import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 from typing import Any, Self
 
 import pydantic
 
 from refgi.bench.error import Error
-from refgi.compare.report import number, require_environment
-from refgi.image import write_text
+from refgi.compare.pages import number, require_environment
 
 SPLIT_COLUMNS = ("approximation", "mean, %", "RMS, %", "spread, %", "share, %", "RMSE without, %", "mean without, %")
 ALL = "all together"
@@ -20,11 +16,7 @@ LEAST = 0.01  # of the mean square: what is taken back and not said
 
 
 def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
-    """Return a row for each part and one for the whole, by `COLUMNS`, over the truth's mean.
-
-    Change of the mean, root mean square and spread over seeds of what the part changes, its share of the whole's mean
-    square, then the whole's RMSE and change of the mean with it switched off.
-    """
+    """Return a row by `SPLIT_COLUMNS` for each part and one for the whole, over the truth's mean."""
     parts = [(part.name, percent(part.mean), percent(part.error.rmse), percent(part.error.spread),
               percent(part.share), percent(part.alone.rmse if part.alone else None),
               percent(_mean_without(split, part))) for part in split.parts]
@@ -32,10 +24,7 @@ def rows_of_split(split: "Split") -> list[tuple[str, ...]]:
 
 
 def said_of_split(split: "Split") -> str:
-    """Return what a split says: the largest share and what takes most back, how squares add up, what helps most.
-
-    The settings alone where nothing is known.
-    """
+    """Return what a split says: its largest share, what takes most back, how squares add up, what helps most."""
     known = [part for part in split.parts if part.share is not None]
     if not known or split.squares is None or split.cross is None:
         return f"{split.label}: not known."
@@ -54,21 +43,18 @@ def said_of_split(split: "Split") -> str:
     return f"{text} With {name} alone switched off RMSE would be {percent(rmse)} %."
 
 
-def tables_of(splits: "Sequence[Split]") -> list[str]:
-    """Return the tables of a scene's splits as lines of Markdown; none without splits."""
-    return [line for split in splits for line in _table(split)]
+def tables_of(splits: "Sequence[Split]") -> Iterator[str]:
+    """Yield the tables of a scene's splits as lines of Markdown."""
+    for split in splits:
+        yield from ("", f"Error split of {split.label}, {split.width} x {split.height}:", "")
+        yield from (f"| {' | '.join(SPLIT_COLUMNS)} |", f"|---|{'--:|' * (len(SPLIT_COLUMNS) - 1)}")
+        yield from (f"| {' | '.join(row)} |" for row in rows_of_split(split))
+        yield from ("", said_of_split(split))
 
 
 def percent(value: float | None) -> str:
     """Return a share in %, with its sign; nothing where it is not known."""
     return "" if value is None else number(100 * value)
-
-
-def _table(split: "Split") -> Iterator[str]:
-    yield from ("", f"Error split of {split.label}, {split.width} x {split.height}:", "")
-    yield from (f"| {' | '.join(SPLIT_COLUMNS)} |", f"|---|{'--:|' * (len(SPLIT_COLUMNS) - 1)}")
-    yield from (f"| {' | '.join(row)} |" for row in rows_of_split(split))
-    yield from ("", said_of_split(split))
 
 
 def _mean_without(split: "Split", part: "Part") -> float | None:
@@ -79,16 +65,15 @@ def _mean_without(split: "Split", part: "Part") -> float | None:
 
 FORMAT = "bench 1"
 LIMITED = ("unoccluded", "seen", "seen_unoccluded")  # truths of which nothing blocks light, whose senders are in view
-COLUMNS = ("scene", "method", "settings", "seconds", "fastest", "slowest", "rmse", "low", "high", "bias", "spread",
-           "noise", "in_doubt", *(f"rmse_{name}" for name in LIMITED), "pairs", "rays", "bytes", "peak_bytes", "flip",
-           "ssim", "against_truth_in_equal_time", "on_the_front", "refgi_format")
 
 
-class _Strict(pydantic.BaseModel):
+class Strict(pydantic.BaseModel):
+    """Data of which every key is known."""
+
     model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
 
 
-class Figures(_Strict):
+class Figures(Strict):
     """Errors over the mean of the reference (`refgi.bench.error.Error`); None where not known."""
 
     in_doubt: bool = False  # the reference's own error is not to be trusted
@@ -101,8 +86,8 @@ class Figures(_Strict):
     noise: float | None
 
 
-class Work(_Strict):
-    """What a frame takes beside time (`refgi.bench.work`)."""
+class Work(Strict):
+    """What a frame takes beside time (`refgi.bench.measure`)."""
 
     pairs: int  # of light, or other sender, and receiver that sums are given, before skips within a sum
     rays: int  # traced
@@ -110,7 +95,7 @@ class Work(_Strict):
     peak_bytes: int  # most memory of arrays and objects above that of the scene
 
 
-class Run(_Strict):
+class Run(Strict):
     """One method with one choice of settings on one scene."""
 
     method: str
@@ -167,7 +152,7 @@ class Run(_Strict):
         return next((rmse_against(self, name) for name in reversed(LIMITED) if name in self.errors), None)
 
 
-class Alone(_Strict):
+class Alone(Strict):
     """What switching one approximation off alone does, the truth's noise taken out; None where not known."""
 
     rmse: float | None  # without it
@@ -175,7 +160,7 @@ class Alone(_Strict):
     mean: float | None  # change of the mean that it makes
 
 
-class Part(_Strict):
+class Part(Strict):
     """What one approximation changes in the picture of those before it, over the mean of the truth."""
 
     name: str
@@ -186,7 +171,7 @@ class Part(_Strict):
     alone: Alone | None = None  # None for what no approximation accounts for
 
 
-class Split(_Strict):
+class Split(Strict):
     """The error of one method and setting as a sum of its approximations, over the mean of the truth."""
 
     method: str
@@ -208,7 +193,7 @@ class Split(_Strict):
         return f"{self.method}, {', '.join(self.changes) or 'default'}{' (knee)' if self.knee else ''}"
 
 
-class SceneResult(_Strict):
+class SceneResult(Strict):
     """All runs on one scene."""
 
     scene: str
@@ -231,7 +216,7 @@ class SceneResult(_Strict):
                 "figures against it" for name in names]
 
 
-class PathResult(_Strict):
+class PathResult(Strict):
     """One method with one choice of settings over all frames of a path (`refgi.batch.outcome`)."""
 
     scene: str
@@ -248,7 +233,7 @@ class PathResult(_Strict):
         return ", ".join(self.changes) or "default"
 
 
-class Result(_Strict):
+class Result(Strict):
     """results.json."""
 
     refgi: str = FORMAT
@@ -278,33 +263,10 @@ def schema_text() -> str:
     return json.dumps(Result.model_json_schema(), indent=1, sort_keys=True) + "\n"
 
 
-def rows_of(result: Result) -> Iterable[dict[str, Any]]:
-    """Yield one row a run by `COLUMNS`, the path tracer's among them; None where there is nothing to say."""
-    for scene in result.scenes:
-        for run in (*scene.runs, *scene.line):
-            yield {"scene": scene.scene, "method": run.method, "settings": run.label, "seconds": run.seconds,
-                   "fastest": min(run.times), "slowest": max(run.times), **run.errors["truth"].model_dump(),
-                   **{f"rmse_{name}": rmse_against(run, name) for name in LIMITED},
-                   **({} if run.work is None else run.work.model_dump()), "flip": run.flip, "ssim": run.ssim,
-                   "against_truth_in_equal_time": run.in_equal_time, "on_the_front": run.front,
-                   "refgi_format": result.refgi}
-
-
 def rmse_against(run: Run, reference: str) -> float | None:
     """Return the RMSE of a run against one of its references; None where it has no such reference."""
     known = run.errors.get(reference)
     return None if known is None else known.rmse
-
-
-def write_results(result: Result, folder: Path) -> None:
-    """Write results.json, results.csv and results.md, each whole or not at all; InputError where it cannot be done."""
-    table = io.StringIO()
-    writer = csv.DictWriter(table, COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows_of(result))
-    write_text(folder / "results.json", result.model_dump_json(indent=1) + "\n")
-    write_text(folder / "results.csv", table.getvalue())
-    write_text(folder / "results.md", markdown(result))
 
 
 def markdown(result: Result) -> str:

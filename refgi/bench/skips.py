@@ -1,66 +1,187 @@
 """What each skip saves on a scene, measured, with the proof that it changes no bit of the picture.
 
-A method renders the scene with all skips on, which counts what each has to leave out, and with each of these off, which
-compares bits and loads kernels. Then come rounds: a picture with all on before each one without, so that a slow moment
-of the machine falls on both. Beside that stand things that could be left out at the cost of a difference, with the
-setting to type, and skips that have no switch, with the reason.
+Rounds have a picture with all skips on before each one without, so that a slow moment of the machine falls on both.
+Beside that stand things that could be left out at the cost of a difference, with the setting to type, lights too dim to
+matter, which no setting leaves out, and skips that have no switch, with the reason.
 """
 
-import hashlib
 import statistics
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import pydantic
 
 from refgi import skips
-from refgi.bench.trades import DimLights, Trade, changes_of, difference, dim_lights
-from refgi.errors import RefgiWarning, expect
+from refgi.bench.results import Strict
+from refgi.errors import InputError, RefgiWarning, expect
+from refgi.frame import Frame
+from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.settings import LightSettings
 from refgi.methods import Picture, find_method, render
+from refgi.pairs.estimates import light_at, sample_for
+from refgi.pairs.irradiance import Receivers, irradiance
+from refgi.pairs.pixel_lights import PixelLights
+from refgi.pairs.settings import PairSettings
 from refgi.scene import Scene
-from refgi.settings import Settings
+from refgi.settings import Settings, from_text
+from refgi.types import Array, Tell
 
-Tell = Callable[[str, float], None]
 Clock = Callable[[], float]  # s
 Times = tuple[tuple[float, ...], tuple[float, ...]]  # s, a round each: of the plain picture, and of one right after
 
+SHARE = 0.999  # of the light without visibility, that the lights carry that are kept
+MOST = 8192  # lights that are summed one by one
 
-class Kernel(NamedTuple):
-    """A skip inside of a kernel, without a switch."""
 
-    methods: frozenset[str]
+class DimLights(Strict):
+    """Lights that carry nearly all of a picture's light without visibility."""
+
+    lights: int
+    carrying: int  # the fewest that carry `share`
+    count: int  # `lights.count` that draws about as many
+    share: float
+    times: tuple[float, ...]  # s of the sum over all lights at all pixels, a round each
+    times_carrying: tuple[float, ...]  # over those alone
+    error: float  # RMSE without the others, over the mean
+
+
+def dim_lights(
+    frame: Frame, settings: Settings, rounds: int, *, share: float = SHARE, clock: Clock = time.perf_counter
+) -> DimLights | None:
+    """Measure what leaving out the dimmest lights saves and costs, `share` of the light kept; None without any."""
+    chosen = getattr(settings, "lights", None)
+    pairs = getattr(settings, "effective_pairs", None)
+    if not isinstance(chosen, LightSettings) or pairs is None:
+        return None
+    lights = choose_lights(frame, chosen)
+    footprint = footprints(frame, chosen, pairs)
+    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    if lights.flux.shape[1] > MOST:
+        return None
+    parts = parts_of_lights(receivers, lights, pairs, footprint)
+    kept = brightest(parts, share)
+    if not len(kept):
+        return None
+    some = (receivers, selected(lights, kept), pairs, None if footprint is None else footprint[kept])
+    every = (receivers, lights, pairs, footprint)
+    right, without = irradiance(*every), irradiance(*some)
+    ((times, times_carrying),) = in_turn(lambda: irradiance(*every), [lambda: irradiance(*some)], rounds, clock)
+    difference = (without - right)[:, receivers.covered].astype(np.float64)
+    mean = float(right[:, receivers.covered].mean(dtype=np.float64))
+    return DimLights(lights=len(parts), carrying=len(kept), count=max(1, round(chosen.count * len(kept) / len(parts))),
+                     share=share, times=times, times_carrying=times_carrying,
+                     error=float(np.sqrt((difference**2).mean())) / mean)
+
+
+def parts_of_lights(
+    receivers: Receivers, lights: PixelLights, pairs: PairSettings, footprint: Array | None = None
+) -> Array:
+    """Return the irradiance, W/m^2, that each of N lights adds to the mean over sampled pixels, unoccluded, (N,)."""
+    sample = sample_for(receivers, lights)
+    return np.array([light_at(sample, selected(lights, [k]), pairs, None if footprint is None else footprint[[k]])
+                     for k in range(lights.flux.shape[1])])
+
+
+def selected(lights: PixelLights, index: Any) -> PixelLights:
+    """Return some of the lights, in the order of `index` (n,)."""
+    parts: dict[str, Any] = {name: values[..., index] for name, values in lights._asdict().items()
+                             if isinstance(values, np.ndarray)}
+    return lights._replace(**parts)
+
+
+def brightest(parts: Array, share: float) -> Array:
+    """Return the fewest lights (n,) that carry a share of the sum of all parts (N,), rising; none where that is 0."""
+    order = np.argsort(-parts, kind="stable")
+    sums = np.cumsum(parts[order])
+    if not len(sums) or sums[-1] <= 0:
+        return order[:0]
+    return np.sort(order[: int(np.searchsorted(sums, share * sums[-1])) + 1])
+
+
+# by method: what is left out, or put back, and how settings change
+TRADES: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
+    "sii": (("pairs below 1 % of the brightest light's irradiance", ("reach.cut=relative", "reach.cut.share=0.01")),
+            ("three of four pixels where neighbours resemble each other", ("half_resolution=true",))),
+    "multires": (("subsplats that a target of 1 % does not ask for", ("subsplats=error", "subsplats.target=0.01")),),
+    "val": (("subsplats that a target of 10 % does not ask for", ("interleaving.block=none", "subsplats.target=0.1")),
+            ("63 of 64 lights at each pixel", ("interleaving.block=8",)),
+            ("nothing: walls that nothing lies behind are drawn into maps too", ("maps.occluders_alone=false",))),
+}
+
+
+class Trade(Strict):
+    """A change of settings, measured."""
+
+    meaning: str
+    changes: tuple[str, ...]  # "key=value", as --set takes them
+    times: tuple[float, ...]  # s of a whole frame as the settings are, a round each
+    times_changed: tuple[float, ...]  # as changed, right after
+    difference: float | None  # RMSE to the picture as the settings are, over its mean; None where that is black
+
+
+class Change(NamedTuple):
+    """A change of settings."""
+
+    meaning: str
+    changes: tuple[str, ...]
+    settings: Settings
+
+
+def changes_of(method: str, settings: Settings, lights: DimLights | None) -> list[Change]:
+    """Return what a method could leave out and does not yet: fewer lights, and those of `TRADES` that go."""
+    fewer = () if lights is None else (
+        (f"lights: as many as carry {lights.share:.1%}, drawn anew", (f"lights.count={lights.count}",)),)
+    made = []
+    for meaning, changes in (*fewer, *TRADES.get(method, ())):
+        try:
+            changed = from_text(settings, changes)
+        except InputError:  # does not go with the other settings
+            continue
+        if changed != settings:
+            made.append(Change(meaning, changes, changed))
+    return made
+
+
+def difference(picture: Picture, plain: Picture) -> float | None:
+    """Return the RMSE between two pictures' irradiance over the second's mean; None where that is black."""
+    covered = plain.frame.gbuffer.covered
+    made, right = (one.irradiance[:, covered].astype(np.float64) for one in (picture, plain))
+    mean = float(right.mean()) if right.size else 0.0
+    return float(np.sqrt(((made - right) ** 2).mean())) / mean if mean > 0 else None
+
+
+
+
+class Unmeasured(Strict):
+    """A skip without a switch."""
+
     meaning: str
     reason: str
 
 
-SPLATTING = frozenset({"sii", "multires", "val"})
-UNMEASURED = (
-    Kernel(SPLATTING, "lights without diffuse flux, or without lobe beside others that have one",
-           "float32 sums close after every 64 lights: dark ones among them would move where"),
-    Kernel(SPLATTING | {"gather", "vpl"}, "five of six faces of a spot light's map",
-           "a cube's texels lie elsewhere: other pixel lights, other bits"),
-    Kernel(frozenset({"val"}), "visibility at the receivers of a tile that get no light",
-           "those with light move together inside of the kernel that also lights them"),
-    Kernel(frozenset({"val"}), "triangles wholly behind a map's hemisphere", "inside of the rasterizer"),
-    Kernel(frozenset({"val"}), "the basis of a map's texels where it is empty",
-           "they are all alike, and copied inside of the kernel that filters the others"),
-    Kernel(frozenset({"multires"}), "cells of subsplats without surface", "the list of leaves is made without them"),
-    Kernel(frozenset({"hssil"}), "samples that are dark for a whole strip of a level",
-           "the others are summed in twos: dark ones among them would move which"),
-    Kernel(frozenset({"truth"}), "shadow rays of samples that give no light",
-           "the kernel that draws samples sorts them out"),
-    Kernel(frozenset({"truth", "vpl"}), "pixels without surface", "rays start on triangles, which these have not"),
-)
+SPLATTING = {"sii", "multires", "val"}
+# skips inside of kernels: of which methods, what they leave out, and why there is no switch
+UNMEASURED: tuple[tuple[frozenset[str], Unmeasured], ...] = tuple(
+    (frozenset(methods), Unmeasured(meaning=meaning, reason=reason)) for methods, meaning, reason in (
+        (SPLATTING, "lights without diffuse flux, or without lobe beside others that have one",
+         "float32 sums close after every 64 lights: dark ones among them would move where"),
+        (SPLATTING | {"gather", "vpl"}, "five of six faces of a spot light's map",
+         "a cube's texels lie elsewhere: other pixel lights, other bits"),
+        ({"val"}, "visibility at the receivers of a tile that get no light",
+         "those with light move together inside of the kernel that also lights them"),
+        ({"val"}, "triangles wholly behind a map's hemisphere", "inside of the rasterizer"),
+        ({"val"}, "the basis of a map's texels where it is empty",
+         "they are all alike, and copied inside of the kernel that filters the others"),
+        ({"multires"}, "cells of subsplats without surface", "the list of leaves is made without them"),
+        ({"hssil"}, "samples that are dark for a whole strip of a level",
+         "the others are summed in twos: dark ones among them would move which"),
+        ({"truth"}, "shadow rays of samples that give no light", "the kernel that draws samples sorts them out"),
+        ({"truth", "vpl"}, "pixels without surface", "rays start on triangles, which these have not")))
 
 
-class _Strict(pydantic.BaseModel):
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
-
-
-class MeasuredSkip(_Strict):
+class MeasuredSkip(Strict):
     """One skip that has something to leave out."""
 
     name: str
@@ -83,14 +204,7 @@ class MeasuredSkip(_Strict):
         return statistics.median(self.saved)
 
 
-class Unmeasured(_Strict):
-    """A skip without a switch."""
-
-    meaning: str
-    reason: str
-
-
-class SkipReport(_Strict):
+class SkipReport(Strict):
     """All skips of a method on a scene."""
 
     scene: str
@@ -113,11 +227,10 @@ def measure_skips(
     scene: Scene, method: str, settings: Settings | None = None, *, rounds: int = 3,
     clock: Clock = time.perf_counter, tell: Tell = lambda *_: None, **frame_options: Any,
 ) -> SkipReport:
-    """Measure what each skip saves on a scene, and whether the picture has the same bits without it.
+    """Measure what each skip saves on a scene at its camera's size, and whether the picture has the same bits without.
 
-    The scene's camera has the size of the picture; the method's default settings where absent. `clock` in s:
-    `time.process_time` is that of processors alone, for machines that do other work as well. Skips that have nothing to
-    leave out are not in the report. InputError if scene, method or settings are not usable, or there is no round.
+    `clock`: `time.process_time` is that of processors alone, for machines that do other work as well. Skips that have
+    nothing to leave out are not in the report. InputError if something is not usable, or there is no round.
     """
     expect(rounds >= 1, "rounds", "1 or more", rounds)
     chosen = find_method(method).settings() if settings is None else settings
@@ -131,19 +244,20 @@ def measure_skips(
         changes = changes_of(method, chosen, lights)
         jobs = [*(plain._replace(off=(name,)) for name in names),
                 *(plain._replace(settings=change.settings) for change in changes)]
-        comparisons = _compared(jobs, first, tell)
-        times = _in_turn(plain, jobs, rounds, clock, tell)
+        comparisons = list(_compared(jobs, first, tell))
+        times = in_turn(plain.run, [job.run for job in jobs], rounds, clock, tell)
     results = list(zip(times, comparisons, strict=True))
     return SkipReport(
         scene=scene.name, method=method, width=first.frame.width, height=first.frame.height,
         times=tuple(seconds for on, _ in times for seconds in on),
-        skips=tuple(_measured(name, counts[name], *result) for name, result in zip(names, results, strict=False)),
+        skips=tuple(MeasuredSkip(name=name, **skips.SKIPS[name]._asdict(), **counts[name]._asdict(), times=on,
+                                 times_without=off, same_bits=same)
+                    for name, ((on, off), (same, _)) in zip(names, results, strict=False)),
         trades=tuple(Trade(meaning=change.meaning, changes=change.changes, times=on, times_changed=changed,
-                           difference=one.difference)
-                     for change, ((on, changed), one) in zip(changes, results[len(names) :], strict=True)),
+                           difference=off)
+                     for change, ((on, changed), (_, off)) in zip(changes, results[len(names) :], strict=True)),
         dim_lights=lights,
-        unmeasured=tuple(Unmeasured(meaning=one.meaning, reason=one.reason) for one in UNMEASURED
-                         if method in one.methods))
+        unmeasured=tuple(one for methods, one in UNMEASURED if method in methods))
 
 
 class _Job(NamedTuple):
@@ -160,42 +274,25 @@ class _Job(NamedTuple):
             return render(self.scene, self.method, self.settings, **self.options)
 
 
-class _Comparison(NamedTuple):
-    """A picture beside the plain one."""
-
-    same_bits: bool
-    difference: float | None
-
-
-def _compared(jobs: Sequence[_Job], plain: Picture, tell: Tell) -> list[_Comparison]:
-    bits, made = _hash(plain), []
+def _compared(jobs: Sequence[_Job], plain: Picture, tell: Tell) -> Iterator[tuple[bool, float | None]]:
+    """Yield for each job whether its picture has the bits of the plain one, and by how much it is off."""
     for number, job in enumerate(jobs):
         tell("comparing bits", number / len(jobs))
         picture = job.run()
-        made.append(_Comparison(_hash(picture) == bits, difference(picture, plain)))
-    return made
+        same = picture.irradiance.tobytes() == plain.irradiance.tobytes() and (
+            picture.radiance.tobytes() == plain.radiance.tobytes())
+        yield same, difference(picture, plain)
 
 
-def _in_turn(plain: _Job, jobs: Sequence[_Job], rounds: int, clock: Clock, tell: Tell) -> list[Times]:
-    """Return for each job the times of the plain picture right before it, and its own."""
-    times: list[tuple[list[float], list[float]]] = [([], []) for _ in jobs]
+def in_turn(plain: Callable[[], object], others: Sequence[Callable[[], object]], rounds: int, clock: Clock,
+            tell: Tell = lambda *_: None) -> list[Times]:
+    """Return for each of some calls the times of the plain one right before it, and its own; a round each."""
+    times: list[tuple[list[float], list[float]]] = [([], []) for _ in others]
     for turn in range(rounds):
-        for number, job in enumerate(jobs):
-            tell("timing", (turn + number / len(jobs)) / rounds)
-            for one, took in zip((plain, job), times[number], strict=True):
+        for number, other in enumerate(others):
+            tell("timing", (turn + number / len(others)) / rounds)
+            for one, took in zip((plain, other), times[number], strict=True):
                 started = clock()
-                one.run()
+                one()
                 took.append(clock() - started)
     return [(tuple(before), tuple(own)) for before, own in times]
-
-
-def _measured(name: str, count: skips.Count, times: Times, one: _Comparison) -> MeasuredSkip:
-    return MeasuredSkip(name=name, **skips.SKIPS[name]._asdict(), **count._asdict(), times=times[0],
-                        times_without=times[1], same_bits=one.same_bits)
-
-
-def _hash(picture: Picture) -> bytes:
-    digest = hashlib.sha256()
-    for plane in (picture.irradiance, picture.radiance):
-        digest.update(np.ascontiguousarray(plane).tobytes())
-    return digest.digest()

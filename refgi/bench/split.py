@@ -1,27 +1,15 @@
 """The error of a method, split into its approximations: pictures from the truth to the method, one more in each.
 
-The chain starts at the truth. Then come truths that leave out what the method cannot do without, such as unseen
-senders; then the method with all other approximations switched off; then one after the other is switched on, in the
-order of the method's pipeline. Beside the chain stands the method with each switched off alone.
-
-Every picture is made with each of several seeds. One that draws no random numbers is made once.
-
-x_0 is the truth, x_n the picture of the method as it is used, x_k has one approximation more than x_k-1. Its step is
-d_k = x_k - x_k-1, the whole error e = x_n - x_0 = d_1 + ... + d_n. How parts add up:
-
-- changes of the mean add up exactly: mean e = sum of mean d_k;
-- mean squares do so with their cross terms: mean e^2 = sum of mean d_k^2 + 2 sum over j < k of mean d_j d_k;
-- shares, mean d_k e / mean e^2, add up to 1: each has its own square and half of its cross terms with others; a share
-  below 0 takes back what others did.
-
-Switched off alone, approximations do not add up: what is missing is `cross_alone`.
+x_0 is the truth, x_n the picture of the method as it is used; d_k = x_k - x_k-1 is a step, e = d_1 + ... + d_n the
+whole error. Changes of the mean add up, mean squares with their cross terms, shares mean d_k e / mean e^2 to 1; what is
+missing where each is switched off alone is `cross_alone` (docs/error_split.md).
 """
 
 import dataclasses
 import math
 import warnings
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -42,9 +30,7 @@ from refgi.provenance.frames import StillFrames
 from refgi.scene import Scene
 from refgi.sssil.temporal import still_frame
 from refgi.truth import TruthResult, TruthSettings, trace_truth
-from refgi.types import Array
-
-Tell = Callable[[str, float], None]
+from refgi.types import Array, Tell
 
 REST = "rest"
 REST_ABOUT = "what is left with all of them switched off: texels of maps, pixels for surfaces"
@@ -76,11 +62,7 @@ class Chain(NamedTuple):
 
 
 class Renderer:
-    """Makes pictures of one view, each once.
-
-    Each truth has a seed of its own, so that their noise is not alike. `still` gives the frames of the resting scene
-    that a method with a temporal filter blends.
-    """
+    """Makes pictures of one view, each once; each truth has a seed of its own, so that their noise is not alike."""
 
     def __init__(
         self, scene: Scene, truth: TruthSettings | None = None, tell: Tell = lambda *_: None, *,
@@ -135,11 +117,7 @@ class Renderer:
 def chain_of(
     renderer: Renderer, choice: Choice, seeds: int, tell: Tell = lambda *_: None, *, alone: bool = True
 ) -> Chain:
-    """Make the pictures of one method and choice of settings, `seeds` of each kind.
-
-    Approximations that the settings do not make are left out, and those that `from_truth` takes in. With `alone` they
-    are switched off one by one as well.
-    """
+    """Make the pictures of one method and choice, `seeds` of each kind; `alone`: each switched off by itself too."""
     kept = [one for one in METHODS[choice.method].approximations if _is_made(one, choice.settings, renderer.options)]
     limits = [one for one in kept if one.shared_by(choice.settings)]
     others = [one for one in kept if one not in limits]
@@ -183,10 +161,7 @@ def _is_made(one: Approximation, settings: Any, options: Mapping[str, Any]) -> b
 
 
 def _pictures(renderer: Renderer, choice: Choice, off: Sequence[Approximation], seeds: int) -> tuple[Array, ...]:
-    """Return pictures without some approximations, a seed each.
-
-    The first in the pipeline is switched off first: what stands on it is gone with it.
-    """
+    """Return pictures without some approximations, a seed each; the first in the pipeline is switched off first."""
     made, still = [], renderer.options.get("still")
     for seed in range(seeds):
         first = seed * (1 if still is None else still.frames)  # each frame of a resting scene has the next seed
@@ -209,12 +184,7 @@ def with_splits(
     result: SceneResult, scene: Scene, grid: Grid, *, seeds: int, truth: TruthSettings | None = None,
     tell: Tell = lambda *_: None, defaults: bool = True, still: StillFrames | None = None, **frame_options: Any,
 ) -> SceneResult:
-    """Split the error of each method at the knee of its curve and, with `defaults`, at its defaults.
-
-    `seeds` pictures of each kind: from two on bias and variance are told apart. Without width and height the longer
-    side has `SIDE` pixels at most. Splits are by method in the order of the runs; what could not be split is among the
-    failures. `still`: frames of the resting scene that methods with a temporal filter blend.
-    """
+    """Split the error of each method at the knee of its curve and, with `defaults`, at its defaults; `seeds` each."""
     splits, failures = [], dict(result.failures)
     size = dict(zip(("width", "height"), small_size(result.width, result.height), strict=True))
     renderer = Renderer(scene, truth, tell, still=still, **{**size, **frame_options})
@@ -244,10 +214,7 @@ def small_size(width: int, height: int) -> tuple[int, int]:
 
 
 def chosen_for_split(runs: Sequence[Run], grid: Grid, *, defaults: bool = True) -> list[tuple[Choice, bool]]:
-    """Return what is split, each with whether it is the knee of its curve.
-
-    The knee of each method and, with `defaults`, its default where that is another.
-    """
+    """Return each method's knee and, with `defaults`, its default if that is another; and which of them is the knee."""
     chosen = []
     for method in dict.fromkeys(run.method for run in runs):
         curve = [run for run in runs if run.method == method]
@@ -262,11 +229,7 @@ def chosen_for_split(runs: Sequence[Run], grid: Grid, *, defaults: bool = True) 
 
 
 def split_of(chain: Chain, choice: Choice, at_knee: bool = False, statement: str = "") -> Split:
-    """Measure the pictures of a chain, from the truth to the method as it is used.
-
-    Figures are over the mean of the truth; None where that is 0 or a picture is not finite. `statement` says how well
-    the truth is known.
-    """
+    """Measure the pictures of a chain over the mean of the truth; None where that is 0 or a picture not finite."""
     first, last, covered = chain.links[0], chain.links[-1], chain.covered
     scale = float(first.pictures[0][:, covered].mean(dtype=np.float64))
     whole = _changes(first, last, covered)

@@ -1,4 +1,4 @@
-"""The command `refgi`: one file a verb, loaded when it is used; the only place that prints, asks or exits.
+"""The command `refgi`: verbs are loaded when they are used; the only place that prints, asks or exits.
 
 Results go to stdout, everything else to stderr. Exit codes: 0 done, 1 a check failed (or a fault of refgi itself),
 2 usage or input error, 130 interrupted, 143 terminated.
@@ -27,10 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _open_standard_files() -> None:
-    """Put the null device where stdin, stdout or stderr are closed: the next file to be opened would take the number.
-
-    What a library prints would then end up in a picture.
-    """
+    """Put the null device where stdin, stdout or stderr are closed, lest a picture's file takes their number."""
     for number in range(3):
         try:
             os.fstat(number)

@@ -57,10 +57,7 @@ def picture_files(out: str, stem: str, permission: Permission) -> Pictures:
 
 
 def folder(out: str, permission: Permission, names: Iterable[str] = ()) -> Path:
-    """Make sure that files can be written into a folder; a missing one is not made yet.
-
-    InputError if it cannot be made or written, or a file in it is another program's.
-    """
+    """Make sure that files can be written into a folder, none over another program's; it is not made yet."""
     expect(out != "", "--out", "a name", out)
     path = Path(out)
     with blame(key="--out"):
@@ -71,10 +68,7 @@ def folder(out: str, permission: Permission, names: Iterable[str] = ()) -> Path:
 
 
 def make(folder: Path) -> None:
-    """Make a folder that `folder` or `picture_files` found possible, unless it is there.
-
-    InputError if it cannot be made any more.
-    """
+    """Make a folder that `folder` or `picture_files` found possible; InputError if it cannot be any more."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -9,11 +9,8 @@ import time
 import warnings
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from refgi.cli.options import machine, shadows, speech, view
-from refgi.cli.session import DONE, FAILED, Session, Tell, table
-from refgi.cli.settings import preset
+from refgi.cli.options import MACHINE, SEEN, Asked, verb
+from refgi.cli.session import DONE, FAILED, Session, progress, table
 
 if TYPE_CHECKING:
     from refgi.bench.skips import SkipReport
@@ -21,15 +18,6 @@ if TYPE_CHECKING:
     from refgi.stages import Memory, Run
 
 CLOCKS = {"wall": time.perf_counter, "processor": time.process_time}
-
-
-def measured(
-    scene: "Scene", method: str, settings: Any, options: dict[str, Any], rounds: int, clock: str, tell: Tell
-) -> "SkipReport":
-    """Measure the skips of a method on a scene, at its own size; as `refgi.bench.skips.measure_skips`."""
-    from refgi.bench.skips import measure_skips
-
-    return measure_skips(scene, method, settings, rounds=rounds, clock=CLOCKS[clock], tell=tell, **options)
 
 
 def measured_text(report: "SkipReport | None") -> str:
@@ -95,46 +83,30 @@ ROWS = {  # SII Table 1
 }
 
 
-@click.command("explain")
-@view
-@click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
-@preset
-@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
-@machine
-@shadows("auto")
-@click.option("--measure", is_flag=True, help="Time what is skipped at the picture's own size, and prove its bits.")
-@click.option("--rounds", type=click.IntRange(1, 1000), default=3, show_default=True,
-              help="How often each skip is timed by --measure.")
-@click.option("--clock", type=click.Choice(list(CLOCKS)), default="wall", show_default=True,
-              help="Of --measure: the time of day, or that of processors, all threads together.")
-@speech
-@click.pass_obj
-def _explain(session: Session, /, method: str, preset: str, pairs: tuple[str, ...], dtype: str, rsm_resolution: int,
-            shadows: str | None, threads: int | None, seed: int | None, measure: bool, rounds: int,
-            clock: str, **options: Any) -> int:
+@verb("explain", "SCENE", *SEEN, "method", "preset", "set", *MACHINE, "shadows", "measure", "rounds", "clock",
+      rounds="How often each skip is timed by --measure.")
+def _explain(session: Session, asked: Asked) -> int:
     """Show what a method runs, skips and reuses, and where light goes.
 
     The method runs at a small size. The four rows are those of SII Table 1: light and camera still or moving. With
     --measure each skip is switched off at the picture's own size; the exit code is 1 where that changes a bit.
     """
     from refgi import stages
-    from refgi.cli.options import on_threads
-    from refgi.cli.session import progress
-    from refgi.cli.settings import settings_for
-    from refgi.cli.view import View, require_memory
-    from refgi.cli.warm import warm_up
-    from refgi.compare.results import ledger_json
+    from refgi.bench.skips import measure_skips
+    from refgi.cli.view import on_threads, require_memory, scene_of, settings_for, warm_up
+    from refgi.compare.report import ledger_json
     from refgi.errors import RefgiWarning
 
-    settings = settings_for(method, pairs, seed, preset)
+    method = asked.method
+    settings = settings_for(method, asked.pairs, asked.seed, asked.preset)
     with stages.observe() as loading:
-        whole = View(**options).load()
+        whole = scene_of(asked)
     scene = _small(whole)
-    require_memory(whole if measure else scene, dtype, rsm_resolution, traced=method == "truth",
+    require_memory(whole if asked.measure else scene, asked.dtype, asked.rsm_resolution, traced=method == "truth",
                    settings={method: settings})
-    frame_options = {"dtype": dtype, "rsm_resolution": rsm_resolution, "shadows": shadows}
-    with on_threads(threads), progress() as tell:
-        warm_up([method], dtype, tell)
+    frame_options = {key: getattr(asked, key) for key in ("dtype", "rsm_resolution", "shadows")}
+    with on_threads(asked.threads), progress() as tell:
+        warm_up([method], asked.dtype, tell)
         first = [dataclasses.replace(run, depth=0) for run in loading.runs if run.status == "skipped"]
         first += _watch(scene, method, settings, frame_options, None)
         tell(method, 0.2)
@@ -145,10 +117,12 @@ def _explain(session: Session, /, method: str, preset: str, pairs: tuple[str, ..
                 animation[row] = _second_frame(scene, method, settings, frame_options, light, camera)
                 tell(method, 0.2 + 0.2 * len(animation))
         ledger = _ledger(scene, method, settings, frame_options)
-        report = measured(whole, method, settings, frame_options, rounds, clock, tell) if measure else None
+        report = None if not asked.measure else measure_skips(
+            whole, method, settings, rounds=asked.rounds, clock=CLOCKS[asked.clock], tell=tell, **frame_options)
     content = {"scene": scene.name, "method": method, "settings": settings,
-               "stages": [dataclasses.asdict(line) for line in summed(first)],
-               "animation": {row: {line.name: line.what for line in summed(runs)} for row, runs in animation.items()},
+               "stages": summed(first),
+               "animation": {row: {line["name"]: _what(line) for line in summed(runs)}
+                             for row, runs in animation.items()},
                "ledger": None if ledger is None else ledger_json(ledger)}
     if report is not None:
         content["measured"] = report.model_dump(mode="json")
@@ -156,37 +130,22 @@ def _explain(session: Session, /, method: str, preset: str, pairs: tuple[str, ..
     return DONE if report is None or report.same_bits else FAILED
 
 
-command = _explain
-
-
-@dataclasses.dataclass(frozen=True)
-class Line:
-    """What became of all calls of one stage."""
-
-    name: str
-    depth: int
-    ran: int
-    reused: int
-    skipped: int
-    reason: str
-
-    @property
-    def what(self) -> str:
-        """In a word or two."""
-        counts = {"runs": self.ran, "reused": self.reused, "skipped": self.skipped}
-        return ", ".join(f"{word} x{n}" if n > 1 else word for word, n in counts.items() if n)
-
-
-def summed(runs: "list[Run]") -> list[Line]:
+def summed(runs: "list[Run]") -> list[dict[str, Any]]:
     """Add up the calls of each stage, in the order of first appearance."""
-    lines: dict[str, Line] = {}
+    lines: dict[str, dict[str, Any]] = {}
     for run in runs:
-        line = lines.get(run.name, Line(run.name, run.depth, 0, 0, 0, ""))
-        reason = run.reason if run.status == "skipped" else line.reason
-        lines[run.name] = dataclasses.replace(
-            line, ran=line.ran + (run.status == "ran"), reused=line.reused + (run.status == "reused"),
-            skipped=line.skipped + (run.status == "skipped"), reason=reason)
+        line = lines.setdefault(run.name, {"name": run.name, "depth": run.depth, "ran": 0, "reused": 0, "skipped": 0,
+                                           "reason": ""})
+        line[run.status] += 1
+        if run.status == "skipped":
+            line["reason"] = run.reason
     return list(lines.values())
+
+
+def _what(line: dict[str, Any]) -> str:
+    """Return what became of all calls of a stage, in a word or two."""
+    counts = {"runs": line["ran"], "reused": line["reused"], "skipped": line["skipped"]}
+    return ", ".join(f"{word} x{n}" if n > 1 else word for word, n in counts.items() if n)
 
 
 def _small(scene: "Scene") -> "Scene":
@@ -257,7 +216,7 @@ def _text(content: dict[str, Any]) -> str:
     settings = ", ".join(f"{key}={value}" for key, value in plain(content["settings"]).items())
     head = f"{content['method']} on {content['scene']}\n{settings}"
     lines = [("stage", "", "why")]
-    lines += [("  " * line["depth"] + line["name"], Line(**line).what, line["reason"]) for line in content["stages"]]
+    lines += [("  " * line["depth"] + line["name"], _what(line), line["reason"]) for line in content["stages"]]
     names = list(dict.fromkeys(name for row in content["animation"].values() for name in row))
     rows = [("next frame", *content["animation"])]
     rows += [(name, *(row.get(name, "-") for row in content["animation"].values())) for name in names]

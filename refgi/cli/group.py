@@ -31,10 +31,7 @@ THREADS, MOST_THREADS = "NUMBA_NUM_THREADS", 4096  # a million end the process
 
 
 def require_threads() -> None:
-    """Refuse (InputError) a value of NUMBA_NUM_THREADS that Numba cannot read or start.
-
-    It is no whole number, or too small or large.
-    """
+    """Refuse (InputError) a value of NUMBA_NUM_THREADS that is no whole number, or that Numba cannot start."""
     asked = os.environ.get(THREADS)
     usable = asked is None or (asked.strip().isdecimal() and 1 <= int(asked[:20]) <= MOST_THREADS)
     expect(usable, THREADS, f"a whole number from 1 to {MOST_THREADS}", asked)
@@ -61,8 +58,10 @@ def _left() -> int | None:
     return None if limit == resource.RLIM_INFINITY else limit - pages * resource.getpagesize()
 
 
-VERBS = ("scenes", "render", "sequence", "compare", "bench", "batch", "choose", "report", "vectors", "check", "stress",
-         "explain", "settings", "warm", "info")
+# by name the module of this package that has it
+VERBS = {"scenes": "short", "render": "render", "sequence": "sequence", "compare": "judge", "bench": "judge",
+         "batch": "batch", "choose": "judge", "report": "short", "vectors": "vectors", "check": "judge",
+         "stress": "short", "explain": "explain", "settings": "short", "warm": "short", "info": "short"}
 HELP = """Indirect light by four published methods on the CPU, judged by path tracing.
 
 SCENE is a built-in name such as cornell_box (see `refgi scenes`), a scene file (.json), or a mesh (.glb, .gltf, .obj,
@@ -81,10 +80,7 @@ class Terminated(KeyboardInterrupt):
 
 
 def fault_of(error: BaseException, *, debug: bool = False) -> Fault:
-    """Return what went wrong, for people and for programs: one line of message, or one for each fault of a file.
-
-    With `debug` the traceback is shown anyway.
-    """
+    """Return what went wrong: a line of message, or one for each fault of a file; `debug` shows the traceback."""
     if isinstance(error, Terminated):
         return Fault(TERMINATED, "terminated")
     if isinstance(error, click.exceptions.Abort | KeyboardInterrupt):
@@ -112,10 +108,7 @@ def _option(error: click.UsageError) -> str | None:
 
 
 def _place(error: RefgiError) -> tuple[str | None, str | None]:
-    """Return file and key of an error, as far as it or one that it arose from says them.
-
-    A file's error names file and key at the start of its message: `file: key: expected ...`.
-    """
+    """Return file and key of an error or one that it arose from, or of a message `file: key: expected ...`."""
     said = [one for one in _chain(error) if isinstance(one, InputError)]
     file = next((one.file for one in said if one.file is not None), None)
     key = next((one.key for one in said if one.key is not None), None)
@@ -138,7 +131,7 @@ def _one_line(text: str) -> str:
 
 
 class VerbGroup(click.Group):
-    """A group of verbs, each the `command` of a module of this package with its name."""
+    """A group of verbs, each the command `_VERB` of a module of this package."""
 
     @classmethod
     def refgi(cls) -> "VerbGroup":
@@ -155,7 +148,7 @@ class VerbGroup(click.Group):
         """Import a verb."""
         if cmd_name not in VERBS:
             return None
-        command: click.Command = importlib.import_module(f"refgi.cli.{cmd_name}").command
+        command: click.Command = getattr(importlib.import_module(f"refgi.cli.{VERBS[cmd_name]}"), f"_{cmd_name}")
         return command
 
     def resolve_command(

@@ -1,18 +1,20 @@
-"""`refgi render`: one scene by one method, or a picture made again from what its file says."""
+"""`refgi render`: one scene by one method, or a picture made again from the record that its file holds."""
 
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
-from refgi.cli.options import Exposure, machine, seen, shadows, speech, still, writing
-from refgi.cli.session import DONE, FAILED, Session, say
-from refgi.cli.settings import preset
+from refgi.cli.options import MACHINE, SEEN, WRITING, Asked, verb
+from refgi.cli.session import DONE, FAILED, Session, progress, say
 
 DARKEST, BRIGHTEST = 1e-3, 1e3  # radiance times exposure that a picture's brightest pixel usually has
 STATED = "sampling_error", "lightcuts"  # of a picture, for its record
 DARKEST_OF_GLTF = 1e-2  # whose lights may be in W/sr, 683 times as strong as the format says
+BESIDE = frozenset({"again", "scene_path", "exposure", "out", "threads", "parents", "force", "allow_empty",
+                    "json", "debug"})  # parameters that --again goes with
 
 if TYPE_CHECKING:
     from refgi.cli.destination import Pictures
@@ -21,28 +23,10 @@ if TYPE_CHECKING:
     from refgi.scene import Scene
 
 
-@click.command("render")
-@click.argument("scene", required=False)
-@seen
-@click.option("--method", default="sii", show_default=True, help="Short name of a method; `refgi info` lists them.")
-@preset
-@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
-@still
-@machine
-@shadows("auto")
-@click.option("--engine", type=click.Choice(["kernels", "literal"]), default="kernels", show_default=True,
-              help="literal: stages run by the plain NumPy of refgi/literal where they have it, after their kernels; "
-              "sii of cornell_box at 64x48 takes 6 times as long, hssil 3, multires, val and gather 1.1 to 1.2.")
-@click.option("--again", metavar="FILE.exr", help="Make this picture again, and say whether it is the same to the bit.")
-@click.option("--scene", "scene_path", metavar="PATH", help="Where the scene of --again is now, if it was moved.")
-@click.option("--exposure", type=Exposure(), help="Factor before the sRGB curve of a PNG, the scene's where absent; "
-              "auto makes the 98th percentile white.")
-@click.option("--allow-empty", is_flag=True, help="Write a black picture where the camera sees no surface.")
-@click.option("--out", help="out.exr (linear), out.png (tone-mapped), or a folder for both.")
-@writing
-@speech
-@click.pass_context
-def _render(ctx: click.Context, /, **options: Any) -> int:
+@verb("render", "SCENE", *SEEN, "method", "preset", "set", "frames", "temporal", *MACHINE, "shadows", "engine", "again",
+      "scene", "exposure", "allow-empty", "out", *WRITING,
+      SCENE={"required": False}, out="out.exr (linear), out.png (tone-mapped), or a folder for both.")
+def _render(session: Session, asked: Asked) -> int:
     """Render SCENE by one method.
 
     An EXR holds the radiance that the camera receives (R, G, B; W/m^2/sr) and the indirect irradiance
@@ -53,34 +37,64 @@ def _render(ctx: click.Context, /, **options: Any) -> int:
     --frames 20 shows a method with its temporal filter after so many frames of a resting scene.
     """
     from refgi.cli.destination import Permission, Pictures, picture_files
-    from refgi.cli.job import asked, recorded, require_either, stem
-    from refgi.cli.view import require_memory
+    from refgi.cli.view import require_memory, stem
     from refgi.errors import expect
 
-    require_either(ctx)
-    exposure, again, out = options["exposure"], options["again"], options["out"]
+    _require_either(click.get_current_context())
+    exposure = asked.exposure
     auto = exposure == "auto"
     fits = exposure is None or auto or 0 < exposure < float("inf")
     expect(fits, "--exposure", "auto or a finite number > 0", exposure)
-    job = asked(options) if again is None else recorded(again, options["scene_path"])
+    job = _job(asked)
     job = job if exposure is None or auto else job._replace(exposure=exposure)
-    permission = Permission(options["parents"], options["force"])
-    name = stem(options["scene"] if job.scene.source is None else job.scene.source.name)
-    files = Pictures() if out is None else picture_files(out, f"{name}_{job.method}", permission)
+    permission = Permission(asked.parents, asked.force)
+    name = stem(asked.scene if job.scene.source is None else job.scene.source.name)
+    files = Pictures() if asked.out is None else picture_files(asked.out, f"{name}_{job.method}", permission)
     require_memory(job.scene, job.options["dtype"], job.options["rsm_resolution"], traced=job.method == "truth",
                    settings={job.method: job.settings})
-    return _rendered(ctx.ensure_object(Session), job, files, again, options)
+    return _rendered(session, job, files, asked)
 
 
-command = _render
+def _require_either(ctx: click.Context) -> None:
+    """Refuse (UsageError) a run without a scene, and one that is to make a picture again but otherwise."""
+    by_name = {parameter.name: parameter for parameter in ctx.command.params}
+    given = {name: parameter for name, parameter in by_name.items()
+             if name and ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE}
+    if "again" in given:
+        more = [name for name in given if name not in BESIDE]
+        if more:
+            names = ", ".join(given[name].opts[-1] if name != "scene" else "SCENE" for name in more)
+            raise click.UsageError(f"--again makes a picture as it was; it takes no {names}", ctx)
+        return
+    if "scene_path" in given:
+        raise click.UsageError("--scene says where the scene of --again is now; without it name the SCENE alone", ctx)
+    for name in ("scene", "out"):
+        if name not in given:
+            raise click.MissingParameter(ctx=ctx, param=by_name[name])
 
 
-def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None, options: dict[str, Any]) -> int:
+def _job(asked: Asked) -> "Job":
+    """Return what the options say to render, or the record of --again, with the scene loaded.
+
+    InputError if a setting, the scene, the camera or a light is not usable, a file has no record or its scene is not
+    the same any more.
+    """
+    from refgi.cli.view import scene_of, settings_for, still_frames
+    from refgi.provenance import Job, job_of, read_record
+
+    if asked.again is not None:
+        path = Path(asked.again)
+        return job_of(read_record(path), path, asked.scene_path)
+    settings = settings_for(asked.method, asked.pairs, asked.seed, asked.preset)
+    still = still_frames([asked.method], asked.frames, asked.filtering)
+    scene = scene_of(asked)
+    frame = {key: getattr(asked, key) for key in ("dtype", "rsm_resolution", "shadows")}
+    return Job(scene, asked.method, settings, frame, scene.exposure, still=still)
+
+
+def _rendered(session: Session, job: "Job", files: "Pictures", asked: Asked) -> int:
     from refgi import stages
-    from refgi.cli.job import differences, require_view
-    from refgi.cli.options import on_threads
-    from refgi.cli.session import progress
-    from refgi.cli.warm import warm_up
+    from refgi.cli.view import on_threads, require_view, warm_up
     from refgi.compare.pictures import EXPOSED, auto_exposure
     from refgi.methods import render
 
@@ -89,11 +103,11 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     started = time.perf_counter()
     kept = stages.Memory() if job.still is not None else None  # frames of a resting scene share their buffers
     engine = None
-    if options["engine"] == "literal":
+    if asked.engine == "literal":
         from refgi.vectors.engine import Literal
 
         engine = Literal()
-    with on_threads(options["threads"]), progress() as tell, stages.observe(
+    with on_threads(asked.threads), progress() as tell, stages.observe(
             memory=kept, progress=tell, substitute=engine) as log:
         if job.still is not None:
             from refgi.provenance.frames import render_still
@@ -106,13 +120,15 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
 
             picture = render_frame(job.scene, job.method, job.settings, job.frame, job.options)
     seconds = time.perf_counter() - started
-    require_view(bool(picture.frame.gbuffer.covered.any()), job.scene.name, options["allow_empty"] or again is not None)
-    auto = options["exposure"] == "auto"
+    covered = bool(picture.frame.gbuffer.covered.any())
+    require_view(covered, job.scene.name, asked.allow_empty or asked.again is not None)
+    auto = asked.exposure == "auto"
     if auto:
         job = job._replace(exposure=auto_exposure(picture.radiance))
     record = _record(job, picture) | ({"auto_exposure": {"percentile": EXPOSED}} if auto else {}) | (
-        {} if engine is None else {"engine": options["engine"]})
-    content = _content(picture, job, seconds, record) | {"stages": [_run(run) for run in log.runs]}
+        {} if engine is None else {"engine": asked.engine})
+    content = _content(picture, job, seconds, record) | {"stages": [
+        {key: getattr(run, key) for key in ("name", "status", "seconds", "depth", "reason")} for run in log.runs]}
     planes = _write(picture, files, record)
     _say_aloud(content, job.scene)
     _warn_of_brightness(session, content, job.exposure)
@@ -126,10 +142,10 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
         content["literal"] = [one._asdict() for one in engine.timed]
         text += "".join(f"\n{one.stage} by the literal text: {one.literal:.3f} s, its kernel {one.kernel:.3f} s"
                         for one in engine.timed) or "\nno stage of this method has a literal form"
-    if again is not None:
-        other = differences(Path(again), planes)
-        content["again"] = {"file": again, "same": not other, "differs": other}
-        text += f"\n{again}: {'other: ' + '; '.join(other) if other else 'the same to the bit'}"
+    if asked.again is not None:
+        other = _differences(Path(asked.again), planes)
+        content["again"] = {"file": asked.again, "same": not other, "differs": other}
+        text += f"\n{asked.again}: {'other: ' + '; '.join(other) if other else 'the same to the bit'}"
     session.result(text, content)
     return FAILED if content["non_finite_pixels"] or not content.get("again", {}).get("same", True) else DONE
 
@@ -192,6 +208,22 @@ def _write(picture: "Picture", files: "Pictures", record: "Record") -> dict[str,
     return planes
 
 
+def _differences(file: Path, planes: dict[str, Any]) -> list[str]:
+    """Return which planes, (h, w) by channel, are not to the bit those of an EXR that refgi wrote, a text each."""
+    import numpy as np
+
+    from refgi.image import read_exr
+
+    found = []
+    for name, plane in read_exr(file)[0].items():
+        made = planes.get(name)
+        if made is None or made.shape != plane.shape:
+            found.append(f"{name} is missing or of another size")
+        elif count := int((made.view(np.uint32) != plane.view(np.uint32)).sum()):
+            found.append(f"{name} in {count} of {plane.size} pixels")
+    return found
+
+
 def _say_aloud(content: dict[str, Any], scene: "Scene") -> None:
     from refgi.scene.repair import faintest_irradiance
 
@@ -217,7 +249,3 @@ def _warn_of_brightness(session: Session, content: dict[str, Any], exposure: flo
         if gltf:
             text += ", --light-unit says what the file's lights are in"
         session.warn(text, RefgiWarning)
-
-
-def _run(run: Any) -> dict[str, Any]:
-    return {"name": run.name, "status": run.status, "seconds": run.seconds, "depth": run.depth, "reason": run.reason}

@@ -9,19 +9,21 @@ import json
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from refgi.texts import table as table  # of the commands
 
+if TYPE_CHECKING:
+    from refgi.types import Tell
+
 DONE, FAILED, USAGE, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 PERCENTAGE = re.compile(r"\d+(?= %)")
 SECONDS_BETWEEN_LINES = 3.0
 
-Tell = Callable[[str, float], None]
 
 
 @dataclasses.dataclass
@@ -48,10 +50,7 @@ class Session:
             alike.append(text)
 
     def result(self, text: str, content: dict[str, Any]) -> None:
-        """Print the result to stdout: the text, or with --json one object that also has the warnings.
-
-        A warning that came with several percentages is said once more, with their range.
-        """
+        """Print the result to stdout, with --json as one object with all warnings; say ranges of percentages."""
         for texts in self._warned.values():
             if len(texts) > 1:
                 say(f"warning, over the whole run: {_with_range(texts)}")
@@ -103,7 +102,7 @@ def say(text: str) -> None:
 
 
 @contextmanager
-def progress() -> Iterator[Tell]:
+def progress() -> "Iterator[Tell]":
     """Show how far long work is while the block runs: yield what is to be called with (what runs, fraction done)."""
     if sys.stderr.isatty():
         with _bar() as tell:
@@ -113,7 +112,7 @@ def progress() -> Iterator[Tell]:
 
 
 @contextmanager
-def _bar() -> Iterator[Tell]:
+def _bar() -> "Iterator[Tell]":
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -130,7 +129,7 @@ def _bar() -> Iterator[Tell]:
         yield tell
 
 
-def _lines() -> Tell:
+def _lines() -> "Tell":
     last = time.monotonic()
 
     def tell(what: str, done: float) -> None:

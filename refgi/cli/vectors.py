@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from refgi.cli.options import seen, shadows, speech
+from refgi.cli.options import SEEN, Asked, verb
 from refgi.cli.session import Session, progress, say, table
-from refgi.cli.settings import preset
 from refgi.vectors.options import OPTIONS
 
 if TYPE_CHECKING:
@@ -19,37 +18,23 @@ SMALL, MAP = (64, 48), 64  # size of a picture and side of a light's map, where 
 
 
 @click.group("vectors")
-def command() -> None:
+def _vectors() -> None:
     """Test vectors of every stage, and a port's check against them."""
 
 
-@command.command("export")
-@click.argument("scene", required=False)
-@click.option("--kit", type=click.Choice(["quick", "full"]), help="Ready cases, where no SCENE is named.  [quick]")
-@click.option("--case", help="Of a kit: only cases whose id begins so.")
-@click.option("--method", default="sii", show_default=True, help="Of SCENE: short name of a method.")
-@preset
-@click.option("--set", "pairs", multiple=True, metavar="KEY=VALUE", help="A setting of the method; repeatable.")
-@seen
-@shadows("auto")
-@click.option("--rsm-resolution", type=click.IntRange(1, 16384), default=MAP, show_default=True,
-              help="Texels along a side of a light's map.")
-@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Which random numbers, where a method has any.")
-@click.option("--stage", default="", metavar="NAME", help="Of SCENE: only stages whose name begins so.")
-@click.option("--most", type=click.FloatRange(min=0, min_open=True), default=50.0, show_default=True, metavar="MB",
-              help="Of SCENE: refuse what would take more.")
-@click.option("--out", required=True, help="Folder of the kit; a kit there is replaced.")
-@speech
-@click.pass_context
-def _export(ctx: click.Context, /, **options: Any) -> None:
+@verb("export", "SCENE", "kit", "case", "method", "preset", "set", *SEEN, "shadows", "rsm-resolution", "seed", "stage",
+      "most", "out", SCENE={"required": False}, method="Of SCENE: short name of a method.",
+      rsm_resolution={"default": MAP, "help": "Texels along a side of a light's map."},
+      out={"required": True, "help": "Folder of the kit; a kit there is replaced."})
+def _export(session: Session, asked: Asked) -> None:
     """Write arrays of every stage, bounds, likely bugs, scene, schemas, and how to read them.
 
     Of SCENE by a method with its settings, at 64x48 pixels unless --size says otherwise; without SCENE a kit of ready
     cases of all methods.
     """
-    session, out = ctx.ensure_object(Session), Path(options["out"])
+    out = Path(asked.out)
     with progress() as tell:
-        made = _of_kit(ctx, options, out, tell) if options["scene"] is None else _of_scene(options, out, tell)
+        made = _of_kit(asked, out, tell) if asked.scene is None else _of_scene(asked, out, tell)
     size = sum(file.stat().st_size for file in out.rglob("*") if file.is_file())
     rows = [("case", "what it holds"), *((entry.id, entry.what) for entry in made.cases)]
     session.result(f"{table(rows)}\n{out}: {len(made.cases)} cases, {size / 1e6:.1f} MB, vectors {made.vectors}",
@@ -57,36 +42,36 @@ def _export(ctx: click.Context, /, **options: Any) -> None:
                     "bytes": size})
 
 
-def _of_kit(ctx: click.Context, options: dict[str, Any], out: Path, tell: Any) -> "KitManifest":
+def _of_kit(asked: Asked, out: Path, tell: Any) -> "KitManifest":
     from refgi.vectors.export import export_kit
 
+    ctx = click.get_current_context()
     for parameter in ctx.command.params:
-        asked = ctx.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
-        if asked and parameter.name not in ("kit", "case", "out", "debug", "as_json", "json"):
+        given = ctx.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
+        if given and parameter.name not in ("kit", "case", "out", "debug", "as_json", "json"):
             raise click.UsageError(f"{parameter.opts[0]}: expected a SCENE, which it is said of, got none", ctx)
-    return export_kit(options["kit"] or "quick", out, tell, options["case"])
+    return export_kit(asked.kit or "quick", out, tell, asked.case)
 
 
-def _of_scene(options: dict[str, Any], out: Path, tell: Any) -> "KitManifest":
-    import dataclasses
-
-    from refgi.cli.job import stem
-    from refgi.cli.settings import settings_for
-    from refgi.cli.view import View
+def _of_scene(asked: Asked, out: Path, tell: Any) -> "KitManifest":
+    from refgi.cli.view import scene_of, settings_for, stem
     from refgi.vectors.export import export_case
     from refgi.vectors.recorded import recorded_case
 
-    if options["kit"] is not None or options["case"] is not None:
+    if asked.kit is not None or asked.case is not None:
         raise click.UsageError("--kit and --case say which ready cases; they take no SCENE")
-    method = options["method"]
-    settings = settings_for(method, options["pairs"], options["seed"], options["preset"])
-    options["size"] = options["size"] or SMALL
-    scene = View(**{field.name: options[field.name] for field in dataclasses.fields(View)}).load()
-    tell(f"{method} of {scene.name}", 0.0)
-    case = recorded_case(f"{method}-{stem(options['scene'])}", scene, method, settings, only=options["stage"],
-                         what=f"{method} of {scene.name}", rsm_resolution=options["rsm_resolution"],
-                         shadows=options["shadows"])
-    return export_case(case, out, tell, options["most"] * 1e6)
+    method = asked.method
+    settings = settings_for(method, asked.pairs, asked.seed, asked.preset)
+    asked.size = asked.size or SMALL
+    scene = scene_of(asked)
+    what = f"{method} of {scene.name}"
+    tell(what, 0.0)
+    case = recorded_case(f"{method}-{stem(asked.scene)}", scene, method, settings, only=asked.stage, what=what,
+                         rsm_resolution=asked.rsm_resolution, shadows=asked.shadows)
+    return export_case(case, out, tell, asked.most * 1e6)
+
+
+_vectors.add_command(_export)
 
 
 def _shared(function: Callable[..., int]) -> Callable[..., int]:
@@ -104,7 +89,7 @@ def _shared(function: Callable[..., int]) -> Callable[..., int]:
     return function
 
 
-@command.command("check")
+@_vectors.command("check")
 @click.argument("kit")
 @click.argument("output")
 @_shared

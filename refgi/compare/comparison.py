@@ -1,11 +1,8 @@
 """One comparison: every method on one scene, judged against path tracing.
 
-A method that knows nothing of what blocks indirect light does not converge to the truth but to the truth without
-visibility; both are traced, and each such method is measured against both. Figures are of the indirect irradiance,
-the quantity that the methods compute; FLIP is of the radiance, the picture that a viewer sees.
-
-Each method runs twice: once on a few pixels, so that compiling is not timed, then on a frame of its own, whose buffers
-(G-buffer, RSM) are part of its time.
+A method that knows nothing of what blocks indirect light converges to the truth without visibility, and is measured
+against both. Figures are of the indirect irradiance, FLIP is of the radiance. Each method runs on a few pixels, so that
+compiling is not timed, then on a frame of its own, whose buffers (G-buffer, RSM) are part of its time.
 """
 
 import contextlib
@@ -20,20 +17,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from refgi import stages
-from refgi.compare.flip import flip
+from refgi.compare.metrics import flip
 from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, MethodResult, Reference, measure
-from refgi.compare.report import environment
 from refgi.errors import InputError, RefgiError, RefgiWarning, expect
 from refgi.frame import Frame
 from refgi.methods import METHODS, find_method, require_filter
 from refgi.provenance import estimate_record
+from refgi.provenance.record import environment
 from refgi.scene import Scene, load_scene
+from refgi.types import Tell
 
 if TYPE_CHECKING:
     from refgi.methods import Picture
     from refgi.provenance.frames import StillFrames
 
-Progress = Callable[[str, float], None]
 
 WITHOUT_VISIBILITY: Mapping[str, Any] = MappingProxyType({"visibility": False})  # nothing blocks indirect light
 WARM_UP_SIZE = 96  # pixels along a side: more than the coarse grid of `gather`, whose interpolation then runs as well
@@ -48,7 +45,7 @@ def compare(
     truth_settings: Any = None,
     method_settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
-    progress: Progress | None = None,
+    progress: Tell | None = None,
     still: "StillFrames | None" = None,
     **frame_options: Any,
 ) -> Comparison:
@@ -114,7 +111,7 @@ def compare(
 class _Runner:
     """Runs methods on frames of one scene and view."""
 
-    def __init__(self, scene: Scene, options: Mapping[str, Any], progress: Progress | None) -> None:
+    def __init__(self, scene: Scene, options: Mapping[str, Any], progress: Tell | None) -> None:
         self.frame = Frame(scene, **options)  # shows every method's irradiance; never timed
         expect(bool(self.frame.gbuffer.covered.any()), f"scene {scene.name!r}: camera", "a view of some surface",
                "a view past all of it")
@@ -125,15 +122,13 @@ class _Runner:
     def reference(self, name: str, settings: Any) -> Reference:
         from refgi.truth import trace_truth
 
-        shortest = dataclasses.replace(settings, samples=1, seconds=None, target_error=None, checkpoint=None)
-        self._warm_up(trace_truth, shortest)
-        truth = METHODS[TRUTH]
-        made, seconds, runs = self._timed(name, lambda frame: (trace_truth(frame, settings),
-                                                               *truth.compute_lobes(frame, settings)))
-        result, shown, lobes = made
-        radiance = self.frame.radiance(np.asarray(result.mean, self.frame.dtype), shown)
-        return Reference(name, settings, result.mean, result.variance_of_mean, result.picture_variance, result.samples,
-                         radiance, seconds, runs, estimate_record(result, lobes), lobes, result.doubt)
+        self._warm_up(trace_truth, dataclasses.replace(settings, samples=1, seconds=None, target_error=None,
+                                                       checkpoint=None))
+        self._tell(name, 0.0)
+        made = trace_reference(self._fresh_frame(self.frame.width, self.frame.height), name, settings,
+                               self._inner_progress(name), self.frame)
+        self._tell(name, 1.0)
+        return made
 
     def method(
         self, name: str, settings: Any, references: Mapping[str, Reference], *, accounts: bool,
@@ -187,12 +182,27 @@ class _Runner:
     def _fresh_frame(self, width: int, height: int) -> Frame:
         return Frame(self.scene, width=width, height=height, **self.options)
 
-    def _inner_progress(self, name: str) -> Progress | None:
+    def _inner_progress(self, name: str) -> Tell | None:
         return (lambda stage, done: self._tell(f"{name}: {stage}", done)) if self.progress else None
 
     def _tell(self, what: str, done: float) -> None:
         if self.progress is not None:
             self.progress(what, done)
+
+
+def trace_reference(frame: Frame, name: str, settings: Any, progress: Tell | None = None,
+                    shown: Frame | None = None) -> Reference:
+    """Trace what pictures are judged by: the truth, or what else its settings say; its radiance by a frame `shown`."""
+    from refgi.truth import trace_truth
+
+    with stages.observe(progress=progress) as log:
+        started = time.perf_counter()
+        found = trace_truth(frame, settings)
+        light, lobes = METHODS[TRUTH].compute_lobes(frame, settings)
+        seconds = time.perf_counter() - started
+    radiance = (shown or frame).radiance(np.asarray(found.mean, frame.dtype), light)
+    return Reference(name, settings, found.mean, found.variance_of_mean, found.picture_variance, found.samples,
+                     radiance, seconds, tuple(log.runs), estimate_record(found, lobes), lobes, found.doubt)
 
 
 def _over_all(lobes: Any, covered: Any) -> Any:
@@ -221,10 +231,7 @@ def _settings(names: Sequence[str], truth: Any, given: Mapping[str, Any]) -> dic
 
 
 def limited(settings: Any, name: str, limits: Mapping[str, Any]) -> Any:
-    """Return how a truth is traced that shares limits of a method, such as `WITHOUT_VISIBILITY`.
-
-    With a checkpoint file of its own, named by `name`, where there is one.
-    """
+    """Return how a truth is traced that shares limits of a method, with a checkpoint file of its own by `name`."""
     checkpoint = settings.checkpoint
     if checkpoint and not Path(checkpoint).is_dir():  # a folder has a file for each
         checkpoint = f"{checkpoint}.{name}"
@@ -239,9 +246,8 @@ def require_folder(folder: Path) -> None:
         raise InputError(f"out: {folder} cannot be written: {error.strerror or error}") from error
 
 
-def _write(comparison: Comparison, folder: Path, progress: Progress | None) -> None:
-    from refgi.compare.report import write_report
-    from refgi.compare.results import write_results
+def _write(comparison: Comparison, folder: Path, progress: Tell | None) -> None:
+    from refgi.compare.report import write_report, write_results
 
     for what, write in (("pictures and results.json", write_results), ("index.html", write_report)):
         if progress is not None:

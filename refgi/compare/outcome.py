@@ -1,10 +1,7 @@
-"""What a comparison found: references, methods judged against them, and how it was made.
-
-All figures of a picture at once, each beside what the reference's own noise gives.
+"""What a comparison found: references, methods judged against them, each figure beside what noise alone gives.
 
 A perfect picture compared with a noisy reference does not score zero: its MSE is the mean of v, the variance of the
-reference's mean. That expectation stands beside each figure, and a figure that does not rise above it says nothing
-about the picture.
+reference's mean. A figure that does not rise above that expectation says nothing about the picture.
 """
 
 import dataclasses
@@ -16,19 +13,20 @@ from typing import Any
 import numpy as np
 
 from refgi import stages
-from refgi.compare.flip import Flip
 from refgi.compare.metrics import (
     METRICS,
+    Flip,
     checked_mask,
     count_non_finite,
     decibels,
     over_magnitude,
     relative_scale,
     samples,
+    ssim_of_noise,
 )
-from refgi.compare.ssim import ssim_of_noise
+from refgi.compare.pictures import linear_planes
 from refgi.errors import expect
-from refgi.provenance import Record, scene_record
+from refgi.provenance import Record, method_record, scene_record
 from refgi.scene import Scene
 from refgi.types import Array
 
@@ -150,6 +148,29 @@ class Reference:
     estimate: Mapping[str, Any] = dataclasses.field(default_factory=dict)  # what the record of its files adds of it
     lobes: Any = None  # `TruthResult` of receivers' lobes by indirect light, W/m^2/sr, where a glossy surface is seen
     doubt: str = ""  # why the error of the irradiance is not to be trusted
+
+    @property
+    def record(self) -> Record:
+        """What it adds to the record of its scene."""
+        return {**method_record(TRUTH, self.settings), **self.estimate}
+
+    @property
+    def planes(self) -> dict[str, Array]:
+        """The planes of its EXR, by channel."""
+        lobes = {} if self.lobes is None else {"lobes": self.lobes.mean, "lobe_variance": self.lobes.variance_of_mean}
+        return linear_planes(self.radiance, self.irradiance, self.variance, self.samples, **lobes)
+
+    @property
+    def statement(self) -> str:
+        """How well it is known."""
+        said: str = self.estimate["estimate"]["statement"]
+        return f"{said}; lobes: {self.lobes.doubt}" if self.lobes is not None and self.lobes.doubt else said
+
+    @property
+    def whole_doubt(self) -> str:
+        """Why an error is not to be trusted, of the irradiance or of lobes, in a line."""
+        of_lobes = f"lobes of receivers: {self.lobes.doubt}" if self.lobes is not None and self.lobes.doubt else ""
+        return "; ".join(said for said in (self.doubt, of_lobes) if said)
 
     @property
     def doubts(self) -> list[str]:

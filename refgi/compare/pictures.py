@@ -6,13 +6,14 @@ last colour; a pixel without surface is grey, and one that is not finite magenta
 
 import io
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from refgi.compare.flip import LUMINANCE
+from refgi.compare.metrics import LUMINANCE
 from refgi.image import NOT_FINITE, write_png
 from refgi.provenance import Record
 from refgi.types import Array
@@ -30,32 +31,20 @@ def linear_planes(radiance: Array, irradiance: Array, variance: Array | None = N
     many estimates each pixel has; frames: how many its light is blended of.
     """
     planes = rgb_planes("", radiance) | rgb_planes("irradiance.", irradiance)
-    if variance is not None:
-        planes |= rgb_planes("variance.", variance)
-    if samples is not None:
-        planes["samples"] = np.asarray(samples, np.float32)
-    if frames is not None:
-        planes["frames"] = np.asarray(frames, np.float32)
-    if lobes is not None:
-        planes |= rgb_planes("lobes.", lobes)
-    if lobe_variance is not None:
-        planes |= rgb_planes("lobe_variance.", lobe_variance)
+    for name, values in (("variance", variance), ("samples", samples), ("frames", frames), ("lobes", lobes),
+                         ("lobe_variance", lobe_variance)):
+        if values is not None:
+            planes |= {name: np.asarray(values, np.float32)} if values.ndim == 2 else rgb_planes(f"{name}.", values)
     return planes
 
 
 def write_preview(path: Path, radiance: Array, record: Record) -> None:
-    """Write radiance as a PNG, tone-mapped at the exposure of its record, whole or not at all.
-
-    InputError if the file cannot be written.
-    """
+    """Write radiance as a PNG, tone-mapped at the exposure of its record, whole or not at all."""
     write_png(path, np.moveaxis(radiance, 0, -1), record["exposure"], record)
 
 
 def auto_exposure(radiance: Array) -> float:
-    """Return the factor that makes a percentile of a picture white: of the largest channel of all that is not black.
-
-    Above 0; 1 where the picture is black.
-    """
+    """Return the factor that makes the 98th percentile of the largest channel white; 1 for a black picture."""
     brightest = radiance.max(axis=0)
     lit = brightest[np.isfinite(brightest) & (brightest > 0)]
     return float(1.0 / np.percentile(lit.astype(np.float64), EXPOSED)) if len(lit) else 1.0
@@ -64,6 +53,11 @@ def auto_exposure(radiance: Array) -> float:
 def rgb_planes(prefix: str, rgb: Array) -> dict[str, Array]:
     """Return the float32 planes of one quantity, (3, h, w), by channel; names start with `prefix`."""
     return {f"{prefix}{channel}": np.asarray(plane, np.float32) for channel, plane in zip("RGB", rgb, strict=True)}
+
+
+def rgb_of(planes: Mapping[str, Array], prefix: str) -> Array:
+    """Return one quantity, (3, h, w), of planes by channel; the reverse of `rgb_planes`."""
+    return np.stack([planes[f"{prefix}{channel}"] for channel in "RGB"])
 
 
 Pixels = npt.NDArray[np.uint8]
@@ -93,10 +87,7 @@ def luminance(rgb: Array) -> Array:
 
 
 def indirect_exposure(reference: Array, covered: Array) -> float:
-    """Return the factor before the sRGB curve at which a reference's irradiance, (3, h, w), just fits.
-
-    1 for a black picture.
-    """
+    """Return the factor at which a reference's irradiance, (3, h, w), just fits; 1 for a black picture."""
     values = luminance(reference)[covered]
     values = values[np.isfinite(values)]
     bright = float(np.percentile(values, 99)) if values.size else 0.0
@@ -104,10 +95,7 @@ def indirect_exposure(reference: Array, covered: Array) -> float:
 
 
 def error_scale(errors: list[Array], covered: Array) -> Scale:
-    """Choose one symmetric scale for all maps, (h, w), of signed luminance errors.
-
-    From -s to s; s is 1, 2 or 5 times a power of ten and holds 95 % of the covered pixels.
-    """
+    """Choose one scale from -s to s for all maps; s, 1, 2 or 5 times a power of ten, holds 95 % of the errors."""
     magnitudes = np.abs(np.concatenate([error[covered] for error in errors] or [np.zeros(1)]))
     magnitudes = magnitudes[np.isfinite(magnitudes)]
     reach = float(np.percentile(magnitudes, SCALE_PERCENTILE)) if magnitudes.size else 0.0
@@ -116,10 +104,7 @@ def error_scale(errors: list[Array], covered: Array) -> Scale:
 
 
 def luminance_scale(reference: Array, covered: Array) -> Scale:
-    """Choose one logarithmic scale for all false-colour pictures.
-
-    Six stops up to the 99.5th percentile of the luminance of the truth's irradiance, (3, h, w), over covered pixels.
-    """
+    """Choose one logarithmic scale: six stops up to the 99.5th percentile of the truth's luminance."""
     values = luminance(reference)[covered]
     values = values[np.isfinite(values) & (values > 0)]
     high = _round_up(float(np.percentile(values, 99.5))) if values.size else 1.0

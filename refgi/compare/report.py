@@ -1,32 +1,29 @@
-"""The page of a comparison: one file that works from disk, with pictures as numbers, table, plot and stages inside.
+"""A comparison's files: pictures, maps, results.json, and the page; each is written whole or not at all.
 
-It says what its results were made with: versions, processor, threads.
+results.json is the record: whatever the page and the table show is in it. Numbers that JSON cannot hold are null (not
+known, not defined) or the words "inf" and "-inf".
 """
 
 import functools
 import math
-import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from refgi import stages
+from refgi.compare import pictures as maps
+from refgi.compare.album import LABELS, Judge, Picture, View, album
 from refgi.compare.outcome import TRUTH, UNOCCLUDED, Comparison, Figure, Measurement, MethodResult, Reference
-from refgi.compare.page.album import LABELS, Judge, Picture, View, album
-from refgi.compare.plot import Point, time_against_error
-from refgi.image import write_text
-from refgi.provenance import Record, plain, versions
+from refgi.compare.pages import DASH, MINUS, TIMES, Point, markup, number, page_of, sort_key, time_against_error
+from refgi.compare.pictures import linear_planes, write_preview
+from refgi.image import canonical_json, write_encoded, write_exr, write_text
+from refgi.provenance import UNITS, Record, method_record, plain
 from refgi.scene.files import text_of
 from refgi.types import Array
 
-if TYPE_CHECKING:
-    import jinja2
-    from markupsafe import Markup
-
 DEGREE = "\N{DEGREE SIGN}"
-SIMD = ("sse2", "avx", "avx2", "fma", "avx512f", "avx512vl", "neon", "sve")
 
 
 def provenance_rows(record: Record) -> list[tuple[str, str]]:
@@ -54,25 +51,6 @@ def _value(value: Sequence[float] | float) -> str:
     return str(value) if isinstance(value, int) else f"{math.degrees(value):g}{DEGREE}"  # sizes, and angles
 
 
-def environment() -> dict[str, Any]:
-    """Return versions, platform, cpu, simd (features of the processor) and threads as JSON values."""
-    import llvmlite.binding
-
-    from refgi.jit import thread_count
-
-    features = llvmlite.binding.get_host_cpu_features()
-    return {
-        "versions": versions(),
-        "platform": f"{platform.system()} {platform.machine()}",
-        "cpu": llvmlite.binding.get_host_cpu_name(),
-        "simd": [name for name in SIMD if features.get(name)],
-        "threads": thread_count(),
-    }
-
-
-PAGE = Path(__file__).with_name("page")
-SCRIPTS = ("floats", "scene", "paint", "panels", "input", "viewer", "page")  # each after what it builds on
-MINUS, DASH, TIMES = "\N{MINUS SIGN}", "\N{EN DASH}", "\N{MULTIPLICATION SIGN}"
 JUDGES = {TRUTH: "truth", UNOCCLUDED: "truth without visibility"}
 COLUMNS = {
     "relmse": ("relMSE", "mean of (x-r)² / (r² + (0.1 mean r)²)"), "rmse": ("RMSE", "W/m²"), "mae": ("MAE", "W/m²"),
@@ -86,81 +64,23 @@ def write_report(comparison: Comparison, folder: Path) -> None:
     write_text(Path(folder) / "index.html", page(comparison))
 
 
-def templates(*folders: Path) -> "jinja2.Environment":
-    """Return the templates of this package and of `folders` by file name: all escaped, nothing left out in silence."""
-    import jinja2
-
-    return jinja2.Environment(loader=jinja2.FileSystemLoader([*folders, PAGE]), autoescape=True, trim_blocks=True,
-                              lstrip_blocks=True, undefined=jinja2.StrictUndefined)
-
-
-def script() -> "Markup":
-    """Return the script of a page, its viewers and its tables: JavaScript that asks for nothing else."""
-    from markupsafe import Markup
-
-    return Markup("\n".join((PAGE / f"{name}.js").read_text("utf-8") for name in SCRIPTS))
-
-
 def page(comparison: Comparison) -> str:
     """Return the page as HTML that refers to nothing outside itself; the same for equal input."""
-    from markupsafe import Markup
-
-    return templates().get_template("report.html.j2").render(
-        style=Markup((PAGE / "style.css").read_text("utf-8")), script=script(),
+    return page_of(
+        "report.html.j2", comparison.environment,
         kind="comparison", title=comparison.scene.name, lead=comparison.scene.description, facts=_facts(comparison),
         verdict=_verdict(comparison),
         failures=[*((name, f"gave no picture: {reason}") for name, reason in comparison.failures.items()),
                   *(doubt.split(": ", 1) for one in comparison.references.values() for doubt in one.doubts)],
         album=album([_view(comparison)]), again=next(iter(comparison.results), TRUTH),
         columns=[{"label": label, "about": about} for label, about in (*COLUMNS.values(), ("FLIP", "of the picture"))],
-        rows=_rows(comparison), notes=_notes(comparison), plot=Markup(_plot(comparison)), made=_made(comparison),
+        rows=_rows(comparison), notes=_notes(comparison), plot=markup(_plot(comparison)), made=_made(comparison),
         ledgers=[_ledger(result) for result in comparison.results.values() if result.ledger is not None],
-        provenance=provenance_rows(comparison.record),
-        versions=comparison.environment["versions"], machine=machine(comparison.environment),
-    )
-
-
-def number(value: float) -> str:
-    r"""Write a figure with three significant digits, a dash for nan.
-
-    >>> [ascii(number(value)) for value in (0.0123456, -1234.5, 2.5e-7)]
-    ["'0.0123'", "'\\u22121230'", "'2.5e\\u22127'"]
-    """
-    if math.isnan(value):
-        return DASH
-    if math.isinf(value):
-        return "∞" if value > 0 else f"{MINUS}∞"
-    if value == 0:
-        return "0"
-    if not 1e-4 <= abs(value) < 1e6:
-        mantissa, _, exponent = f"{value:.2e}".partition("e")
-        return f"{float(mantissa):g}e{int(exponent)}".replace("-", MINUS)
-    rounded = float(f"{value:.3g}")
-    return f"{rounded:.10f}".rstrip("0").rstrip(".").replace("-", MINUS)
-
-
-def sort_key(value: float | None) -> str:
-    """Return what a table sorts a number by, all its digits; nothing where it is not known, which stands last."""
-    return "" if value is None or math.isnan(value) else repr(float(value)).replace("inf", "Infinity")
-
-
-def machine(environment: Mapping[str, Any]) -> str:
-    """Return what a result was made on, in a line: platform, processor, threads."""
-    return f"{environment['platform']}, {environment['cpu']}, {environment['threads']} threads"
-
-
-def require_environment(environment: Mapping[str, Any]) -> None:
-    """Refuse (ValueError) what a result was made on where it is not all that a page needs."""
-    missing = [key for key in ("platform", "cpu", "threads", "versions") if key not in environment]
-    if missing or not isinstance(environment["versions"], dict) or "refgi" not in environment["versions"]:
-        raise ValueError(f"environment: expected {', '.join(missing) or 'versions, that of refgi among them'}")
+        provenance=provenance_rows(comparison.record))
 
 
 def ledger_cells(ledger: Any) -> list[tuple[str, ...]]:
-    """Write a ledger as cells of a table: name, R, G, B in W, percent of the first row, meaning.
-
-    The last row is what the sum is off by.
-    """
+    """Write a ledger as cells: name, R, G, B in W, percent of the first row, meaning; last what the sum is off by."""
     whole = float(np.sum(ledger.rows[0].watts))
     rows = [(row.name.replace("_", " "), row.watts, row.meaning) for row in ledger.rows]
     rows.append(("difference", ledger.difference, "of emitted and the sum of its parts"))
@@ -275,3 +195,127 @@ def _ledger(result: MethodResult) -> dict[str, Any]:
 def _stage(run: stages.Run) -> dict[str, Any]:
     said = f"{number(1e3 * run.seconds)} ms" if run.status == "ran" else f"{run.status}: {run.reason}"
     return {"name": run.name, "status": run.status, "depth": run.depth, "said": said}
+
+
+SCHEMA = 1
+
+
+def write_results(comparison: Comparison, folder: Path) -> None:
+    """Write an EXR and a PNG a method and reference, maps a method, and at last results.json."""
+    for reference in comparison.references.values():
+        _write_picture(comparison, folder, reference)
+    scale = error_scale(comparison)
+    brightness = maps.luminance_scale(comparison.truth.irradiance, comparison.covered)
+    for result in comparison.results.values():
+        record = _write_picture(comparison, folder, result)
+        for judge in result.against:
+            painted = maps.paint(signed_error(comparison, result, judge), comparison.covered, scale)
+            title = f"{result.name} - {judge}"
+            write_encoded(folder / _error_name(result.name, judge), maps.with_legend(painted, scale, title), record)
+        painted = maps.paint(maps.luminance(result.irradiance), comparison.covered, brightness)
+        encoded = maps.with_legend(painted, brightness, result.name)
+        write_encoded(folder / _false_colour_name(result.name), encoded, record)
+    write_text(folder / "results.json", canonical_json(as_json(comparison)) + "\n")
+
+
+def file_names(methods: Sequence[str]) -> list[str]:
+    """Return the names, without folder, of all files that a comparison of methods may write."""
+    pictures = [f"{name}{suffix}" for name in (*methods, TRUTH, UNOCCLUDED) for suffix in (".exr", ".png")]
+    maps_of = [name for method in methods
+               for name in (_false_colour_name(method), *(_error_name(method, j) for j in (TRUTH, UNOCCLUDED)))]
+    return [*pictures, *maps_of, "results.json", "index.html"]
+
+
+def as_json(comparison: Comparison) -> dict[str, Any]:
+    """Return everything but the pixels as JSON values, the content of results.json."""
+    scene = comparison.scene
+    content: dict[str, Any] = plain({
+        "schema": SCHEMA,
+        "refgi": comparison.record["refgi"],
+        "provenance": comparison.record,
+        "scene": {"name": scene.name, "description": scene.description, "faces": scene.face_count,
+                  "lights": len(scene.lights), "exposure": scene.exposure, "camera": scene.camera},
+        "size": [comparison.width, comparison.height],
+        "covered_pixels": int(comparison.covered.sum()),
+        "options": comparison.options,
+        "environment": comparison.environment,
+        "units": UNITS,
+        "references": {r.name: _reference(r, comparison.covered) for r in comparison.references.values()},
+        "methods": {r.name: _method(r) for r in comparison.results.values()},
+        "failures": comparison.failures,
+        "sound": comparison.is_sound,
+    })
+    return content
+
+
+def record_of(comparison: Comparison, made: Reference | MethodResult) -> Record:
+    """Return the record of one picture of a comparison: all that is needed to make it again."""
+    if isinstance(made, Reference):
+        return {**comparison.record, **made.record}
+    still = {} if made.still is None else made.still.record
+    return {**comparison.record, **method_record(made.name, made.settings), **still}
+
+
+def ledger_json(ledger: Any) -> dict[str, Any]:
+    """Return a ledger as JSON: rows by name in W, which of them sum to the first, what the sum is off by."""
+    return {"rows": {row.name: row.watts for row in ledger.rows},
+            "parts": [row.name for row in ledger.rows if row.is_part], "difference": ledger.difference}
+
+
+def signed_error(comparison: Comparison, result: MethodResult, judge: str = TRUTH) -> Array:
+    """Return the luminance of a method's irradiance less that of a reference, (h, w), W/m^2; above 0: too bright."""
+    return maps.luminance(result.irradiance) - maps.luminance(comparison.references[judge].irradiance)
+
+
+def error_scale(comparison: Comparison) -> maps.Scale:
+    """Choose the scale, symmetric about 0, that all error maps of a comparison share."""
+    errors = [signed_error(comparison, r, judge) for r in comparison.results.values() for judge in r.against]
+    return maps.error_scale(errors, comparison.covered)
+
+
+def _write_picture(comparison: Comparison, folder: Path, made: Reference | MethodResult) -> Record:
+    """Write EXR and PNG, and return the record that they hold."""
+    record = record_of(comparison, made)
+    planes = made.planes if isinstance(made, Reference) else linear_planes(
+        made.radiance, made.irradiance, frames=made.frames, lobes=made.lobes)
+    write_exr(folder / f"{made.name}.exr", planes, record)
+    write_preview(folder / f"{made.name}.png", made.radiance, record)
+    return record
+
+
+def _false_colour_name(method: str) -> str:
+    return f"{method}_false_colour.png"
+
+
+def _error_name(method: str, judge: str) -> str:
+    return f"{method}_error.png" if judge == TRUTH else f"{method}_error_{judge}.png"
+
+
+def _reference(reference: Reference, covered: Array) -> dict[str, Any]:
+    samples, values = reference.samples[covered], reference.irradiance[:, covered]
+    return {
+        "settings": reference.settings, "seconds": reference.seconds, "stages": _stages(reference.runs),
+        "samples": {"fewest": int(samples.min()), "most": int(samples.max()), "mean": float(samples.mean())},
+        "mean_irradiance": float(values.mean()),
+        "standard_error_of_a_pixel": float(np.sqrt(reference.variance[:, covered]).mean()),
+        "standard_error_of_the_mean": float(np.sqrt(reference.mean_variance).mean()),
+        **reference.estimate,
+        "files": [f"{reference.name}.exr", f"{reference.name}.png"],
+    }
+
+
+def _method(result: MethodResult) -> dict[str, Any]:
+    return {
+        "summary": result.summary, "settings": result.settings, "seconds": result.seconds,
+        "stages": _stages(result.runs),
+        "against": result.against, **({"lobes_against": result.lobes_against} if result.lobes_against else {}),
+        "flip": {key: getattr(result.flip, key) for key in ("mean", "exposures", "skipped")},
+        "ledger": None if result.ledger is None else ledger_json(result.ledger),
+        "files": [f"{result.name}.exr", f"{result.name}.png", _false_colour_name(result.name),
+                  *(_error_name(result.name, judge) for judge in result.against)],
+    }
+
+
+def _stages(runs: tuple[stages.Run, ...]) -> list[dict[str, Any]]:
+    return [{"name": r.name, "status": r.status, "seconds": r.seconds, "depth": r.depth, "reason": r.reason}
+            for r in runs]

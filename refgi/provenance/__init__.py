@@ -5,13 +5,13 @@ method with all settings, what it was computed in, and which refgi did it.
 """
 
 from refgi.provenance.again import Job, job_of, read_record
-from refgi.provenance.content import plain
 from refgi.provenance.record import (
     CONTENT,
     UNITS,
     Record,
     estimate_record,
     method_record,
+    plain,
     program,
     scene_record,
     stated_record,

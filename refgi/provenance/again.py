@@ -1,23 +1,137 @@
-"""A picture made again from its record: the same scene, looked for where it may lie now, and the same settings."""
+"""A picture made again from its record: the same scene, looked for where it may lie now, and the same settings.
+
+A record comes with an EXR, which may be a stranger's: before anything is done by it, its keys and the kinds and sizes
+of what is taken as it is are judged. Scene, camera, lights and settings are judged where they are made.
+"""
 
 import dataclasses
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
-from refgi.errors import InputError, RefgiWarning, blame, expect
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from refgi.errors import InputError, RefgiWarning, blame, expect, first_faults
 from refgi.image import read_exr
 from refgi.methods import find_method
-from refgi.provenance.content import camera_from, geometry_digest, light_from, materials_digest
-from refgi.provenance.record import VERSION, Record, program, versions
-from refgi.provenance.schema import require_sound
+from refgi.provenance.record import (
+    VERSION,
+    Record,
+    camera_from,
+    geometry_digest,
+    light_from,
+    materials_digest,
+    program,
+    versions,
+)
 from refgi.scene import Scene, builtin_scenes, load_scene
 from refgi.scene.files import is_there
 from refgi.settings import Settings, flat, of_record
 
 if TYPE_CHECKING:
     from refgi.provenance.frames import SequenceFrame, StillFrames
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=0, lt=2**31)]
+Objects = dict[str, Any]
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class ProgramEntry(_Entry):
+    """Which refgi made it."""
+
+    version: str
+    git: str | None = None
+
+
+class LampsEntry(_Entry):
+    """Lamps that stand for emissive surfaces."""
+
+    count: Count
+    approximation: str
+
+
+class ExposureEntry(_Entry):
+    """What an exposure was taken from."""
+
+    percentile: Annotated[float, Field(ge=0, le=100)]
+
+
+class SceneEntry(_Entry):
+    """Which scene, and as seen and lit by what."""
+
+    source: str | None
+    files: dict[str, str]
+    name: str
+    faces: Count
+    geometry_sha256: str
+    materials_sha256: str
+    camera: Objects
+    lights: list[Objects]
+    emissive_lamps: LampsEntry | None = None
+
+
+class OptionsEntry(_Entry):
+    """Options of a `Frame`."""
+
+    dtype: Literal["float32", "float64"]
+    rsm_resolution: Annotated[int, Field(ge=1, le=65536)]
+    shadows: Literal["map", "exact"] | None = None
+
+
+class EstimateEntry(_Entry):
+    """What an estimate came to; its figures are of no consequence."""
+
+    model_config = ConfigDict(extra="allow")
+
+    passes: Annotated[int, Field(ge=1, lt=2**31)] | None = None
+
+
+class PathEntry(_Entry):
+    """The path that a sequence follows."""
+
+    source: str
+    sha256: str
+
+
+class PictureRecord(_Entry):
+    """All of it."""
+
+    provenance: int
+    refgi: ProgramEntry
+    versions: dict[str, str | None]
+    scene: SceneEntry
+    options: OptionsEntry
+    exposure: Annotated[float, Field(allow_inf_nan=False, gt=0)]
+    auto_exposure: ExposureEntry | None = None
+    engine: Literal["literal"] | None = None  # what ran stages in place of kernels
+    units: dict[str, str]
+    content: str
+    method: str
+    settings: Objects
+    estimate: EstimateEntry = EstimateEntry()
+    sampling_error: Objects | None = None
+    lightcuts: Objects | None = None
+    path: PathEntry | None = None
+    of: Count = 0
+    temporal: Objects | None = None
+    frame: Count = 0
+    at_frame: Objects = {}
+    frames: Annotated[int, Field(ge=1, lt=2**31)] = 1
+
+
+def require_sound(record: Mapping[str, Any], path: Path) -> None:
+    """Raise InputError, with all keys that are missing, unknown or of another kind, if a record is not whole."""
+    try:
+        PictureRecord.model_validate(dict(record))
+    except ValidationError as error:
+        faults = [f"{path}: {'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()]
+        raise InputError(first_faults(faults), key=".".join(map(str, error.errors()[0]["loc"]))) from error
+
 
 COMPUTES = ("numpy", "numba", "llvmlite", "scipy", "embreex")  # what may change a bit of a picture
 PARTS = {"geometry": geometry_digest, "materials": materials_digest}
@@ -142,37 +256,14 @@ def _found(source: str | None, path: Path) -> str:
         raise InputError(f"{path}: the scene was made in Python; --scene names one in a file", key="scene")
     if source.partition(":")[0] in builtin_scenes():
         return source
-    for place in _places(source, path):
+    for place in (Path(source), *(folder / source for folder in path.resolve().parents)):
         if is_there(place):
             return str(place)
     raise InputError(f"{path}: {source}: not there, neither from the current folder nor from one above the "
                      "picture (--scene says where a scene is)", key="scene")
 
 
-def _places(source: str, path: Path) -> Iterator[Path]:
-    yield Path(source)
-    for folder in path.resolve().parents:
-        yield folder / source
-
-
-def _settings(wanted: type[Any], values: Mapping[str, Any], path: Path) -> Any:
-    from pydantic import ConfigDict, TypeAdapter, ValidationError
-
-    if issubclass(wanted, Settings):
-        return _composed(wanted, values, path)
-    hints, names = get_type_hints(wanted), [field.name for field in dataclasses.fields(wanted)]
-    if set(values) != set(names):
-        raise InputError(f"{path}: {wanted.__name__}: expected {', '.join(names)}; got {', '.join(values)}",
-                         key="settings")
-    try:
-        read = {key: TypeAdapter(hints[key], config=ConfigDict(extra="forbid")).validate_python(value)
-                for key, value in values.items()}
-    except ValidationError as error:
-        raise InputError(f"{path}: {wanted.__name__}: {error.errors()[0]['msg']}", key="settings") from error
-    return wanted(**read)
-
-
-def _composed(wanted: type[Settings], values: Mapping[str, Any], path: Path) -> Settings:
+def _settings(wanted: type[Settings], values: Mapping[str, Any], path: Path) -> Any:
     """Return settings of a record, which holds every key of their tree."""
     try:
         made = of_record(wanted, values)

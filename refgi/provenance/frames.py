@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 from refgi.errors import InputError, expect
 from refgi.methods import KeepingEstimate, Picture, find_method, require_filter, usual_shadows
-from refgi.provenance.content import light_json, plain
-from refgi.provenance.record import Record
+from refgi.provenance.record import Record, light_json, plain
 from refgi.scene import Scene
 from refgi.scene.files import read_bytes
 from refgi.scene.path import Path as Way
@@ -40,18 +39,12 @@ class StillFrames(NamedTuple):
 
 
 def path_record(path: str, of: int, temporal: TemporalSettings | None) -> Record:
-    """Return, as JSON values, what all `of` frames of a sequence share beyond scene and method.
-
-    `path`: TOML file of the path; `temporal`: the temporal filter.
-    """
+    """Return what all `of` frames of a sequence share beyond scene and method: the path's file and the filter."""
     return {"path": {"source": path, "sha256": _digest(path)}, "of": of, "temporal": plain(temporal)}
 
 
 def frame_record(scene: Scene, way: Way, number: int, of: int) -> Record:
-    """Return, as JSON values, what one frame adds: its number, its camera and its lights in full.
-
-    `scene`: without the path `way`.
-    """
+    """Return what one frame adds: its number, camera and lights in full; `scene`: without the path `way`."""
     camera, lights = camera_and_lights(scene, way, number, of)
     return {"frame": number, "at_frame": {"camera": plain(camera), "lights": [light_json(light) for light in lights]}}
 
@@ -63,10 +56,7 @@ def whole_record(scene: Scene, frame: SequenceFrame) -> Record:
 
 
 def same_sequence(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[str]:
-    """Return in which keys two records of frames are not of one sequence, those of objects after a dot.
-
-    How scene and path were named, and what an estimate came to, does not count.
-    """
+    """Return in which keys two frames' records are not of one sequence; names of files and estimates do not count."""
     same = {"estimate": None}
     left, right = (_flat({**one, **same, **{key: {**one.get(key, {}), "source": None} for key in ("scene", "path")}})
                    for one in (a, b))
@@ -74,10 +64,7 @@ def same_sequence(a: Mapping[str, Any], b: Mapping[str, Any]) -> list[str]:
 
 
 def require_repeatable(settings: Any) -> None:
-    """Refuse settings by which frames of a sequence would not be the same when they are made again.
-
-    Raises InputError if frames end by the clock, or would share a checkpoint.
-    """
+    """Refuse settings by which frames of a sequence end by the clock or share a checkpoint: none comes twice alike."""
     for key, why in (("seconds", "as the clock ends no frame of a sequence twice alike: say samples"),
                      ("checkpoint", "as a file holds the passes of one frame alone")):
         value = getattr(settings, key, None)
@@ -85,12 +72,7 @@ def require_repeatable(settings: Any) -> None:
 
 
 def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame, options: Mapping[str, Any]) -> Picture:
-    """Render one frame of a sequence, after those before it where the temporal filter needs them.
-
-    `scene`: without the path; `settings`: the method's in the first frame; `options`: of every `Frame`. The picture is
-    the same to the bit as in the whole sequence. Raises InputError if the path is not usable, or frames end by the
-    clock.
-    """
+    """Render one frame of a sequence to the bit as in the whole of it, after those that its temporal filter needs."""
     require_repeatable(settings)
     way, _ = read_path(frame.path, scene)
     first = frame.number if frame.temporal is None else 0
@@ -104,11 +86,7 @@ def render_frame(scene: Scene, method: str, settings: Any, frame: SequenceFrame,
 
 
 def render_still(scene: Scene, method: str, settings: Any, still: StillFrames, options: Mapping[str, Any]) -> Picture:
-    """Render the last frame of a resting scene, by a method and its temporal filter.
-
-    `settings`: the method's in the first frame; `options`: of every `Frame`, `shadows` by default those of
-    `usual_shadows`. Raises InputError if the method has no temporal filter.
-    """
+    """Render the last frame of a resting scene by a method and its temporal filter; InputError if it has none."""
     require_filter([method])
     options = {**options, "shadows": options.get("shadows") or usual_shadows(settings)}
     light = KeepingEstimate(find_method(method))

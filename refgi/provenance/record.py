@@ -1,12 +1,12 @@
-"""The record of a picture: all that is needed to make it again.
+"""The record of a picture: all that is needed to make it again, as one JSON object in every EXR, PNG and results.json.
 
-One JSON object, written into every EXR and PNG and, for what all pictures of a comparison share, into results.json.
-
-Which refgi this is: its version, the commit of its source tree, and the versions of what it stands on.
+What a scene consists of as JSON values and back, digests of its surfaces, and which refgi on which machine this is.
 """
 
 import dataclasses
 import functools
+import hashlib
+import math
 import os
 import platform
 import subprocess
@@ -18,15 +18,121 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from refgi.provenance.content import geometry_digest, light_json, materials_digest, plain
-from refgi.scene import Scene
+from refgi.errors import InputError
+from refgi.image import canonical_json
+from refgi.scene import Camera, DirectionalLight, Light, Material, PointLight, Scene, SpotLight
+from refgi.scene.material import TEXTURES
 from refgi.scene.placed import APPROXIMATION
+from refgi.settings import Settings, flat
 
 if TYPE_CHECKING:
     from refgi.diagnostics import LightcutsChoice, SamplingError
 
+LIGHTS: dict[str, type[SpotLight] | type[PointLight] | type[DirectionalLight]] = {
+    "spot": SpotLight, "point": PointLight, "directional": DirectionalLight}
+
+
+def plain(value: Any) -> Any:
+    """Turn settings and figures into finite JSON values.
+
+    Parameters
+    ----------
+    value : object
+        Dataclasses, mappings, sequences, sets, numbers, text, types.
+
+    Returns
+    -------
+    object
+        The same as dict, list, str, int, float, bool and None.
+    """
+    if isinstance(value, Settings):
+        return {key: plain(item) for key, item in flat(value).items()}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, dict) or hasattr(value, "items"):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, set | frozenset):
+        return sorted(map(plain, value))
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return value if value is None or isinstance(value, bool | int | float | str) else str(value)
+
+
+def geometry_digest(scene: Scene) -> str:
+    """Return SHA-256 over triangles, normals, texture coordinates and materials by number; equal on every machine."""
+    shape, digest = scene.geometry, hashlib.sha256()
+    for array, kind in ((shape.vertices, "<f8"), (shape.faces, "<i4"), (shape.material_of_face, "<i4"),
+                        (shape.vertex_normals, "<f8")):
+        plane = np.zeros(0, kind) if array is None else np.ascontiguousarray(array, kind)
+        digest.update(f"{plane.shape}\0".encode() + plane.tobytes())
+    for key in ("uv", "colours"):
+        if getattr(shape, key) is not None:  # absent, the digest is that of earlier versions
+            plane = np.ascontiguousarray(getattr(shape, key), "<f8")
+            digest.update(f"{key} {plane.shape}\0".encode() + plane.tobytes())
+    return digest.hexdigest()
+
+
+def materials_digest(scene: Scene) -> str:
+    """Return SHA-256 over all materials in order, with every texel of their images; equal on every machine."""
+    return hashlib.sha256(canonical_json([_material_json(one) for one in scene.materials]).encode()).hexdigest()
+
+
+def _material_json(material: Material) -> dict[str, Any]:
+    """Return a material as JSON values; textures, alpha and cutoff only where it has some, images by their digests."""
+    without: dict[str, Any] = dict.fromkeys(TEXTURES)
+    fields: dict[str, Any] = plain(dataclasses.replace(material, **without))
+    del fields["one_sided"]
+    for key in TEXTURES:
+        del fields[key]
+        texture = getattr(material, key)
+        if texture is not None:
+            fields[key] = {"image": texture.image.digest, "wrap": list(texture.wrap), "filter": texture.filter}
+    if material.cutoff is None:  # absent, the digest is that of earlier versions
+        del fields["alpha"], fields["cutoff"]
+    for key in ("sends", "solid"):
+        if getattr(material, key) == getattr(Material, key):
+            del fields[key]
+    return fields
+
+
+def light_json(light: Light) -> dict[str, Any]:
+    """Return a light's type and fields as JSON values, angles in rad; the smoothstep falloff is left out."""
+    kind = next(name for name, one in LIGHTS.items() if isinstance(light, one))
+    fields: dict[str, Any] = plain(light)
+    if isinstance(light, SpotLight) and light.falloff == SpotLight.falloff:  # as in earlier versions
+        del fields["falloff"]
+    return {"type": kind} | fields
+
+
+def light_from(content: Mapping[str, Any]) -> Light:
+    """Return the light that `light_json` wrote, equal to the bit. Raises InputError if the content is not a light's."""
+    kind = LIGHTS.get(str(content.get("type")), PointLight)
+    usual = {"falloff": SpotLight.falloff} if kind is SpotLight else {}
+    made: Light = _made(kind, usual | {key: value for key, value in content.items() if key != "type"}, "light")
+    return made
+
+
+def camera_from(content: Mapping[str, Any]) -> Camera:
+    """Return the camera that `plain` wrote, equal to the bit. Raises InputError if the content is not a camera's."""
+    camera: Camera = _made(Camera, content, "camera")
+    return camera
+
+
+def _made(kind: type[Any], content: Mapping[str, Any], key: str) -> Any:
+    known = {field.name for field in dataclasses.fields(kind)}
+    if set(content) != known:
+        raise InputError(f"{key}: expected the keys {', '.join(sorted(known))}, got {', '.join(sorted(content))}",
+                         key=key)
+    return kind(**content)
+
+
 PACKAGES = ("refgi", "numpy", "numba", "llvmlite", "scipy", "embreex", "OpenEXR", "imageio", "pillow", "matplotlib",
             "click", "rich", "pydantic", "jinja2", "flip-evaluator")
+SIMD = ("sse2", "avx", "avx2", "fma", "avx512f", "avx512vl", "neon", "sve")
 GIT_SECONDS = 10.0
 DIRTY = "-dirty"
 VERSION = 2  # of the record; its key is `provenance`
@@ -49,6 +155,22 @@ def versions() -> dict[str, str | None]:
     return {"python": platform.python_version()} | {name: _version(name) for name in PACKAGES}
 
 
+def environment() -> dict[str, Any]:
+    """Return versions, platform, cpu, simd (features of the processor) and threads as JSON values."""
+    import llvmlite.binding
+
+    from refgi.jit import thread_count
+
+    features = llvmlite.binding.get_host_cpu_features()
+    return {
+        "versions": versions(),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "cpu": llvmlite.binding.get_host_cpu_name(),
+        "simd": [name for name in SIMD if features.get(name)],
+        "threads": thread_count(),
+    }
+
+
 def program() -> dict[str, str]:
     """Return which refgi this is.
 
@@ -64,11 +186,7 @@ def program() -> dict[str, str]:
 
 @functools.cache
 def git_id(package: Path) -> str | None:
-    """Return the commit of the checkout that a package's folder is part of, with "-dirty" where a file in it differs.
-
-    None where git does not keep the folder: a package installed inside another project's checkout is not of that
-    project.
-    """
+    """Return the commit of the checkout that keeps a package, with "-dirty" where a file differs; None without one."""
     if not _git(package, "ls-files", "__init__.py"):
         return None
     commit = _git(package, "rev-parse", "HEAD")

@@ -57,10 +57,7 @@ class Change(NamedTuple):
 
 
 def mapped(scene: Scene, places: Map, directions: Map = lambda d: d, power: float = 1.0) -> Scene:
-    """Return a scene with places and directions, (n, 3), changed, and spots' and points' intensity times `power`.
-
-    Faces and materials stay. NotPromisedError if a coordinate or an intensity leaves what a scene may have.
-    """
+    """Return a scene with places and directions, (n, 3), changed; NotPromisedError where it leaves a scene's range."""
     def one(of: Map, vector: Vector) -> Vector:
         x, y, z = (float(c) for c in of(np.array([vector], np.float64))[0])
         return x, y, z

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from refgi.compare.report import PAGE, machine, number, script, sort_key, templates
+from refgi.compare.pages import number, page_of, sort_key
 from refgi.image import write_text
 from refgi.image.png import png_bytes
 from refgi.stress.promises import Row, Stability, strain
@@ -22,17 +22,14 @@ BRIGHT = 0.35  # what the mean is shown as, linear
 
 def write_page(result: Stability, found: Sequence[Found], silent: Sequence[Silence], folder: Path, title: str) -> None:
     """Write index.html of a run, whole or not at all: rows with their pictures, and what methods were not asked."""
-    from markupsafe import Markup
-
-    page = templates(FILES).get_template("stress.html.j2").render(
-        style=Markup((PAGE / "style.css").read_text("utf-8")), script=script(), kind="stress",
-        title=f"What is promised of {title}", lead="", facts=[f"{len(result.rows)} promises"],
+    page = page_of(
+        "stress.html.j2", result.environment, FILES, kind="stress", title=f"What is promised of {title}",
+        facts=[f"{len(result.rows)} promises"],
         verdict=markdown_summary(result),
         failures=[(row.subject, f"{row.property}: {_figure(row)}, limit {row.limit:.3g}") for row in result.failed],
         methods=list(dict.fromkeys(row.subject for row in result.rows)), matrix=_matrix(result.rows),
         columns=COLUMNS, rows=[_cells(row) for row in result.rows], shown=[_shown(one) for one in _worst(found)],
-        silent=[(f"{one.method}: {one.change}", one.why) for one in silent],
-        versions=result.environment["versions"], machine=machine(result.environment))
+        silent=[(f"{one.method}: {one.change}", one.why) for one in silent])
     write_text(folder / "index.html", page)
 
 

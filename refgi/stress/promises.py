@@ -1,8 +1,7 @@
 """Promises of numerical stability: each with its settings and limit, and what was found of it, as data and table.
 
-Bits are promised where a change rounds nothing, or names the same triangles otherwise. Where numbers round anew, the
-limit is twice the worst that was observed on scenes that stand in docs/precision.md. Lights that are drawn from a map
-are other lights after some changes, so there every texel is a light.
+Bits are promised where a change rounds nothing, or names the same triangles otherwise; where numbers round anew, twice
+the worst that was observed (docs/precision.md). Where other lights would be drawn, every texel is a light.
 """
 
 import builtins
@@ -16,6 +15,7 @@ from typing import Any, Literal, NamedTuple
 
 import pydantic
 
+from refgi.bench.results import Strict
 from refgi.image import write_text
 from refgi.scene import DirectionalLight, PointLight, Scene, SpotLight
 from refgi.settings import Settings, from_text
@@ -27,11 +27,7 @@ COLUMNS = ("property", "of", "scene", "where it holds", "worst", "limit", "where
 Kind = Literal["exact", "derived", "observed x 2", "statistics"]
 
 
-class _Strict(pydantic.BaseModel):
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
-
-
-class Row(_Strict):
+class Row(Strict):
     """One promise: what holds, where, the worst that was found and the limit."""
 
     part: str  # of the run, such as "kernels"
@@ -75,7 +71,7 @@ class Row(_Strict):
         return value if math.isfinite(value) else None  # JSON has neither NaN nor infinity
 
 
-class Stability(_Strict):
+class Stability(Strict):
     """The rows of a run and where it was made."""
 
     refgi: Literal["stability 1"] = FORMAT
@@ -115,10 +111,7 @@ def schema_text() -> str:
 
 
 def strain(row: Row) -> float:
-    """Return a figure over its limit; infinity for what is no number, and for any figure beside a limit of 0.
-
-    Over 1 where the promise is broken.
-    """
+    """Return a figure over its limit, over 1 where broken; infinity for no number and for any beside a limit of 0."""
     if not math.isfinite(row.figure):
         return math.inf
     return row.figure / row.limit if row.limit > 0 else (math.inf if row.figure > 0 else 0.0)

@@ -1,8 +1,8 @@
 """Jobs done: figures are those of a bench, buffers and truths are shared, errors are results."""
 
 import contextlib
+import dataclasses
 import importlib
-import warnings
 
 import numpy as np
 import pytest
@@ -12,12 +12,12 @@ from refgi.batch import work
 from refgi.batch.jobs import jobs_of
 from refgi.batch.outcome import is_done, read_outcome, read_outcomes, result_of
 from refgi.batch.plan import read_plan
-from refgi.batch.shared import Common
+from refgi.batch.shared import Common, digest_of, hashes_of
 from refgi.batch.work import Chunk, forget, run_chunk
 from refgi.bench import measure
 from refgi.bench.measure import bench_scene
-from refgi.compare.flip import Flip
-from refgi.errors import InputError, RefgiWarning
+from refgi.compare.metrics import Flip
+from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.image import read_exr
 from refgi.scene import load_scene
@@ -25,9 +25,12 @@ from refgi.scene.path import scenes_along
 from refgi.scene.pathfile import read_path
 from refgi.sssil import HssilSettings
 from refgi.sssil.temporal import Sequence, TemporalSettings
+from refgi.stages import observe, stage
 from refgi.truth import TruthSettings
 from tests.batch.made import PLAN as SMALL_PLAN
 from tests.batch.made import run_of
+
+pytestmark = pytest.mark.filterwarnings("ignore::refgi.errors.RefgiWarning")
 
 PLAN = SMALL_PLAN + "[vpl]\nlights = 16\n"
 
@@ -68,10 +71,8 @@ def test_figures_are_those_of_a_bench(tmp_path):
     jobs, common = jobs_of(plan), common_of(tmp_path, plan)
     assert done(jobs, common) == 3
     got = result_of(common.folder, jobs, read_outcomes(common.folder, jobs)).scenes[0]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)
-        expected = bench_scene(load_scene("cornell_box"), plan.grid, rounds=2, truth=plan.truth, width=24, height=18,
-                               **common.options)
+    expected = bench_scene(load_scene("cornell_box"), plan.grid, rounds=2, truth=plan.truth, width=24, height=18,
+                           **common.options)
     assert (got.scene, got.width, got.height, got.covered, got.mean, got.truth) == (
         "cornell_box", 24, 18, expected.covered, expected.mean, expected.truth)
     for one, other in zip((*got.runs, *got.line), (*expected.runs, *expected.line), strict=True):
@@ -137,9 +138,7 @@ def test_pictures_and_what_they_say(tmp_path):
     frame = Frame(load_scene("cornell_box"), width=24, height=18, **common.options)
     from refgi.splat import SiiSettings, sii
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)
-        light = sii(frame, jobs[0].choice.settings)
+    light = sii(frame, jobs[0].choice.settings)
     assert isinstance(jobs[0].choice.settings, SiiSettings)
     planes, record = read_exr(common.folder / jobs[0].picture)
     radiance = frame.radiance(light)
@@ -229,10 +228,8 @@ def test_a_temporal_filter_goes_on_from_frame_to_frame_also_in_another_process(t
     done(way[:1], common_of(tmp_path, plan, "other"))  # after which this process knows another frame, as any might
     done(way[2:], common)
     scene = load_scene("cornell_box").with_camera(width=24, height=18)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)
-        steps = list(Sequence(scenes_along(scene, read_path(tmp_path / "way.toml", scene)[0], 3), HssilSettings(),
-                              TemporalSettings(weight=0.7), **common.options))
+    steps = list(Sequence(scenes_along(scene, read_path(tmp_path / "way.toml", scene)[0], 3), HssilSettings(),
+                          TemporalSettings(weight=0.7), **common.options))
     for job, step in zip(way, steps, strict=True):
         planes, record = read_exr(common.folder / job.picture)
         assert np.array_equal(np.stack([planes[f"irradiance.{c}"] for c in "RGB"]), step.irradiance)
@@ -278,3 +275,56 @@ def let_go():
 def no_flip(monkeypatch):
     """FLIP starts a process for each picture."""
     monkeypatch.setattr(measure, "flip", lambda *_: Flip(0.25))
+
+
+@dataclasses.dataclass
+class Pair:
+    left: object
+    right: object
+
+
+@stage("test_digest.inner")
+def inner(value):
+    return value + 1
+
+
+@stage("test_digest.outer")
+def outer(value):
+    return inner(value) * inner(value + 1)
+
+
+@stage("test_digest.last")
+def last(value):
+    return np.full(3, value)
+
+
+def test_a_digest_is_of_all_that_a_value_holds():
+    a = np.arange(6, dtype=np.float32)
+    values = [a, a.reshape(2, 3), a.astype(np.float64), a + np.float32(1e-6), (a,), [a], (a, a), None, 1, 1.0, True,
+              "1", {"a": 1}, {"b": 1}, {"a": 2}, Pair(1, 2), Pair(2, 1), {"a": a}, np.float32(1),
+              (1, (2, 3)), ((1, 2), 3)]
+    assert len({digest_of(value) for value in values}) == len(values)
+    assert digest_of(a[::-1]) == digest_of(a[::-1].copy())
+    assert digest_of({"a": 1, "b": 2}) == digest_of({"b": 2, "a": 1})
+
+
+def test_stages_come_in_the_order_in_which_they_end():
+    with observe(record=True) as log:
+        outer(2)
+        last(5)
+    assert hashes_of(log, {}) == (
+        ("test_digest.inner", digest_of(3)), ("test_digest.inner", digest_of(4)), ("test_digest.outer", digest_of(12)),
+        ("test_digest.last", digest_of(np.full(3, 5))))
+
+
+def test_a_shared_buffer_counts_alike_whether_it_ran_or_not():
+    with observe(record=True) as log:
+        last(1)
+        outer(2)
+        outer(3)
+        last(5)
+    buffers = {"test_digest.outer": ["first", "second"]}
+    assert hashes_of(log, buffers) == (
+        ("test_digest.last", digest_of(np.full(3, 1))), ("test_digest.outer", "first"), ("test_digest.outer", "second"),
+        ("test_digest.last", digest_of(np.full(3, 5))))
+    assert buffers == {"test_digest.outer": ["first", "second"]}

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from refgi.bench.results import Figures, Result, Run, SceneResult, write_results
+from refgi.bench.folder import write_results
+from refgi.bench.results import Figures, Result, Run, SceneResult
 from refgi.compare.pictures import linear_planes
 from refgi.image import write_exr
 

@@ -1,6 +1,5 @@
 """Approximations as methods declare them: each is a real change, and with all of them off a method is its limit."""
 
-import warnings
 
 import numpy as np
 import pytest
@@ -8,7 +7,6 @@ import pytest
 from refgi.bench.grid import TRUTH, Choice
 from refgi.bench.measure import REFERENCE_SEED
 from refgi.bench.split import REST, Renderer, chain_of, split_of
-from refgi.errors import RefgiWarning
 from refgi.methods import METHODS
 from refgi.provenance.frames import StillFrames
 from refgi.scene import load_scene
@@ -16,8 +14,10 @@ from refgi.settings import of, replaced
 from refgi.sssil.temporal import TemporalSettings
 from refgi.truth import TruthSettings
 
+pytestmark = pytest.mark.filterwarnings("ignore::refgi.errors.RefgiWarning")
+
 OPTIONS = {"width": 32, "height": 24, "rsm_resolution": 64}
-STILL = StillFrames(6, TemporalSettings(weight=0.75))
+STILL = StillFrames(4, TemporalSettings(weight=0.75))
 # settings with which every approximation of a method is made; of several kinds, where one excludes another
 MADE = {
     "sii": [{"lights": 64, "cut": "relative", "half_resolution": True, "quantisation": "published",
@@ -72,28 +72,26 @@ def test_every_method_declares_its_own_once():
         assert made == set(declared)
 
 
-@pytest.mark.parametrize(("name", "number"), KINDS)
-def test_what_is_switched_off_stays_off(name, number):
-    settings = settings_of(name, number)
-    for one in METHODS[name].approximations:
-        off = one.off(settings, OPTIONS) if one.off else settings
-        if one.off and name != TRUTH and one.name != "shadow map resolution":  # there is always more of these
-            assert one.off(off, OPTIONS) == off, one.name
+def test_what_is_switched_off_stays_off():
+    for name, number in KINDS:
+        settings = settings_of(name, number)
+        for one in METHODS[name].approximations:
+            if one.off and name != TRUTH and one.name != "shadow map resolution":  # there is always more of these
+                off = one.off(settings, OPTIONS)
+                assert one.off(off, OPTIONS) == off, one.name
 
 
-@pytest.mark.parametrize(("name", "number"), KINDS)
-def test_the_truth_leaves_visibility_out_where_the_method_does(name, number):
-    method, settings = METHODS[name], settings_of(name, number)
-    limits = {key: value for one in method.approximations for key, value in one.shared_by(settings).items()}
-    assert limits.get("visibility", True) is method.knows_visibility(settings)
+def test_the_truth_leaves_visibility_out_where_the_method_does():
+    for name, number in KINDS:
+        method, settings = METHODS[name], settings_of(name, number)
+        limits = {key: value for one in method.approximations for key, value in one.shared_by(settings).items()}
+        assert limits.get("visibility", True) is method.knows_visibility(settings), (name, number)
 
 
 @pytest.mark.parametrize(("name", "number"), [one for one in KINDS if one != ("val", 2)])  # of few pixels each is lit
 def test_each_changes_the_picture(small, name, number):
     """Each approximation that settings make changes some pixel where it is switched off alone, or the truth."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)
-        chain = chain_of(small, Choice(name, (), settings_of(name, number)), 1)
+    chain = chain_of(small, Choice(name, (), settings_of(name, number)), 1)
     used = chain.links[-1].pictures[0]
     for part, alone in chain.alone.items():
         changed = not np.array_equal(alone.pictures[0], used)
@@ -163,12 +161,10 @@ def test_steps_switch_on_what_they_say(renderer):
 def test_frames_of_a_resting_scene_are_the_last_part(evidence):
     """Each seed has frames of its own; the k-th counts as much as those before at first, then the share 1 - a."""
     renderer = Renderer(load_scene("cornell_box"), TruthSettings(samples=24), still=STILL, **OPTIONS)
-    settings, seeds = settings_of("hssil", 0), 3
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)  # short reach
-        chain = chain_of(renderer, Choice("hssil", (), settings), seeds)
-        frames = [METHODS["hssil"].function(renderer.frame, replaced(settings, {"seed": k})).astype(np.float64)
-                  for k in range(seeds * STILL.frames)]
+    settings, seeds = settings_of("hssil", 0), 2
+    chain = chain_of(renderer, Choice("hssil", (), settings), seeds)
+    frames = [METHODS["hssil"].function(renderer.frame, replaced(settings, {"seed": k})).astype(np.float64)
+              for k in range(seeds * STILL.frames)]
     assert chain.links[-1].name == "temporal"
     for seed in range(seeds):
         first, *others = frames[seed * STILL.frames : (seed + 1) * STILL.frames]

@@ -7,8 +7,7 @@ import shutil
 import pytest
 
 from refgi.bench import report
-from refgi.bench.folder import INDEX, RESULTS, folders_of, read_result, remake, watch
-from refgi.bench.results import write_results
+from refgi.bench.folder import INDEX, RESULTS, folders_of, read_result, remake, watch, write_results
 from refgi.errors import InputError
 from refgi.image import is_from_refgi
 from tests.bench.folders import make_folder
@@ -62,15 +61,6 @@ def test_folders_get_their_pages_and_an_index(home):
     assert "data-refresh" not in html
 
 
-def test_results_are_read_anew(home):
-    out = home / "out"
-    remake(out, folders_of(out))
-    result = read_result(out / RESULTS)
-    write_results(result.model_copy(update={"scenes": result.scenes[:1]}), out)
-    remake(out, folders_of(out))
-    assert "hall" not in (out / INDEX).read_text()
-
-
 def test_folders_without_results_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"expected results\.json, or folders with one, got neither"):
         folders_of(tmp_path)
@@ -112,3 +102,75 @@ def test_watching_makes_pages_when_results_change_and_ends_without_refresh(home)
     assert "out: 8 runs" in said[0]
     assert "expected results of" in said[2]
     assert all("data-refresh" not in (folder / INDEX).read_text() for folder in (home, home / "out"))
+
+
+NAMES = ["", "a\nb", "<script>alert(1)</script>", "|", "../../etc", "\0", "{{ 7*7 }}", "%s", "'\"&<", "$\\frac{",
+         "a" * 5000]
+
+
+@pytest.fixture(scope="module")
+def named(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("names") / "out"
+    write_results(make_folder(folder), folder)
+    return folder
+
+
+@pytest.fixture
+def content(named):
+    held = json.loads((named / "results.json").read_text())
+    yield held
+    (named / "results.json").write_text(json.dumps(held))
+
+
+def changed(folder, content, change):
+    copy = json.loads(json.dumps(content))
+    change(copy)
+    (folder / "results.json").write_text(json.dumps(copy))
+
+
+def test_names_of_scenes_methods_and_settings_are_text(named, content):
+    """A scene of each name."""
+    def change(one):
+        template = json.dumps(one["scenes"][0])
+        one["scenes"] = [json.loads(template) for _ in NAMES]
+        for scene, name in zip(one["scenes"], NAMES, strict=True):
+            scene["scene"] = scene["truth"] = name
+            for run in (*scene["runs"], *scene["line"]):
+                run["method"], run["changes"], run["picture"] = name, [name], None
+            scene["failures"] = {name: name}
+            scene["runs"][0]["picture"] = None if name == "../../etc" else name or None
+
+    changed(named, content, change)
+    remake(named, folders_of(named))
+    page = (named / "index.html").read_text()
+    assert "<script>alert" not in page
+    assert "\n49\n" not in page
+
+
+@pytest.mark.parametrize(("path", "said"), [
+    (("environment", "versions"), "environment: expected versions"),
+    (("environment", "cpu"), "environment: expected cpu"),
+    (("scenes", 0, "runs", 0, "errors", "truth"), "scenes.0.runs.0.errors: expected results"),
+    (("scenes", 0, "line", 0, "errors", "truth"), "scenes.0.line.0.errors: expected results")])
+def test_what_a_page_needs_is_asked_for(named, content, path, said):
+    def change(one):
+        for key in path[:-1]:
+            one = one[key]
+        del one[path[-1]]
+
+    changed(named, content, change)
+    with pytest.raises(InputError, match=said):
+        read_result(named / "results.json")
+
+
+@pytest.mark.parametrize("versions", ["1", [], 2, {}])
+def test_versions_are_those_of_packages(named, content, versions):
+    changed(named, content, lambda one: one["environment"].update(versions=versions))
+    with pytest.raises(InputError, match="environment: expected versions, that of refgi"):
+        read_result(named / "results.json")
+
+
+def test_a_run_has_a_time(named, content):
+    changed(named, content, lambda one: one["scenes"][0]["runs"][0].update(times=[]))
+    with pytest.raises(InputError, match=r"runs\.0\.times"):
+        read_result(named / "results.json")

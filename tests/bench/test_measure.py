@@ -8,38 +8,17 @@ import pytest
 
 from refgi.bench import measure
 from refgi.bench.error import error_of
-from refgi.bench.grid import Choice, Grid
+from refgi.bench.grid import Grid
 from refgi.bench.measure import REFERENCE_SEED, bench_scene, load_kernels, small_frame, with_seed
 from refgi.errors import InputError, RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import METHODS
 from refgi.scene import load_scene
-from refgi.settings import of
 from refgi.stages import observe
 from refgi.truth import TruthSettings, trace_truth
+from tests.bench.conftest import GRID, ROUNDS, SIZE, choice
 
-SIZE = {"width": 40, "height": 36, "rsm_resolution": 64, "shadows": "exact"}
-ROUNDS = 2
-
-
-def choice(method, **changes):
-    made = of(METHODS[method].settings, **changes)
-    return Choice(method, tuple(f"{key}={value}" for key, value in changes.items()), made)
-
-
-GRID = Grid((choice("sii", lights=32), choice("sii", lights=256), choice("vpl", lights=32), choice("gather")), (2, 4))
-
-
-@pytest.fixture(scope="module")
-def box():
-    return load_scene("cornell_box")
-
-
-@pytest.fixture(scope="module")
-def bench(box):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)
-        return bench_scene(box, GRID, rounds=ROUNDS, truth=TruthSettings(samples=96), **SIZE)
+pytestmark = pytest.mark.filterwarnings("ignore::refgi.errors.RefgiWarning")
 
 
 def test_no_time_has_compiling_in_it(box):
@@ -50,9 +29,7 @@ def test_no_time_has_compiling_in_it(box):
 
 
 def picture_of(frame, choice, seed):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)
-        return METHODS[choice.method].function(frame, with_seed(choice.settings, seed))
+    return METHODS[choice.method].function(frame, with_seed(choice.settings, seed))
 
 
 def test_errors_are_those_of_the_method_run_by_hand_with_each_seed(box, bench):
@@ -73,9 +50,7 @@ def test_errors_are_those_of_the_method_run_by_hand_with_each_seed(box, bench):
 def test_a_method_of_the_screen_is_judged_by_what_the_camera_sees_as_well(box):
     """Each reference is the truth with the method's own limits, traced by hand; with rays it knows what blocks."""
     grid = Grid((choice("hssil", samples=64), choice("hssil", samples=64, visibility="rays")), ())
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)
-        found = bench_scene(box, grid, rounds=1, truth=TruthSettings(samples=96), **SIZE)
+    found = bench_scene(box, grid, rounds=1, truth=TruthSettings(samples=96), **SIZE)
     frame = Frame(box, **SIZE)
     limits = {"truth": {}, "unoccluded": {"visibility": False}, "seen": {"emitters": "visible"},
               "seen_unoccluded": {"visibility": False, "emitters": "visible"}}
@@ -104,10 +79,8 @@ def test_the_path_tracer_comes_nearer_and_has_no_bias(bench):
 @pytest.mark.slow
 def test_the_path_tracer_s_line_estimates_what_the_reference_does(box, tmp_path):
     """Its own settings reach both, and no stop reads what the reference has left in a file."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)
-        found = bench_scene(box, GRID._replace(choices=GRID.choices[2:3]), rounds=1, truth=TruthSettings(
-            samples=96, bounces=2, checkpoint=tmp_path / "sums", target_error=0.5), **SIZE)
+    found = bench_scene(box, GRID._replace(choices=GRID.choices[2:3]), rounds=1, truth=TruthSettings(
+        samples=96, bounces=2, checkpoint=tmp_path / "sums", target_error=0.5), **SIZE)
     frame, stop = Frame(box, **SIZE), found.line[1]
     assert (stop.settings["bounces"], stop.settings["samples"]) == (2, 96)
     assert stop.settings["checkpoint"] is stop.settings["target_error"] is None
@@ -118,10 +91,8 @@ def test_the_path_tracer_s_line_estimates_what_the_reference_does(box, tmp_path)
 
 
 def test_a_checkpoint_file_serves_both_references(box, tmp_path):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RefgiWarning)
-        bench_scene(box, Grid(GRID.choices[:1], ()), rounds=1, truth=TruthSettings(
-            samples=48, checkpoint=tmp_path / "sums"), **SIZE)
+    bench_scene(box, Grid(GRID.choices[:1], ()), rounds=1, truth=TruthSettings(
+        samples=48, checkpoint=tmp_path / "sums"), **SIZE)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["sums", "sums.unoccluded"]
 
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 import refgi.bench
+from refgi.bench.folder import rows_of, write_results
 from refgi.bench.report import said_of, write_page
-from refgi.bench.results import Figures, Result, Run, SceneResult, rows_of, schema_text, write_results
+from refgi.bench.results import Figures, Result, Run, SceneResult, schema_text
 from refgi.image import is_from_refgi
-from tests.compare.test_report import Outline
 
 FIGURES = Figures(rmse=0.5, low=0.4, high=0.6, bias=0.3, spread=0.4, noise=0.01)
 
@@ -75,20 +75,6 @@ def test_what_the_curves_say():
     early = list(said_of(SCENE.model_copy(update={"runs": (run("sii", 16, 0.01, 0.5), run("sii", 64, 0.04, 0.3))})))
     assert early[0].endswith("each of its settings is done before the path tracer's first picture.")
     assert [one[-1] for one in said_of(SCENE.model_copy(update={"line": ()}))] == ["."] * 3
-
-
-def test_the_page_is_one_whole_file(tmp_path):
-    write_page(RESULT, tmp_path)
-    html = (tmp_path / "index.html").read_text()
-    outline = Outline(html)
-    assert "box &lt;1&gt;" in html
-    assert "no &amp; way" in html
-    assert html.count('class="front"') == 1
-    assert html.count("<svg") == 1
-    assert not [value for _, attributes in outline.tags for key, value in attributes.items()
-                if key in ("src", "href") and value and not value.startswith("#")]
-    identifiers = [attributes["id"] for _, attributes in outline.tags if "id" in attributes]
-    assert len(identifiers) == len(set(identifiers))
 
 
 def test_nothing_known_is_no_number(tmp_path):

@@ -1,20 +1,24 @@
 """What is measured of skips: those that fire, their counts and times, wrong ones, and what changes of settings cost."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 from refgi import frame as frames
 from refgi import skips
-from refgi.bench.skips import UNMEASURED, measure_skips
-from refgi.bench.trades import TRADES
+from refgi.bench.skips import TRADES, UNMEASURED, brightest, dim_lights, measure_skips, parts_of_lights
 from refgi.diagnostics import diagnosing
 from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.jit import threads
+from refgi.lights.selection import choose_lights
 from refgi.methods import METHODS, render
 from refgi.pairs import irradiance as pairs
+from refgi.pairs.settings import DiscClamp, PairSettings
 from refgi.scene import load_scene
 from refgi.settings import from_text
+from tests.pairs import sets
 
 pytestmark = pytest.mark.filterwarnings("ignore::refgi.errors.RefgiWarning")
 
@@ -37,11 +41,6 @@ def _one_thread():
 @pytest.fixture(scope="module")
 def wedge():
     return load_scene(WEDGE)
-
-
-@pytest.fixture(scope="module")
-def box():
-    return load_scene(BOX)
 
 
 @pytest.fixture
@@ -71,7 +70,7 @@ def test_what_fires_is_measured_in_rounds(wedge):
         assert len(skip.times) == 2
         assert len(skip.times_without) == 2
         assert min(skip.times + skip.times_without) > 0
-    assert {one.reason for one in report.unmeasured} == {one.reason for one in UNMEASURED if "sii" in one.methods}
+    assert {one.reason for one in report.unmeasured} == {one.reason for methods, one in UNMEASURED if "sii" in methods}
 
 
 def test_counts_are_those_of_the_buffers(wedge):
@@ -170,9 +169,82 @@ def test_trades_and_reasons_are_of_methods_and_settings_that_there_are():
     for method, trades in TRADES.items():
         for _, changes in trades:
             assert settings_of(method, *changes) != METHODS[method].settings()
-    assert {name for one in UNMEASURED for name in one.methods} <= set(METHODS)
+    assert {name for methods, _ in UNMEASURED for name in methods} <= set(METHODS)
 
 
 def test_no_rounds_are_refused(wedge):
     with pytest.raises(InputError, match="rounds: expected 1 or more, got 0"):
         measure_skips(wedge, "sii", rounds=0, **OPTIONS)
+
+
+ROUNDING = 1e-6  # of float32, in a sum of few terms
+UNLIKE = 1e-4  # roundings of cosines of pairs that nearly lie in one plane
+
+
+@pytest.mark.parametrize(("share", "kept"), [
+    (0.5, [1]), (0.51, [1, 3]), (0.9, [1, 3]), (0.95, [0, 1, 3]), (1.0, [0, 1, 3])])
+def test_the_fewest_lights_that_carry_a_share(share, kept):
+    parts = np.array([1.0, 5.0, 0.0, 4.0])
+    assert brightest(parts, share).tolist() == kept
+
+
+def test_dark_lights_carry_nothing():
+    assert brightest(np.zeros(3), 0.9).tolist() == []
+    assert brightest(np.zeros(0), 0.9).tolist() == []
+
+
+def test_a_light_over_a_point_gives_it_the_inverse_square():
+    """Closed form: head on at distance r, E = Phi / (pi r^2); behind the point, nothing."""
+    real = np.float32
+    up = np.array([[0.0], [1.0], [0.0]])
+    heights = np.array([1.0, 2.0, -1.0])
+    lights = sets.lights(up * heights, np.repeat(-up, 3, axis=1), np.array([[3.0, 8.0, 1.0]]), real)
+    parts = parts_of_lights(sets.receivers(0 * up, up, real), lights, PairSettings(clamp=None))
+    np.testing.assert_allclose(parts, np.array([3.0, 2.0, 0.0]) / np.pi, rtol=ROUNDING)
+
+
+def test_each_light_is_clamped_by_its_own_disc():
+    """Closed form: head on at distance r from a disc of area A, E = Phi / (pi r^2 + A)."""
+    real, up, area = np.float32, np.array([[0.0], [1.0], [0.0]]), np.array([1.0, 5.0], np.float32)
+    lights = sets.lights(np.repeat(up, 2, axis=1), np.repeat(-up, 2, axis=1), np.full((1, 2), 2.0), real)
+    parts = parts_of_lights(sets.receivers(0 * up, up, real), lights, PairSettings(clamp=DiscClamp()), area)
+    np.testing.assert_allclose(parts, 2.0 / (np.pi + area), rtol=ROUNDING)
+
+
+def test_error_is_that_of_the_lights_left_out():
+    """Independent: light by light in float64, without a clamp; the picture is smaller than a sample of one would be."""
+    settings = settings_of("sii", "lights=48", "pairs.clamp=none")
+    frame = Frame(load_scene("cornell_box"), **OPTIONS)
+    ticks = itertools.count()
+    found = dim_lights(frame, settings, 2, share=0.8, clock=lambda: next(ticks) ** 2.0)
+    lights, buffer = choose_lights(frame, settings.lights), frame.gbuffer
+    x, n = (plane[:, buffer.covered].astype(np.float64) for plane in (buffer.position, buffer.normal))
+    to = lights.position[:, None].astype(np.float64) - x[:, :, None]
+    square = (to**2).sum(axis=0)
+    g = (np.maximum((to * n[:, :, None]).sum(axis=0), 0) * np.maximum(-(to * lights.normal[:, None]).sum(axis=0), 0)
+         / np.maximum(square, 1e-30) ** 2)
+    light = g * lights.flux[:, None] / np.pi  # (3, pixels, lights)
+    parts = light.mean(axis=(0, 1))
+    order = np.argsort(-parts)
+    carrying = 1 + np.flatnonzero(np.cumsum(parts[order]) >= 0.8 * parts.sum())[0]
+    lost = light[:, :, order[carrying:]].sum(axis=2)
+    assert (found.lights, found.carrying, found.share) == (len(parts), carrying, 0.8)
+    assert 1 < carrying < len(parts) < 48  # some of those drawn have no flux
+    assert abs(found.count - 48 * carrying / len(parts)) <= 0.5
+    assert found.error == pytest.approx(np.sqrt((lost**2).mean()) / light.sum(axis=2).mean(), rel=UNLIKE)
+    assert (found.times, found.times_carrying) == ((1.0, 9.0), (5.0, 13.0))  # in turn: 1 - 0, 9 - 4, 25 - 16, 49 - 36
+
+
+def test_footprints_go_with_their_lights():
+    frame = Frame(load_scene("cornell_box"), **OPTIONS)
+    found = dim_lights(frame, settings_of("multires", "lights=100"), 1)
+    assert 0 < found.carrying < found.lights <= 100
+    assert 0 < found.error < 0.02  # a thousandth of the light, spread unevenly
+
+
+def test_methods_without_pixel_lights_and_dark_scenes_have_none(monkeypatch):
+    frame = Frame(load_scene("cornell_box"), **OPTIONS)
+    assert dim_lights(frame, settings_of("gather"), 1) is None
+    assert dim_lights(frame, settings_of("vpl"), 1) is None
+    monkeypatch.setattr("refgi.bench.skips.MOST", 10)
+    assert dim_lights(frame, settings_of("sii", "lights=64"), 1) is None

@@ -150,9 +150,9 @@ def test_words_and_tables_have_the_figures():
     assert said.endswith("With visibility alone switched off RMSE would be 5 %.")
     parts = tuple(part.model_copy(update={"share": 1.5 - 2 * k}) for k, part in enumerate(split().parts))
     assert "of whose square 150 % is visibility, of which cut takes back 50 %." in said_of_split(split(parts=parts))
-    lines = tables_of([split(), split(knee=True)])
+    lines = list(tables_of([split(), split(knee=True)]))
     assert sum(line.startswith("| visibility |") for line in lines) == 2
-    assert tables_of([]) == []
+    assert list(tables_of([])) == []
 
 
 def test_bars_have_a_row_each_and_a_legend():

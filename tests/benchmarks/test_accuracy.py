@@ -8,8 +8,8 @@ import pytest
 
 from benchmarks.accuracy import BUILT_IN, LEVELS, REAL, cheapest_table, error_of, nearest_table
 from benchmarks.before_after import fronts_plot, main, ratio_table
-from refgi.bench.folder import read_result
-from refgi.bench.results import Figures, Result, Run, SceneResult, write_results
+from refgi.bench.folder import read_result, write_results
+from refgi.bench.results import Figures, Result, Run, SceneResult
 from tests.batch.made import MACHINE
 
 ROOT = Path(__file__).parents[2]

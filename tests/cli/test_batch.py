@@ -4,15 +4,14 @@ import json
 import subprocess
 
 import pytest
-from click.testing import CliRunner
 
-from refgi.batch import changes, schedule, work
+from refgi.batch import code, schedule, work
 from refgi.bench import measure
 from refgi.bench.results import Result
-from refgi.cli.group import VerbGroup
-from refgi.compare.flip import Flip
+from refgi.compare.metrics import Flip
 from refgi.errors import InputError
 from refgi.image import is_from_refgi
+from tests.cli.command import runner
 
 PLAN = """
 [batch]
@@ -26,10 +25,7 @@ lights = [16, 64]
 [gather]
 samples = 20
 """
-
-
-def run(*arguments):
-    return CliRunner().invoke(VerbGroup.refgi(), ["batch", *map(str, arguments)])
+run = runner("batch")
 
 
 @pytest.fixture(autouse=True)
@@ -161,9 +157,16 @@ def test_thresholds_and_a_baseline_fail_the_batch(tmp_path, plan, did):
 
 def test_since_a_commit_only_what_reaches_changed_code(tmp_path, plan, did, monkeypatch):
     repository = tmp_path / "repository"
-    monkeypatch.setattr(changes, "PACKAGE", repository)
-    monkeypatch.setattr(changes, "file_of", lambda name: repository / f"{name}.py")
-    monkeypatch.setattr(changes, "reached", lambda place: {"shared", place.partition(":")[0].rpartition(".")[2]})
+    changed = code.changed_methods
+
+    def changed_there(*arguments):
+        with monkeypatch.context() as patch:
+            patch.setattr(code, "PACKAGE", repository)
+            patch.setattr(code, "file_of", lambda name: repository / f"{name}.py")
+            patch.setattr(code, "reached", lambda place: {"shared", place.partition(":")[0].rpartition(".")[2]})
+            return changed(*arguments)
+
+    monkeypatch.setattr(code, "changed_methods", changed_there)
     repository.mkdir()
     for name in ("sii", "gather", "shared"):
         (repository / f"{name}.py").write_text("x = 1\n")

@@ -3,18 +3,14 @@
 import json
 
 import pytest
-from click.testing import CliRunner
 
 from refgi.bench import measure
 from refgi.bench.results import Result
-from refgi.cli.group import VerbGroup
 from refgi.errors import InputError
+from tests.cli.command import runner
 
 SMALL = ("--size", "24x18", "--rounds", "2", "--set", "samples=48", "--threads", "2")
-
-
-def run(*arguments):
-    return CliRunner().invoke(VerbGroup.refgi(), ["bench", *map(str, arguments)])
+run = runner("bench")
 
 
 @pytest.fixture(autouse=True)

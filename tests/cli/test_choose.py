@@ -14,13 +14,11 @@ from refgi.bench.choose import Probe
 from refgi.bench.grid import Choice, Track
 from refgi.cli.group import VerbGroup
 from refgi.truth import TruthSettings
+from tests.cli.command import runner
 
 SMALL = ("cornell_box", "--size", "24x18", "--methods", "sii,truth", "--rounds", "1", "--threads", "2")
 TRUTH = ("--set", "samples=96")
-
-
-def run(*arguments):
-    return CliRunner().invoke(VerbGroup.refgi(), ["choose", *map(str, arguments)])
+run = runner("choose")
 
 
 def test_an_error_is_met_and_the_line_renders(tmp_path, monkeypatch):

@@ -10,34 +10,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import refgi
-from refgi.cli import view
-from refgi.cli.group import VERBS, VerbGroup
+from refgi.cli import session as module
+from refgi.cli.group import VERBS
+from refgi.cli.session import progress
 from refgi.image import read_exr
+from tests.cli.command import TINY
+from tests.cli.command import invoke as run
+from tests.cli.command import refused_in_a_line as refused
 
-TINY = ["--size", "12x10", "--rsm-resolution", "16"]
 HELP_SECONDS = 0.3  # the aim; the test allows a busy machine three times as much
 
 
-def run(*arguments):
-    return CliRunner().invoke(VerbGroup.refgi(), [str(a) for a in arguments])
-
-
-def refused(result, *words):
-    """Exit code 2 and one line on stderr with these words, nothing on stdout."""
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    assert result.stderr.startswith("refgi: ")
-    assert result.stderr.count("\n") == 1
-    for word in words:
-        assert word in result.stderr
-    return True
-
-
-@pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["--version"], *([verb, "--help"] for verb in VERBS)])
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["render", "--help"]])
 def test_help_loads_neither_numpy_nor_numba(arguments, evidence):
+    """That of the command has the first line of every verb's, so it loads them all."""
     code = ("import sys; from refgi.cli import main; sys.argv = ['refgi', *sys.argv[1:]]\n"
             "try: main()\n"
             "finally: print([m for m in ('numpy', 'numba', 'rich', 'pydantic', 'jinja2') if m in sys.modules],"
@@ -59,6 +47,7 @@ def test_every_verb_has_a_line_of_help_that_is_not_cut():
     assert result.exit_code == 0
     for verb in VERBS:
         assert f"  {verb} " in result.stdout
+        assert f"Usage: refgi {verb} " in run(verb, "-h").stdout
     assert "..." not in result.stdout.partition("Commands:")[2]
 
 
@@ -165,8 +154,9 @@ def test_ctrl_c_leaves_with_130_and_no_file(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-@pytest.mark.parametrize("harm", ["del self.handle", "os.kill(os.getpid(), signal.SIGSEGV)"])
-@pytest.mark.parametrize(("asked", "code", "line"), [("SIGTERM", 143, "terminated"), ("SIGINT", 130, "interrupted")])
+@pytest.mark.parametrize(("asked", "code", "line", "harm"), [
+    ("SIGTERM", 143, "terminated", "os.kill(os.getpid(), signal.SIGSEGV)"),
+    ("SIGINT", 130, "interrupted", "del self.handle")])
 def test_what_a_signal_leaves_half_made_does_no_harm(asked, code, line, harm):
     victim = f"""
 import os, signal, sys
@@ -213,62 +203,6 @@ def test_a_full_disk_behind_stdout_is_told_and_behind_stderr_stops_nothing(tmp_p
         assert out.exists()
 
 
-def test_explain_shows_the_four_rows_of_table_1(evidence):
-    """SII Table 1: what stays the same is reused."""
-    told = json.loads(run("explain", "cornell_box", *TINY, "--set", "lights=16", "--json").stdout)
-    rows = told["animation"]
-    assert {word.split(" x")[0] for word in rows["light and camera still"].values()} <= {"reused", "skipped"}
-    assert rows["light and camera still"]["pairs.sum"] == "reused"
-    assert rows["camera moves"]["rsm.reflective_shadow_map"] == "reused"
-    assert rows["camera moves"]["pairs.sum"] == "runs"
-    assert rows["light moves"]["rsm.gbuffer"] == "reused"
-    assert rows["light moves"]["rsm.reflective_shadow_map"] == "runs"
-    assert {rows["light and camera move"][stage] for stage in ("rsm.gbuffer", "rsm.reflective_shadow_map")} == {"runs"}
-    evidence("; ".join(f"{row}: {sum(v == 'reused' for v in stages.values())} stages reused"
-                       for row, stages in rows.items()))
-
-
-def test_explain_says_what_is_skipped_and_why():
-    told = json.loads(run("explain", "cornell_box", *TINY, "--set", "lights=16", "--json").stdout)
-    skipped = [line for line in told["stages"] if line["skipped"]]
-    assert skipped
-    assert all(line["reason"] for line in skipped)
-    text = run("explain", "cornell_box", *TINY, "--set", "lights=16").stdout
-    assert skipped[0]["reason"] in text
-    assert "SII Table 1" in text
-
-
-def test_explain_warns_of_the_frame_asked_for_alone(tmp_path):
-    """The camera and light that it moves take other shares of the light by the gathering radius."""
-    options = ["cornell_box", "--size", "16x12", "--rsm-resolution", "64", "--method", "gather"]
-    result = run("explain", *options)
-    assert result.exit_code == 0, result.output
-    rendered = run("render", *options, "--out", tmp_path / "a.exr")
-    assert "takes" in rendered.stderr
-    assert result.stderr == rendered.stderr
-
-
-def test_explain_refuses_maps_that_do_not_fit(monkeypatch):
-    monkeypatch.setattr(view, "available_bytes", lambda: 10**9)
-    told = run("explain", "cornell_box", *TINY, "--method", "val", "--set", "maps.resolution=4096")
-    assert told.exit_code == 2
-    assert "for the settings of val" in told.stderr
-
-
-@pytest.mark.feature("REF-04")
-def test_explain_tells_where_the_power_goes(evidence):
-    options = ("explain", "cornell_box", *TINY, "--set", "lights=16")
-    ledger = json.loads(run(*options, "--json").stdout)["ledger"]
-    parts = np.sum([ledger["rows"][name] for name in ledger["parts"]], axis=0)
-    assert parts == pytest.approx(ledger["rows"]["emitted"], rel=1e-5)
-    text = run(*options).stdout
-    table = text[text.index("Where the power of the lights goes"):]
-    for name in ("emitted", "reflected", "clamped", "cut", "behind", "off screen", "difference"):
-        assert name in table
-    assert json.loads(run("explain", "cornell_box", *TINY, "--method", "gather", "--json").stdout)["ledger"] is None
-    evidence(f"sii on the Cornell box: {len(ledger['parts'])} lines sum to what is emitted to 1e-5")
-
-
 def test_compare_writes_everything_and_prints_a_table(tmp_path):
     result = run("compare", "cornell_box", *TINY, "--methods", "sii", "--set", "sii.lights=16", "--set",
                  "truth.samples=24", "--parents", "--out", tmp_path / "new" / "out")
@@ -283,15 +217,6 @@ def test_compare_writes_everything_and_prints_a_table(tmp_path):
     assert content["methods"]["sii"]["ledger"]["rows"]["arrived"][0] > 0
     assert "truth without visibility" in result.stdout
     assert read_exr(folder / "sii.exr")[0]["R"].shape == (10, 12)
-
-
-def test_compare_as_json_prints_what_results_json_holds():
-    result = run("compare", "cornell_box", *TINY, "--methods", "sii", "--set", "sii.lights=16", "--set",
-                 "truth.samples=24", "--json")
-    content = json.loads(result.stdout)
-    assert content["schema"] == 1
-    assert content["sound"] is True
-    assert content["out"] is None
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
@@ -314,3 +239,25 @@ def test_compare_fails_with_1_when_a_method_fails(monkeypatch):
     result = run("compare", "cornell_box", *TINY, "--methods", "sii", "--set", "truth.samples=24")
     assert result.exit_code == 1
     assert "refgi: sii gave no picture: lobes" in result.stderr
+
+
+def test_lines_come_only_every_few_seconds(monkeypatch, capsys):
+    clock = iter([0.0, 1.0, 3.5, 4.0, 7.0])
+    monkeypatch.setattr(module.time, "monotonic", lambda: next(clock))
+    with progress() as tell:
+        for done in (0.1, 0.5, 0.6, 1.0):
+            tell("truth", done)
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err == "refgi: truth 50%\nrefgi: truth done\n"
+
+
+def test_a_terminal_gets_a_bar(monkeypatch, capsys):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress() as tell:
+        tell("truth", 0.25)
+        tell("sii", 0.5)
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "sii" in captured.err

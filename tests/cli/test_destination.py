@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from refgi.cli.destination import Permission, make, picture_files
-from refgi.cli.group import VerbGroup
 from refgi.image import is_from_refgi, write_exr, write_png
+from tests.cli.command import TINY
+from tests.cli.command import invoke as run
+from tests.cli.command import refused_in_a_line as refused
 
-TINY = ["--size", "12x10", "--rsm-resolution", "16"]
 WAY = "frames = 2\ncamera = [{at = 0.0, vfov_deg = 30.0}]"
 VERBS = {
     "render": (["cornell_box", *TINY, "--set", "lights=16"], "cornell_box_sii.png"),
@@ -27,19 +27,6 @@ REFUSED = {  # what is wrong with a scene, by verb: before anything is computed 
 def _here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("way.toml").write_text(WAY)
-
-
-def run(verb, *arguments):
-    return CliRunner().invoke(VerbGroup.refgi(), [verb, *(str(a) for a in arguments)])
-
-
-def refused(result, *words):
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    assert result.stderr.count("\n") == 1
-    for word in words:
-        assert word in result.stderr
-    return True
 
 
 @pytest.mark.slow("compare")

@@ -4,10 +4,9 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from refgi.cli.group import VerbGroup
 from refgi.cli.session import Session
+from tests.cli.command import invoke as run
 
 TINY = ["--size", "12x10", "--rsm-resolution", "16", "--set", "lights=16"]
 
@@ -19,10 +18,6 @@ def _here(tmp_path, monkeypatch):
     Path("bad.toml").write_text("frames = 0\n")
     Path("flat.obj").write_text("v 0 0 0\nv 1 0 nan\nv 1 1 0\nf 1 2 3\n")
     Path("cut.json").write_text('{"schema": 1')
-
-
-def run(*arguments):
-    return CliRunner().invoke(VerbGroup.refgi(), [str(a) for a in arguments])
 
 
 def fault(result):

@@ -3,15 +3,12 @@
 import json
 
 import pytest
-from click.testing import CliRunner
 
 from refgi.bench import folder as pages
-from refgi.cli.group import VerbGroup
 from tests.bench.folders import make_folder
+from tests.cli.command import runner
 
-
-def run(*arguments):
-    return CliRunner().invoke(VerbGroup.refgi(), ["report", *map(str, arguments)])
+run = runner("report")
 
 
 @pytest.fixture

@@ -7,9 +7,7 @@ import imageio.v3
 import numpy as np
 import OpenEXR
 import pytest
-from click.testing import CliRunner
 
-from refgi.cli.group import VerbGroup
 from refgi.image import read_exr
 from refgi.methods import find_method, render
 from refgi.scene import load_scene
@@ -19,16 +17,17 @@ from refgi.settings import of
 from refgi.splat import SiiSettings
 from refgi.splat.sii.sii import sii
 from refgi.sssil.temporal import Sequence, TemporalSettings
+from tests.cli.command import TINY, refused, runner
 
 PATH = """
 frames = 4
 objects = [{material = "red", keys = [{at = 0.0}, {at = 1.0, move = [0.02, 0.0, 0.0]}]}]
 camera = [{at = 0.0, eye = [0.278, 0.273, -0.8]}, {at = 1.0, eye = [0.3, 0.28, -0.8]}]
 """
-TINY = ["--size", "12x10", "--rsm-resolution", "16"]
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # of clamps: tests/pairs/test_loss
 # a method that compiles fast and draws random numbers
 SII = ["--method", "sii", "--set", "lights=16", "--temporal", "weight=0.5"]
+run = runner("sequence")
 
 
 @pytest.fixture
@@ -38,21 +37,9 @@ def way(tmp_path):
     return path
 
 
-def run(*arguments):
-    return CliRunner().invoke(VerbGroup.refgi(), ["sequence", *(str(a) for a in arguments)])
-
-
 def lights(folder, numbers):
     channels = [read_exr(folder / f"way_{number:05d}.exr")[0] for number in numbers]
     return [np.stack([own[f"irradiance.{c}"] for c in "RGB"]) for own in channels]
-
-
-def refused(result, *words):
-    assert result.exit_code == 2, result.output
-    assert result.stdout == ""
-    for word in words:
-        assert word in result.stderr
-    return True
 
 
 def test_frames_are_what_python_computes(way, tmp_path):
@@ -74,8 +61,7 @@ def test_frames_are_what_python_computes(way, tmp_path):
     assert (attributes["frame"], attributes["of"], attributes["settings"]["lights.count"]) == (3, 4, 16)
 
 
-@pytest.mark.parametrize(("method", "asked", "used"), [("vpl", [], "exact"), ("sii", [], "map"),
-                                                       ("vpl", ["--shadows", "map"], "map")])
+@pytest.mark.parametrize(("method", "asked", "used"), [("vpl", [], "exact"), ("vpl", ["--shadows", "map"], "map")])
 def test_frames_have_exact_shadows_where_the_method_traces_rays(way, tmp_path, method, asked, used):
     result = run("cornell_box", way, *TINY, "--method", method, "--set", "lights=4", *asked, "--frames", 1, "--format",
                  "exr", "--out", tmp_path / "out", "--json")

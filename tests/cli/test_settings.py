@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import refgi
 from refgi.cli.group import VerbGroup
-from refgi.cli.settings import by_method, has_seed, settings_for
+from refgi.cli.view import by_method, has_seed, settings_for
 from refgi.errors import InputError
 from refgi.methods import METHODS
 from refgi.settings import Settings, flat, from_text, leaves, of, setting

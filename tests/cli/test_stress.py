@@ -9,12 +9,10 @@ from click.testing import CliRunner
 import refgi.methods
 from refgi.cli.group import VerbGroup
 from refgi.stress.promises import read_rows
+from tests.cli.command import runner
 
 ONE = ("--methods", "hssil", "--change", "flux x 2^27", "--size", "16x12")
-
-
-def run(*arguments):
-    return CliRunner().invoke(VerbGroup.refgi(), ["stress", *map(str, arguments)])
+run = runner("stress")
 
 
 def test_files_and_table(tmp_path):

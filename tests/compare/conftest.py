@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from refgi.compare.flip import Flip
+from refgi.compare.metrics import Flip
 from refgi.compare.outcome import Comparison, MethodResult, Reference, measure
 from refgi.scene import Camera, Geometry, Material, Scene, SpotLight
 from refgi.stages import Run

@@ -14,7 +14,7 @@ import refgi
 import refgi.methods
 from refgi.compare import compare
 from refgi.compare import comparison as module
-from refgi.compare.flip import Flip
+from refgi.compare.metrics import Flip
 from refgi.errors import InputError, RefgiWarning
 from refgi.frame import Frame
 from refgi.method import Method
@@ -24,7 +24,8 @@ from refgi.settings import Settings, of, setting
 from refgi.stages import counted_pixels, stage
 from refgi.truth import TruthSettings
 
-pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
+pytestmark = [pytest.mark.filterwarnings("ignore:.* of the indirect light"),  # that is told: tests/pairs/test_loss
+              pytest.mark.filterwarnings("ignore:a fake method")]
 
 SIZE = {"width": 20, "height": 16, "rsm_resolution": 32}
 
@@ -81,7 +82,6 @@ def test_the_small_picture_before_a_timed_one_stands_for_it(box, truth_settings,
 
 
 @pytest.mark.usefixtures("fakes")
-@pytest.mark.filterwarnings("ignore:a fake method")
 def test_a_method_without_visibility_is_judged_twice(box, truth_settings):
     got = compare(box, truth_settings=truth_settings, **SIZE)
     assert set(got.references) == {"truth", "unoccluded"}
@@ -92,7 +92,6 @@ def test_a_method_without_visibility_is_judged_twice(box, truth_settings):
     assert got.truth.settings == truth_settings
 
 
-@pytest.mark.filterwarnings("ignore:a fake method")
 def test_settings_say_whether_a_method_is_judged_twice(box, truth_settings, fakes):
     fakes["blind"] = fakes["blind"]._replace(visibility=lambda settings: settings.level > 0)
     got = compare(box, ["blind"], truth_settings=truth_settings, method_settings={"blind": FakeSettings(0.5)}, **SIZE)
@@ -111,13 +110,11 @@ def test_methods_know_visibility_by_their_settings(name, blind, seeing):
 
 
 @pytest.mark.usefixtures("fakes")
-@pytest.mark.filterwarnings("ignore:a fake method")
 def test_without_blind_methods_the_second_truth_is_not_traced(box, truth_settings):
     assert set(compare(box, ["seeing"], truth_settings=truth_settings, **SIZE).references) == {"truth"}
 
 
 @pytest.mark.usefixtures("fakes")
-@pytest.mark.filterwarnings("ignore:a fake method")
 def test_figures_and_pictures_belong_together(box, truth_settings):
     got = compare(box, ["seeing"], truth_settings=truth_settings, method_settings={"seeing": FakeSettings(0.5)}, **SIZE)
     result = got.results["seeing"]
@@ -129,7 +126,6 @@ def test_figures_and_pictures_belong_together(box, truth_settings):
 
 
 @pytest.mark.usefixtures("fakes")
-@pytest.mark.filterwarnings("ignore:a fake method")
 def test_a_methods_time_has_its_own_buffers_and_its_stages(box, truth_settings):
     """Each method gets a fresh frame: the second one draws its G-buffer again."""
     got = compare(box, truth_settings=truth_settings, **SIZE)
@@ -149,7 +145,6 @@ def test_warnings_come_once_from_the_real_run(box, truth_settings):
 
 
 @pytest.mark.usefixtures("fakes")
-@pytest.mark.filterwarnings("ignore:a fake method")
 def test_one_method_that_fails_does_not_stop_the_others(box, truth_settings, tmp_path):
     got = compare(box, truth_settings=truth_settings, method_settings={"blind": FakeSettings(fails=True)},
                   out=tmp_path / "new", **SIZE)
@@ -161,7 +156,6 @@ def test_one_method_that_fails_does_not_stop_the_others(box, truth_settings, tmp
 
 
 @pytest.mark.usefixtures("fakes")
-@pytest.mark.filterwarnings("ignore:a fake method")
 def test_non_finite_pixels_are_counted_and_unsound(box, truth_settings):
     got = compare(box, ["seeing"], truth_settings=truth_settings,
                   method_settings={"seeing": FakeSettings(float("nan"))}, **SIZE)
@@ -171,7 +165,6 @@ def test_non_finite_pixels_are_counted_and_unsound(box, truth_settings):
     assert not got.is_sound
 
 
-@pytest.mark.filterwarnings("ignore:a fake method")
 def test_a_ledger_is_asked_for_only_where_files_are_written(box, truth_settings, tmp_path, fakes):
     asked = []
 
@@ -191,7 +184,6 @@ def test_a_ledger_is_asked_for_only_where_files_are_written(box, truth_settings,
 
 
 @pytest.mark.usefixtures("fakes")
-@pytest.mark.filterwarnings("ignore:a fake method")
 def test_progress_names_what_runs(box, truth_settings, tmp_path):
     heard = []
     compare(box, ["seeing"], truth_settings=truth_settings, out=tmp_path, progress=lambda *a: heard.append(a), **SIZE)

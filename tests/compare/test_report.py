@@ -10,8 +10,8 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from refgi.compare.plot import Axes, Curve, Point, curves_plot, time_against_error
-from refgi.compare.report import PAGE, SCRIPTS, ledger_cells, number, page, sort_key, write_report
+from refgi.compare.pages import PAGE, SCRIPTS, Axes, Curve, Point, curves_plot, number, sort_key, time_against_error
+from refgi.compare.report import ledger_cells, page, write_report
 from refgi.image import is_from_refgi
 from refgi.scene.source import Source
 from tests.compare.conftest import make_comparison, make_scene

@@ -12,141 +12,47 @@ from pathlib import Path
 import imageio.v3
 import numpy as np
 import pytest
-from pydantic import BaseModel, ConfigDict
+from pydantic import ConfigDict, create_model
 
 from refgi.compare import pictures
-from refgi.compare.results import as_json, file_names, signed_error, write_results
+from refgi.compare.report import as_json, file_names, signed_error, write_results
 from refgi.image import is_from_refgi, read_exr, read_png_attributes
 from refgi.provenance import plain
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 
-class Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
+def strict(model, /, **fields):
+    """A model of exactly these keys, one that may be absent with its default."""
+    kinds = {key: kind if isinstance(kind, tuple) else (kind, ...) for key, kind in fields.items()}
+    return create_model(model, __config__=ConfigDict(extra="forbid", strict=model != "Results"), **kinds)
 
 
-class Figure(Strict):
-    value: float | str | None
-    noise: float | str | None
-    is_noise: bool
-
-
-class Measured(Strict):
-    figures: dict[str, Figure]
-    pixels: int
-    non_finite: int
-    non_finite_reference: int
-
-
-class Stage(Strict):
-    name: str
-    status: str
-    seconds: float
-    depth: int
-    reason: str
-
-
-class FlipJson(Strict):
-    mean: float | None
-    exposures: list[float]
-    skipped: str
-
-
-class LedgerJson(Strict):
-    rows: dict[str, list[float]]
-    parts: list[str]
-    difference: list[float]
-
-
-class Method(Strict):
-    summary: str
-    settings: dict
-    seconds: float
-    stages: list[Stage]
-    against: dict[str, Measured]
-    flip: FlipJson
-    ledger: LedgerJson | None
-    files: list[str]
-
-
-class Samples(Strict):
-    fewest: int
-    most: int
-    mean: float
-
-
-class Reference(Strict):
-    settings: dict
-    seconds: float
-    stages: list[Stage]
-    samples: Samples
-    mean_irradiance: float
-    standard_error_of_a_pixel: float
-    standard_error_of_the_mean: float
-    estimate: dict
-    files: list[str]
-
-
-class SceneJson(Strict):
-    name: str
-    description: str
-    faces: int
-    lights: int
-    exposure: float
-    camera: dict
-
-
-class ProgramJson(Strict):
-    version: str
-    git: str = ""
-
-
-class SceneRecord(Strict):
-    source: str | None
-    files: dict[str, str]
-    name: str
-    faces: int
-    geometry_sha256: str
-    materials_sha256: str
-    camera: dict
-    lights: list[dict]
-
-
-class RecordJson(Strict):
-    provenance: int
-    refgi: ProgramJson
-    versions: dict[str, str | None]
-    scene: SceneRecord
-    options: dict
-    exposure: float
-    units: dict[str, str]
-    content: str
-
-
-class Results(BaseModel):
-    """The schema of results.json."""
-
-    model_config = ConfigDict(extra="forbid", strict=False)
-
-    schema_: int
-    refgi: ProgramJson
-    provenance: RecordJson
-    scene: SceneJson
-    size: tuple[int, int]
-    covered_pixels: int
-    options: dict
-    environment: dict
-    units: dict[str, str]
-    references: dict[str, Reference]
-    methods: dict[str, Method]
-    failures: dict[str, str]
-    sound: bool
+NUMBER = float | str | None
+PROGRAM = strict("Program", version=str, git=(str, ""))
+STAGES = list[strict("Stage", name=str, status=str, seconds=float, depth=int, reason=str)]
+FIGURES = dict[str, strict("Figure", value=NUMBER, noise=NUMBER, is_noise=bool)]
+MEASURED = strict("Measured", figures=FIGURES, pixels=int, non_finite=int, non_finite_reference=int)
+LEDGER = strict("Ledger", rows=dict[str, list[float]], parts=list[str], difference=list[float])
+METHOD = strict("Method", summary=str, settings=dict, seconds=float, stages=STAGES, against=dict[str, MEASURED],
+                flip=strict("Flip", mean=float | None, exposures=list[float], skipped=str), ledger=LEDGER | None,
+                files=list[str])
+REFERENCE = strict("Reference", settings=dict, seconds=float, stages=STAGES, mean_irradiance=float, estimate=dict,
+                   samples=strict("Samples", fewest=int, most=int, mean=float), standard_error_of_a_pixel=float,
+                   standard_error_of_the_mean=float, files=list[str])
+SCENE = strict("Scene", name=str, description=str, faces=int, lights=int, exposure=float, camera=dict)
+SCENE_RECORD = strict("SceneRecord", source=str | None, files=dict[str, str], name=str, faces=int, geometry_sha256=str,
+                      materials_sha256=str, camera=dict, lights=list[dict])
+RECORD = strict("Record", provenance=int, refgi=PROGRAM, versions=dict[str, str | None], scene=SCENE_RECORD,
+                options=dict, exposure=float, units=dict[str, str], content=str)
+RESULTS = strict("Results", schema_=int, refgi=PROGRAM, provenance=RECORD, scene=SCENE, size=tuple[int, int],
+                 covered_pixels=int, options=dict, environment=dict, units=dict[str, str],
+                 references=dict[str, REFERENCE], methods=dict[str, METHOD], failures=dict[str, str], sound=bool)
 
 
 def validated(content):
     content = dict(content)
-    return Results(schema_=content.pop("schema"), **content)
+    return RESULTS(schema_=content.pop("schema"), **content)
 
 
 def test_results_json_keeps_its_schema(comparison, tmp_path):
@@ -261,7 +167,7 @@ spec = importlib.util.spec_from_file_location("by_hand", sys.argv[1])
 by_hand = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(by_hand)
 from refgi.compare.report import write_report
-from refgi.compare.results import write_results
+from refgi.compare.report import write_results
 comparison = by_hand.make_comparison(by_hand.make_scene())
 print("ready", flush=True)
 while True:

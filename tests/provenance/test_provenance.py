@@ -11,9 +11,8 @@ import pytest
 import refgi
 from refgi.errors import InputError
 from refgi.provenance import plain, program, scene_record
-from refgi.provenance.content import camera_from, geometry_digest, light_from, light_json, materials_digest
 from refgi.provenance.frames import same_sequence
-from refgi.provenance.record import git_id
+from refgi.provenance.record import camera_from, geometry_digest, git_id, light_from, light_json, materials_digest
 from refgi.scene import (
     Camera,
     DirectionalLight,

@@ -9,7 +9,7 @@ import pytest
 
 from refgi.errors import InputError, RefgiWarning
 from refgi.methods import render
-from refgi.provenance.content import materials_digest
+from refgi.provenance.record import materials_digest
 from refgi.scene import Material, load_scene
 from tests.scene.samples import glb_bytes, gltf_tree
 

@@ -12,7 +12,7 @@ from refgi.lights.settings import LightSettings
 from refgi.methods import METHODS
 from refgi.pairs.estimates import with_seen_light
 from refgi.pairs.irradiance import Receivers
-from refgi.provenance.content import materials_digest
+from refgi.provenance.record import materials_digest
 from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.splat import SiiSettings

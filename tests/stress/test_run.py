@@ -13,8 +13,17 @@ from refgi.jit import most_threads
 from refgi.scene import PointLight
 from refgi.stress import promises
 from refgi.stress.changes import CHANGES, Changed, NotPromisedError
-from refgi.stress.judge import Seen, bits_apart, estimates_apart, means_apart, rmse_apart, same_surface, unsound
-from refgi.stress.run import Silence, stress
+from refgi.stress.run import (
+    Seen,
+    Silence,
+    bits_apart,
+    estimates_apart,
+    means_apart,
+    rmse_apart,
+    same_surface,
+    stress,
+    unsound,
+)
 
 SIZE = {"width": 16, "height": 12}
 EXACT = ["flux x 2^27", "length x 2^-27", "moved aside", "faces permuted", "hidden plane"]

@@ -20,9 +20,8 @@ from benchmarks.papers.records import Cell, Figure, Picture, Plot, Table
 from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, mean_of
 from refgi.bench.grid import Choice
 from refgi.bench.split import Renderer, chain_of
+from refgi.compare.pages import Axes, Curve, curves_plot, number
 from refgi.compare.pictures import error_scale, luminance
-from refgi.compare.plot import Axes, Curve, curves_plot
-from refgi.compare.report import number
 from refgi.frame import Frame
 from refgi.settings import replaced
 from refgi.sssil import HssilSettings

@@ -22,8 +22,8 @@ from benchmarks.papers.hssil.subjects import (
 )
 from benchmarks.papers.records import Cell, Figure, Picture, Plot, Table
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of, mean_of
+from refgi.compare.pages import Axes, curves_plot
 from refgi.compare.pictures import luminance
-from refgi.compare.plot import Axes, curves_plot
 from refgi.frame import Frame
 from refgi.settings import replaced
 from refgi.sssil import HssilSettings

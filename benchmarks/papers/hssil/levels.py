@@ -15,8 +15,8 @@ from benchmarks.papers.hssil.subjects import (
 )
 from benchmarks.papers.records import Cell, Figure, Picture, Plot, Table
 from benchmarks.papers.workbench import Gallery, Workbench, mapped, mean_of, palette
+from refgi.compare.pages import Axes, Curve, curves_plot
 from refgi.compare.pictures import DIVERGING, Scale, luminance
-from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.settings import replaced
 from refgi.sssil import HssilSettings

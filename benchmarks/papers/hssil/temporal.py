@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.papers.hssil.subjects import WIDE, expected_light, frame_of, light_of, scene_of, smaller
 from benchmarks.papers.records import Figure, Plot, Table
 from benchmarks.papers.workbench import Gallery, Workbench, changes, errors_of
-from refgi.compare.plot import Axes, Curve, curves_plot
+from refgi.compare.pages import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.scene import Scene
 from refgi.sssil import HssilSettings

@@ -22,7 +22,7 @@ from benchmarks.papers.multires.subjects import (
 )
 from benchmarks.papers.records import Bar, Figure, Picture, Plot, Ratios, Table
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of, seen_by
-from refgi.compare.plot import Axes, Curve, curves_plot
+from refgi.compare.pages import Axes, Curve, curves_plot
 from refgi.scene import Scene
 from refgi.settings import replaced
 from refgi.splat.multires import MultiresSettings, multires

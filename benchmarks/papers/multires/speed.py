@@ -12,7 +12,7 @@ from benchmarks.harness import interleaved, seconds_of
 from benchmarks.papers.multires.subjects import LARGE, count_of, drawing, full_sum, scene_of, settings_of
 from benchmarks.papers.records import Cell, Figure, Picture, Plot, Rows, Table
 from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, seen_by
-from refgi.compare.plot import Axes, Curve, curves_plot
+from refgi.compare.pages import Axes, Curve, curves_plot
 from refgi.scene import Scene
 from refgi.settings import flat, replaced
 from refgi.splat.multires import ByError, ByGeometry, ByIrradiance, Criteria, MultiresSettings, multires

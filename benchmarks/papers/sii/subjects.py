@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.harness import interleaved, moved
 from benchmarks.papers.records import Cell, Figure, Plot, Table, relative
 from benchmarks.papers.workbench import Redrawing, Workbench, seen_by
-from refgi.compare.plot import Axes, Curve, curves_plot
+from refgi.compare.pages import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.lights import importance, importance_pyramid
 from refgi.lights.selection import choose_lights, footprints

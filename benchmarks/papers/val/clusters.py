@@ -28,8 +28,8 @@ from benchmarks.papers.workbench import Gallery, Workbench, errors_of, palette, 
 from refgi.cluster.kmeans import in_use, mean_angle
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
+from refgi.compare.pages import Axes, Curve, curves_plot
 from refgi.compare.pictures import luminance
-from refgi.compare.plot import Axes, Curve, curves_plot
 from refgi.frame import Frame
 from refgi.image import tone_map
 from refgi.scene import Scene

@@ -29,7 +29,7 @@ from benchmarks.papers.val.subjects import (
 from benchmarks.papers.workbench import Gallery, Workbench, errors_of
 from refgi.cluster.settings import ValSettings
 from refgi.cluster.val import val
-from refgi.compare.plot import Axes, Curve, curves_plot
+from refgi.compare.pages import Axes, Curve, curves_plot
 from refgi.scene import Scene
 from refgi.stages import observe
 

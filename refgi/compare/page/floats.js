@@ -1,5 +1,5 @@
 "use strict";
-/* Planes as refgi/compare/page/floats.py packs them: bits of half floats, and what they stand for. */
+/* Planes as refgi/compare/album.py packs them: bits of half floats, and what they stand for. */
 
 const HALVES = halfFloats();
 

@@ -10,7 +10,7 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.lights import walk_lights
 from refgi.methods import find_method, render
-from refgi.provenance.content import geometry_digest
+from refgi.provenance.record import geometry_digest
 from refgi.rays import Tracer
 from refgi.rsm import gbuffer, reflective_shadow_map
 from refgi.scene import (

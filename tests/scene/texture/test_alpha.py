@@ -14,7 +14,7 @@ from PIL import Image as Pictures
 
 from refgi.cli.view import needed_bytes
 from refgi.errors import InputError, RefgiWarning
-from refgi.provenance.content import materials_digest
+from refgi.provenance.record import materials_digest
 from refgi.scene import Image, Material, Mesh, Scene, Texture, load_scene, merge
 from refgi.scene.cutouts import cut_outs
 from refgi.scene.texture.image import decoded

@@ -9,7 +9,7 @@ import pytest
 
 from refgi.errors import InputError, RefgiWarning
 from refgi.frame import Frame
-from refgi.provenance.content import materials_digest
+from refgi.provenance.record import materials_digest
 from refgi.scene import Image, Material, Scene, Texture, load_scene
 from refgi.settings import of
 from refgi.truth.vpl import VplSettings, vpl

@@ -1,69 +1,141 @@
-"""The pictures of a page as data for its script: irradiance to radiance, worst places, planes.
+"""The pictures of a page as data for its script: irradiance to radiance, worst places, planes as text.
 
-All pictures of a view share L_0 (emission and reflected direct light) and k (albedo / pi), so a page holds them once
-and each picture's irradiance alone. Both are found from the pictures by least squares, with 0 <= k <= 1 / pi.
-
-A view is one scene from one camera: references, pictures judged by them, and what turns irradiance into radiance.
+All pictures of a view share L_0 (emission and reflected direct light) and k (albedo / pi), 0 <= k <= 1 / pi, fitted by
+least squares: a page holds them once and each picture's irradiance alone. Planes are half floats of a power of two,
+compared as integers: what is stored is the difference to the second channel, then to the pixel on the left. Over the
+limit of a page, the least important become means over blocks of pixels first.
 """
 
+import base64
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from refgi.compare import pictures as maps
+from refgi.compare.findings import Finding, findings, worst_crops
 from refgi.compare.outcome import TRUTH, UNOCCLUDED
-from refgi.compare.page.detectors import Finding, findings
-from refgi.compare.page.floats import FIRST, Store
 from refgi.errors import expect
 from refgi.types import Array
 
-PLACES = 3
-SHARE_OF_SIDE = 8  # a square is an eighth of the shorter side
-LEAST_SIDE = 8  # pixels
-NEGLIGIBLE = 1e-9  # of the whole: what rounding leaves in sums over windows without error
+Bits = npt.NDArray[np.uint16]
+Surface = tuple[Array, Array]  # L_0, k
 
-
-class Crop(NamedTuple):
-    """A square of a picture, in pixels from the upper left corner."""
-
-    x: int
-    y: int
-    side: int
-    share: float  # of the squared error of the whole picture
-
-
-def worst_crops(error: Array, covered: Array) -> tuple[Crop, ...]:
-    """Return up to `PLACES` squares with the most squared error, (h, w), worst first, none over another.
-
-    An error that is not finite counts as the largest that is; no square where there is no error on covered pixels.
-    """
-    squares = _squares(error, covered)
-    side = min(*error.shape, max(LEAST_SIDE, min(error.shape) // SHARE_OF_SIDE))
-    sums, whole = _window_sums(squares, side), float(squares.sum())
-    found: list[Crop] = []
-    while len(found) < PLACES and sums.max() > NEGLIGIBLE * whole:
-        y, x = (int(i) for i in np.unravel_index(np.argmax(sums), sums.shape))
-        found.append(Crop(x, y, side, float(sums[y, x]) / whole))
-        sums[max(0, y - side + 1):y + side, max(0, x - side + 1):x + side] = 0  # windows over this one
-    return tuple(found)
-
-
-def _squares(error: Array, covered: Array) -> Array:
-    finite = np.isfinite(error) & covered
-    squares = np.where(finite, np.where(finite, error, 0.0).astype(np.float64) ** 2, 0.0)
-    squares[covered & ~finite] = squares.max(initial=0.0) or 1.0
-    return squares
-
-
-def _window_sums(values: Array, side: int) -> Array:
-    sums = np.pad(values, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
-    windows: Array = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
-    return windows
-
-
+LARGEST_EXPONENT = 15  # numbers are scaled below 2^15; half floats end at 65504
+LEVEL = 6  # of deflate: 9 takes three times as long for 1 % less
+BASE = 1  # the channel that others are predicted from: green
+COARSEST = 5  # means over 32 x 32 pixels
+FIRST, SECOND, THIRD = 0, 1, 2  # importance: references and what all pictures need; the front; all others
+GRACE = 1.5  # levels that each step of importance is spared
 TOLERANCE = 2.0**-10  # of the radiance: two roundings to half floats
+LIMIT = 14_000_000  # characters of pictures; a page of 100 runs then stays under 15 MB
+STOPS = 33  # colours of a map that the script knows; it blends between them
+LABELS = {TRUTH: "Truth", UNOCCLUDED: "Truth without visibility"}
+
+
+def halves(planes: Array) -> tuple[Bits, int]:
+    """Return numbers, (c, h, w), over 2^exponent as bits of half floats, and the exponent; NaN and infinity stay.
+
+    >>> bits, exponent = halves(np.array([[[1.0, 0.5]]]))
+    >>> (bits.view(np.float16) * 2.0**exponent).tolist()
+    [[[1.0, 0.5]]]
+    """
+    finite = np.abs(planes[np.isfinite(planes)])
+    largest = float(finite.max()) if finite.size else 0.0
+    exponent = math.frexp(largest)[1] - LARGEST_EXPONENT if largest > 0 else 0
+    scaled = np.ldexp(np.asarray(planes, np.float64), -exponent).astype(np.float16)
+    return np.ascontiguousarray(scaled).view(np.uint16), exponent
+
+
+def packed(bits: Bits) -> str:
+    """Return planes of 16 bits, (c, h, w), as the text that the page's script unpacks: Base64 of a zlib stream."""
+    if len(bits) > BASE:
+        base = bits[BASE].copy()
+        bits = bits - base  # modulo 2^16, as all sums here and in the script
+        bits[BASE] = base
+    steps = np.diff(bits, axis=2, prepend=np.uint16(0)).astype(np.uint16)
+    content = np.concatenate([(steps >> 8).astype(np.uint8).ravel(), (steps & 0xFF).astype(np.uint8).ravel()])
+    return base64.b64encode(zlib.compress(content.tobytes(), LEVEL)).decode("ascii")
+
+
+def block_means(values: Array, covered: Array, level: int) -> Array:
+    """Return the mean of covered pixels in each block of 2^level x 2^level; 0 where nothing is covered.
+
+    (c, h, w) to (c, h / 2^level, w / 2^level), rounded up at the far edges.
+    """
+    if level == 0:
+        return values
+    sums, counts = (_block_sums(one, level) for one in (np.where(covered, values, 0), covered.astype(np.float64)))
+    means: Array = sums / np.maximum(counts, 1)
+    return means
+
+
+def _block_sums(values: Array, level: int) -> Array:
+    rows, columns = (np.arange(0, side, 1 << level) for side in values.shape[-2:])
+    sums: Array = np.add.reduceat(np.add.reduceat(values, rows, axis=-2), columns, axis=-1)
+    return sums
+
+
+class Store:
+    """All planes of a page, each at every level of coarseness; what is put in is known by its number."""
+
+    def __init__(self) -> None:
+        self._levels: list[tuple[dict[str, Any], ...]] = []  # text, and what the script must know to unpack it
+        self._importance: list[int] = []
+        self._used: list[int] = []  # level of each
+
+    def add(self, planes: Array, covered: Array, importance: int = FIRST) -> int:
+        """Put in planes, (c, h, w), which have a mean over blocks of covered pixels; return their number."""
+        return self._put(importance, (_numbers(block_means(planes, covered, level)) for level in range(COARSEST + 1)))
+
+    def add_mask(self, covered: Array) -> int:
+        """Put in which pixels, (h, w), show a surface; it is never made coarse. Return its number."""
+        return self._put(FIRST, [_numbers(covered[None].astype(np.float64))])
+
+    def add_ids(self, ids: Array) -> int:
+        """Put in ids, (h, w), uint32, of the upper left pixel of each block: two planes of 16 bits, the lower first."""
+        return self._put(SECOND, (_words(ids[::1 << level, ::1 << level]) for level in range(COARSEST + 1)))
+
+    def fit(self, limit: int) -> None:
+        """Make planes coarser until all are within `limit` characters, the least important and the last first."""
+        size = sum(map(len, self.texts()))
+        steps = sorted((level + GRACE * (THIRD - importance), importance, level)
+                       for importance in (FIRST, SECOND, THIRD) for level in range(1, COARSEST + 1))
+        for _, importance, level in steps:
+            for number, levels in reversed(list(enumerate(self._levels))):
+                if size <= limit:
+                    return
+                if self._importance[number] == importance and level < len(levels):
+                    size += len(levels[level]["text"]) - len(levels[self._used[number]]["text"])
+                    self._used[number] = level
+
+    def texts(self) -> list[str]:
+        """Return what the page holds as Base64, by number."""
+        return [levels[level]["text"] for levels, level in zip(self._levels, self._used, strict=True)]
+
+    def facts(self) -> list[dict[str, Any]]:
+        """Return what the script must know to unpack each, by number: channels, exponent and level."""
+        return [{"channels": levels[level]["channels"], "exponent": levels[level]["exponent"], "level": level}
+                for levels, level in zip(self._levels, self._used, strict=True)]
+
+    def _put(self, importance: int, levels: Iterable[dict[str, Any]]) -> int:
+        self._levels.append(tuple(levels))
+        self._importance.append(importance)
+        self._used.append(0)
+        return len(self._levels) - 1
+
+
+def _numbers(planes: Array) -> dict[str, Any]:
+    bits, exponent = halves(planes)
+    return {"text": packed(bits), "channels": len(bits), "exponent": exponent}
+
+
+def _words(ids: Array) -> dict[str, Any]:
+    words = np.stack([ids & 0xFFFF, ids >> 16]).astype(np.uint16)
+    return {"text": packed(words), "channels": 2, "exponent": 0}
 
 
 class SurfaceFit:
@@ -74,10 +146,7 @@ class SurfaceFit:
         self._sums = np.zeros((4, *shape))  # of E, L, E^2, E L
 
     def add(self, irradiance: Array, radiance: Array) -> None:
-        """Count a picture: indirect irradiance, W/m^2, and the radiance that the camera receives.
-
-        Pixels that are not finite do not count.
-        """
+        """Count a picture: irradiance, W/m^2, and radiance that the camera receives; only pixels that are finite."""
         expect(irradiance.shape == radiance.shape == self._sums.shape[1:], "picture", f"shape {self._sums.shape[1:]}",
                irradiance.shape)
         e, light = irradiance.astype(np.float64), radiance.astype(np.float64)
@@ -99,23 +168,13 @@ class SurfaceFit:
 
 
 def follows(irradiance: Array, radiance: Array, surface: tuple[Array, Array]) -> bool:
-    """Return whether a picture's radiance is what the surface, L_0 and k, makes of its irradiance.
-
-    True where every finite pixel differs by less than a rounding to half floats.
-    """
+    """Return whether a picture's radiance is what L_0 and k make of its irradiance, up to a rounding to halves."""
     emitted, reflectance = surface
     finite = np.isfinite(irradiance) & np.isfinite(radiance)
     made = np.where(finite, emitted + reflectance * np.where(finite, irradiance, 0.0), 0.0)
     right = np.where(finite, radiance, 0.0)
     floor = np.abs(right).max(initial=0.0) * 2.0**-24
     return bool((np.abs(made - right) <= TOLERANCE * np.abs(right) + floor).all())
-
-
-Surface = tuple[Array, Array]
-
-LIMIT = 14_000_000  # characters of pictures; a page of 100 runs then stays under 15 MB
-STOPS = 33  # colours of a map that the script knows; it blends between them
-LABELS = {TRUTH: "Truth", UNOCCLUDED: "Truth without visibility"}
 
 
 class Picture(NamedTuple):

@@ -1,15 +1,105 @@
 """A page's pictures: what the script is told, and what becomes coarse where all are more than the limit."""
 
+import base64
 import functools
 import json
+import math
+import zlib
 
 import numpy as np
 import pytest
 
-from refgi.compare.page.album import Judge, Picture, View, album
-from refgi.compare.page.floats import COARSEST, FIRST, SECOND, THIRD, Store
+from refgi.compare.album import (
+    COARSEST,
+    FIRST,
+    SECOND,
+    THIRD,
+    Judge,
+    Picture,
+    Store,
+    SurfaceFit,
+    View,
+    album,
+    block_means,
+    follows,
+    halves,
+    packed,
+)
 from refgi.compare.pictures import luminance
-from tests.compare.page.test_floats import unpacked
+from refgi.errors import InputError
+
+HALF = 2.0**-11  # relative rounding of a half float
+
+
+def unpacked(text, channels, height, width):
+    """The 16 bits of each pixel: high bytes, low bytes; sums along rows; the second channel added to the others."""
+    content = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8).astype(np.int64)
+    count = channels * height * width
+    steps = (256 * content[:count] + content[count:]).reshape(channels, height, width)
+    bits = np.cumsum(steps, axis=2) % 65536
+    for channel in range(channels):
+        if channels > 1 and channel != 1:
+            bits[channel] = (bits[channel] + bits[1]) % 65536
+    return bits.astype(np.uint16)
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3])
+def test_packed_bits_are_found_again(channels):
+    bits = np.random.default_rng(1).integers(0, 65536, (channels, 5, 7)).astype(np.uint16)
+    before = bits.copy()
+    assert np.array_equal(unpacked(packed(bits), channels, 5, 7), bits)
+    assert np.array_equal(bits, before)
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-3, 1.0, 3e4, 1e9])
+def test_numbers_of_any_size_keep_eleven_bits(scale):
+    planes = scale * np.random.default_rng(2).uniform(1e-6, 1.0, (3, 6, 4)) * np.array([1, -1, 1])[:, None, None]
+    bits, exponent = halves(planes)
+    found = bits.view(np.float16).astype(np.float64) * 2.0**exponent
+    assert np.abs(found / planes - 1).max() <= HALF
+
+
+def test_the_largest_number_never_overflows():
+    for largest in (65504.0, 65536.0, 1.0, np.nextafter(2.0, 0)):
+        bits, exponent = halves(np.array([[[largest, 0.0]]]))
+        found = bits.view(np.float16).astype(np.float64) * 2.0**exponent
+        assert found[0, 0] == pytest.approx([largest, 0.0], rel=HALF)
+
+
+def test_nan_and_infinity_stay():
+    bits, exponent = halves(np.array([[[np.nan, np.inf, -np.inf, 2.0]]]))
+    found = bits.view(np.float16)[0, 0]
+    assert np.isnan(found[0])
+    assert found[1:3].tolist() == [np.inf, -np.inf]
+    assert float(found[3]) * 2.0**exponent == 2.0
+    assert halves(np.full((1, 1, 1), np.nan))[1] == 0
+
+
+def test_noise_that_channels_share_is_stored_once():
+    rng = np.random.default_rng(3)
+    shared, own = 1 + 0.1 * rng.standard_normal((1, 64, 64)), 1 + 0.1 * rng.standard_normal((3, 64, 64))
+    light = np.array([1.0, 0.8, 0.5])[:, None, None]
+    assert len(packed(halves(light * shared)[0])) < 0.8 * len(packed(halves(light * own)[0]))
+
+
+def test_means_are_over_covered_pixels_of_each_block():
+    values = np.arange(15.0).reshape(1, 3, 5)
+    covered = np.ones((3, 5), bool)
+    covered[0, 1] = covered[2, 4] = False
+    expected = [[(0 + 5 + 6) / 3, (2 + 3 + 7 + 8) / 4, (4 + 9) / 2], [(10 + 11) / 2, (12 + 13) / 2, 0.0]]
+    assert block_means(values, covered, 1)[0] == pytest.approx(np.array(expected))
+    assert block_means(values, covered, 0) is values
+    assert block_means(values, covered, 3)[0] == pytest.approx(values[0][covered].mean())
+
+
+def test_ids_are_those_of_a_pixel_of_each_block():
+    store, ids = Store(), 70_000 + np.arange(15, dtype=np.uint32).reshape(3, 5)
+    store.add_ids(ids)
+    store.fit(len(store.texts()[0]) - 1)
+    assert store.facts() == [{"channels": 2, "exponent": 0, "level": 1}]
+    low, high = unpacked(store.texts()[0], 2, 2, 3).astype(int)
+    assert (low + 65536 * high - 70_000).tolist() == [[0, 2, 4], [10, 12, 14]]
+
 
 HEIGHT, WIDTH = 40, 50
 
@@ -140,3 +230,67 @@ def test_a_limit_that_cannot_be_met_ends_at_the_coarsest():
     store.add(light(1), np.ones((HEIGHT, WIDTH), bool), SECOND)
     store.fit(0)
     assert store.facts()[0]["level"] == COARSEST
+
+
+RNG = np.random.default_rng(5)
+EMITTED, ALBEDO = RNG.uniform(0, 3, (3, 4, 5)), RNG.uniform(0.05, 1, (3, 4, 5))
+SHOWN = RNG.uniform(0, 2, (4, 3, 4, 5)).astype(np.float32)
+
+
+def seen(irradiance):
+    return (EMITTED + ALBEDO / math.pi * irradiance).astype(np.float32)
+
+
+def solved(pictures):
+    fit = SurfaceFit(EMITTED.shape)
+    for picture in pictures:
+        fit.add(picture, seen(picture))
+    return fit.solve()
+
+
+def test_emission_and_reflectance_are_found():
+    emitted, reflectance = solved(SHOWN)
+    assert emitted == pytest.approx(EMITTED, rel=1e-4, abs=1e-4)
+    assert reflectance == pytest.approx(ALBEDO / math.pi, rel=1e-4, abs=1e-4)
+    assert all(follows(picture, seen(picture), (emitted, reflectance)) for picture in SHOWN)
+
+
+@pytest.mark.parametrize("pictures", [SHOWN[:1], [SHOWN[0], SHOWN[0]],
+                                      [SHOWN[0], SHOWN[0] * np.float32(1 + 2e-7)]])
+def test_pictures_that_agree_are_reproduced_whatever_the_reflectance(pictures):
+    surface = solved(pictures)
+    assert all(follows(picture, seen(picture), surface) for picture in pictures)
+    assert (surface[0] >= 0).all()
+    assert ((surface[1] >= 0) & (surface[1] <= 1 / math.pi)).all()
+
+
+def test_emission_is_never_negative_and_reflectance_no_more_than_that_of_white():
+    """Pictures that differ by rounding alone have any slope: here 0.3 and 3 where light itself allows 0.01 at most."""
+    fit = SurfaceFit((3, 1, 1))
+    for shift in (0.0, 1e-4):
+        irradiance = np.full((3, 1, 1), 1 + shift)
+        fit.add(irradiance, np.array([0.01 + 0.3 * shift, 0.01 + 3 * shift, 5 + 3 * shift]).reshape(3, 1, 1))
+    emitted, reflectance = (part.ravel() for part in fit.solve())
+    assert (emitted >= 0).all()
+    assert reflectance == pytest.approx([0.01, 0.01, 1 / math.pi], rel=0.02)
+    assert emitted + reflectance == pytest.approx([0.01, 0.01, 5], rel=0.02)
+
+
+def test_pixels_that_are_not_finite_do_not_count():
+    broken = SHOWN.copy()
+    broken[0, :, 1, 2] = np.nan
+    broken[1, 0, 0, 0] = np.inf
+    emitted, reflectance = solved(broken)
+    assert emitted == pytest.approx(EMITTED, rel=1e-3, abs=1e-3)
+    assert follows(broken[0], seen(broken[0]), (emitted, reflectance))
+
+
+def test_other_radiance_does_not_follow():
+    surface, other = solved(SHOWN), seen(SHOWN[0])
+    other[1, 2, 3] *= 1.01
+    assert not follows(SHOWN[0], other, surface)
+
+
+def test_pictures_of_other_sizes_are_refused():
+    with pytest.raises(InputError, match="shape"):
+        SurfaceFit((3, 4, 5)).add(np.zeros((3, 4, 4)), np.zeros((3, 4, 4)))

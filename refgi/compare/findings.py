@@ -42,10 +42,7 @@ class Seen(NamedTuple):
 
 
 def findings(irradiance: Array, mean: Array, variance: Array, covered: Array) -> tuple[Finding, ...]:
-    """Return what stands out in a picture's error: findings whose figure reaches its threshold.
-
-    Irradiance, the reference that it converges to and the variance of the reference's mean are (3, h, w), W/m^2.
-    """
+    """Return what stands out in irradiance, (3, h, w), W/m^2, against a reference's mean and its variance."""
     error = luminance(irradiance) - luminance(mean)
     counted = covered & np.isfinite(error)
     seen = Seen(np.where(counted, error, 0.0), np.where(counted, luminance(mean), 0.0),
@@ -75,10 +72,7 @@ def streaks(seen: Seen) -> Iterator[Finding]:
 
 
 def spikes(seen: Seen) -> Iterator[Finding]:
-    """Yield how many pixels in 10,000 are far too bright and alone.
-
-    Their error is several times the second largest around them, and more than the reference itself and its noise.
-    """
+    """Yield how many pixels in 10,000 are far too bright and alone: several times the errors around them."""
     height, width = seen.error.shape
     wide = np.pad(np.abs(seen.error), 1)
     around = [wide[1 + y:1 + y + height, 1 + x:1 + x + width] for y in (-1, 0, 1) for x in (-1, 0, 1) if x or y]
@@ -90,10 +84,7 @@ def spikes(seen: Seen) -> Iterator[Finding]:
 
 
 def blocks(seen: Seen) -> Iterator[Finding]:
-    """Yield how much larger steps of the error are between blocks than inside them, along x and y alike.
-
-    Of the block size with the largest steps.
-    """
+    """Yield how much larger the error's steps are between blocks than inside, of the size where they are largest."""
     size, figure = max(((period, min(_step_ratio(seen, period), _step_ratio(_turned(seen), period)))
                         for period in PERIODS), key=lambda pair: pair[1])
     yield Finding(f"blocks of {size} x {size}", figure, BLOCKS, "steps of the error between blocks over those inside")
@@ -143,3 +134,44 @@ def _step_ratio(seen: Seen, period: int) -> float:
 
 def _turned(seen: Seen) -> Seen:
     return Seen(*(plane.T for plane in seen))
+
+
+PLACES = 3
+SHARE_OF_SIDE = 8  # a square is an eighth of the shorter side
+LEAST_SIDE = 8  # pixels
+NEGLIGIBLE = 1e-9  # of the whole: what rounding leaves in sums over windows without error
+
+
+class Crop(NamedTuple):
+    """A square of a picture, in pixels from the upper left corner."""
+
+    x: int
+    y: int
+    side: int
+    share: float  # of the squared error of the whole picture
+
+
+def worst_crops(error: Array, covered: Array) -> tuple[Crop, ...]:
+    """Return up to `PLACES` squares with the most squared error, worst first, none over another; NaN counts most."""
+    squares = _squares(error, covered)
+    side = min(*error.shape, max(LEAST_SIDE, min(error.shape) // SHARE_OF_SIDE))
+    sums, whole = _window_sums(squares, side), float(squares.sum())
+    found: list[Crop] = []
+    while len(found) < PLACES and sums.max() > NEGLIGIBLE * whole:
+        y, x = (int(i) for i in np.unravel_index(np.argmax(sums), sums.shape))
+        found.append(Crop(x, y, side, float(sums[y, x]) / whole))
+        sums[max(0, y - side + 1):y + side, max(0, x - side + 1):x + side] = 0  # windows over this one
+    return tuple(found)
+
+
+def _squares(error: Array, covered: Array) -> Array:
+    finite = np.isfinite(error) & covered
+    squares = np.where(finite, np.where(finite, error, 0.0).astype(np.float64) ** 2, 0.0)
+    squares[covered & ~finite] = squares.max(initial=0.0) or 1.0
+    return squares
+
+
+def _window_sums(values: Array, side: int) -> Array:
+    sums = np.pad(values, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
+    windows: Array = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
+    return windows

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from refgi.compare.pages import TIMES
 from refgi.compare.pictures import luminance
-from refgi.compare.report import TIMES, page
+from refgi.compare.report import page
 from refgi.image import tone_map
+from tests.compare.browser import clicked
 from tests.compare.conftest import make_comparison, make_scene
-from tests.compare.page.browser import clicked
 
 HALF = 2.0**-11  # rounding of a half float
 DIGITS = 5e-4  # of the four that the page writes

@@ -1,4 +1,7 @@
-"""Plots as SVG that lives inside a page and takes its colours: run time against error, and curves over an axis."""
+"""What all pages share: template, style and script, numbers in print, plots that take the page's colours.
+
+A page is one file that works from disk and refers to nothing outside itself; a plot is an ``<svg>`` element inside it.
+"""
 
 import hashlib
 import html
@@ -6,16 +9,80 @@ import io
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from refgi.errors import shortened
 
+PAGE = Path(__file__).with_name("page")
+SCRIPTS = ("floats", "scene", "paint", "panels", "input", "viewer", "page")  # each after what it builds on
+MINUS, DASH, TIMES = "\N{MINUS SIGN}", "\N{EN DASH}", "\N{MULTIPLICATION SIGN}"
 INK, LINE, CARD = "#010203", "#010204", "#010205"  # stand-ins, replaced by the page's own colours
 METHOD_COLOURS = [f"#0102{16 + i:02x}" for i in range(7)]
 MARKERS = "os^DvpX"
 LONGEST_NAME = 60  # characters in a legend
 MARK = "mark:"  # what stands before a name that a mark leads to, until the plot is whole
 MOST_MARKED = 64  # points of a curve that are marked; more would hide it
+
+
+def page_of(template: str, environment: Mapping[str, Any], *folders: Path, **parts: Any) -> str:
+    """Return a page by a template of this package or of `folders`: all escaped, nothing left out in silence.
+
+    `environment`: what its results were made on. Parts that a page lacks are empty; style and script may be others.
+    """
+    import jinja2
+
+    loader = jinja2.FileSystemLoader([*folders, PAGE])
+    made = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True,
+                              undefined=jinja2.StrictUndefined)
+    script = "\n".join((PAGE / f"{name}.js").read_text("utf-8") for name in SCRIPTS)
+    common = {"style": markup((PAGE / "style.css").read_text("utf-8")), "script": markup(script), "lead": "",
+              "facts": [], "verdict": "", "failures": [], "versions": environment["versions"],
+              "machine": machine(environment)}
+    return made.get_template(template).render(common | parts)
+
+
+def markup(text: str) -> Any:
+    """Return text that is HTML already, which a template takes as it is."""
+    from markupsafe import Markup
+
+    return Markup(text)
+
+
+def number(value: float) -> str:
+    r"""Write a figure with three significant digits, a dash for nan.
+
+    >>> [ascii(number(value)) for value in (0.0123456, -1234.5, 2.5e-7)]
+    ["'0.0123'", "'\\u22121230'", "'2.5e\\u22127'"]
+    """
+    if math.isnan(value):
+        return DASH
+    if math.isinf(value):
+        return "∞" if value > 0 else f"{MINUS}∞"
+    if value == 0:
+        return "0"
+    if not 1e-4 <= abs(value) < 1e6:
+        mantissa, _, exponent = f"{value:.2e}".partition("e")
+        return f"{float(mantissa):g}e{int(exponent)}".replace("-", MINUS)
+    rounded = float(f"{value:.3g}")
+    return f"{rounded:.10f}".rstrip("0").rstrip(".").replace("-", MINUS)
+
+
+def sort_key(value: float | None) -> str:
+    """Return what a table sorts a number by, all its digits; nothing where it is not known, which stands last."""
+    return "" if value is None or math.isnan(value) else repr(float(value)).replace("inf", "Infinity")
+
+
+def machine(environment: Mapping[str, Any]) -> str:
+    """Return what a result was made on, in a line: platform, processor, threads."""
+    return f"{environment['platform']}, {environment['cpu']}, {environment['threads']} threads"
+
+
+def require_environment(environment: Mapping[str, Any]) -> None:
+    """Refuse (ValueError) what a result was made on where it is not all that a page needs."""
+    missing = [key for key in ("platform", "cpu", "threads", "versions") if key not in environment]
+    if missing or not isinstance(environment["versions"], dict) or "refgi" not in environment["versions"]:
+        raise ValueError(f"environment: expected {', '.join(missing) or 'versions, that of refgi among them'}")
 
 
 class Point(NamedTuple):
@@ -50,20 +117,14 @@ class Axes(NamedTuple):
 
 
 def time_against_error(points: list[Point], noise: float, error_name: str = "relMSE") -> str:
-    """Draw methods by run time and error, both logarithmic, and the truth's noise as a dashed line where positive.
-
-    As `figure_svg`; points whose time or error is not a positive finite number are left out.
-    """
+    """Draw methods by run time and error, both logarithmic, and the truth's noise as a dashed line where positive."""
     axes = Axes("run time, s", f"{error_name} of indirect irradiance", log_x=True, log_y=True)
     shown = [p for p in points if _drawable(p.seconds, p.error, axes)]
     return _svg(lambda plot: _draw_points(plot, shown, noise), axes, 7.6, "Run time against error")
 
 
 def curves_plot(curves: Sequence[Curve], axes: Axes) -> str:
-    """Draw curves with a legend beside them, as `figure_svg`.
-
-    Points that are not finite, or not positive on a logarithmic axis, are left out.
-    """
+    """Draw curves with a legend beside them, without points that an axis cannot show."""
     svg = _svg(lambda plot: _draw_curves(plot, curves, axes), axes, 9.2, f"{axes.y} over {axes.x}")
     return _linked(svg, dict(link for curve in curves for link in curve.links))
 

@@ -1,22 +1,21 @@
-"""`refgi explain --measure`: tables of skips, data, exit codes."""
+"""`refgi explain`: what runs, is reused and skipped; with --measure tables of skips, data, exit codes."""
 
 import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from refgi.bench.skips import MeasuredSkip, SkipReport, Unmeasured
-from refgi.bench.trades import DimLights, Trade
+from refgi.bench.skips import DimLights, MeasuredSkip, SkipReport, Trade, Unmeasured
+from refgi.cli import view
 from refgi.cli.explain import measured_text
-from refgi.cli.group import VerbGroup
 from refgi.pairs import irradiance as pairs
+from tests.cli.command import TINY, invoke
 
 SMALL = ("--rsm-resolution", "64", "--threads", "1", "--rounds", "2")
 
 
 def run(*arguments, size="24x18"):
-    return CliRunner().invoke(VerbGroup.refgi(), ["explain", *arguments, "--size", size, *SMALL])
+    return invoke("explain", *arguments, "--size", size, *SMALL)
 
 
 def skip(name="pairs.pixels", *, same_bits=True):
@@ -98,5 +97,64 @@ def test_a_wrong_skip_is_exit_code_1(monkeypatch):
 
 @pytest.mark.parametrize("rounds", ["0", "x"])
 def test_rounds_are_whole_numbers_from_1_on(rounds):
-    done = CliRunner().invoke(VerbGroup.refgi(), ["explain", "wedge", "--measure", "--rounds", rounds])
+    done = invoke("explain", "wedge", "--measure", "--rounds", rounds)
     assert done.exit_code == 2
+
+
+@pytest.fixture(scope="module")
+def explained():
+    """The same as JSON values and as text."""
+    options = ("explain", "cornell_box", *TINY, "--set", "lights=16")
+    return json.loads(invoke(*options, "--json").stdout), invoke(*options).stdout
+
+
+def test_explain_shows_the_four_rows_of_table_1(explained, evidence):
+    """SII Table 1: what stays the same is reused."""
+    rows = explained[0]["animation"]
+    assert {word.split(" x")[0] for word in rows["light and camera still"].values()} <= {"reused", "skipped"}
+    assert rows["light and camera still"]["pairs.sum"] == "reused"
+    assert rows["camera moves"]["rsm.reflective_shadow_map"] == "reused"
+    assert rows["camera moves"]["pairs.sum"] == "runs"
+    assert rows["light moves"]["rsm.gbuffer"] == "reused"
+    assert rows["light moves"]["rsm.reflective_shadow_map"] == "runs"
+    assert {rows["light and camera move"][stage] for stage in ("rsm.gbuffer", "rsm.reflective_shadow_map")} == {"runs"}
+    evidence("; ".join(f"{row}: {sum(v == 'reused' for v in stages.values())} stages reused"
+                       for row, stages in rows.items()))
+
+
+def test_explain_says_what_is_skipped_and_why(explained):
+    told, text = explained
+    skipped = [line for line in told["stages"] if line["skipped"]]
+    assert skipped
+    assert all(line["reason"] for line in skipped)
+    assert skipped[0]["reason"] in text
+    assert "SII Table 1" in text
+
+
+def test_explain_warns_of_the_frame_asked_for_alone(tmp_path):
+    """The camera and light that it moves take other shares of the light by the gathering radius."""
+    options = ["cornell_box", "--size", "16x12", "--rsm-resolution", "64", "--method", "gather"]
+    result = invoke("explain", *options, "--json")
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["ledger"] is None
+    rendered = invoke("render", *options, "--out", tmp_path / "a.exr")
+    assert "takes" in rendered.stderr
+    assert result.stderr == rendered.stderr
+
+
+def test_explain_refuses_maps_that_do_not_fit(monkeypatch):
+    monkeypatch.setattr(view, "available_bytes", lambda: 10**9)
+    told = invoke("explain", "cornell_box", *TINY, "--method", "val", "--set", "maps.resolution=4096")
+    assert told.exit_code == 2
+    assert "for the settings of val" in told.stderr
+
+
+@pytest.mark.feature("REF-04")
+def test_explain_tells_where_the_power_goes(explained, evidence):
+    ledger, text = explained[0]["ledger"], explained[1]
+    parts = np.sum([ledger["rows"][name] for name in ledger["parts"]], axis=0)
+    assert parts == pytest.approx(ledger["rows"]["emitted"], rel=1e-5)
+    table = text[text.index("Where the power of the lights goes"):]
+    for name in ("emitted", "reflected", "clamped", "cut", "behind", "off screen", "difference"):
+        assert name in table
+    evidence(f"sii on the Cornell box: {len(ledger['parts'])} lines sum to what is emitted to 1e-5")

@@ -39,8 +39,7 @@ def clusters(vertices: Array, faces: Array, bounds: tuple[Array, Array], holed: 
     bits = min(max(math.ceil(math.log2(max(number, 1)) / 2 - 2), 1), MOST_BITS)  # some triangles share a cell
     low, high = bounds
     side = float((high - low).max())
-    places = np.empty(number, np.int64)
-    _place_on_curve(vertices, faces, low, (1 << bits) / side if side > 0 else 0.0, bits, places)
+    places = _places_on_curve(vertices[faces[:, 0]] - low, (1 << bits) / side if side > 0 else 0.0, bits)
     if holed is not None:
         places = np.delete(places, holed)
     places.sort()
@@ -52,27 +51,25 @@ def clusters(vertices: Array, faces: Array, bounds: tuple[Array, Array], holed: 
     _find_vertices(faces, places, face, corner, used, start)
     np.cumsum(start, out=start)
     vertex = np.zeros((3, start[-1] + SPARE))
-    _copy_vertices(vertices, used, start, vertex, box)
+    vertex[:, : start[-1]] = vertices[used[np.arange(used.shape[1]) < np.diff(start)[:, None]]].T
+    if count:
+        box[:, :3] = np.minimum.reduceat(vertex[:, : start[-1]], start[:-1], axis=1).T
+        box[:, 3:] = np.maximum.reduceat(vertex[:, : start[-1]], start[:-1], axis=1).T
     plane, product = np.empty((4, number), np.float32), np.empty(count)
     _find_planes(corner, start, vertex, box, plane, product)
     return Clusters(face, corner, start, vertex, box, plane, product)
 
 
-@kernel(parallel=True)
-def _place_on_curve(vertices: Array, faces: Array, low: Array, scale: float, bits: int, places: Array) -> None:
-    """Write the place of each triangle on the curve above its number."""
-    most = np.int64((1 << bits) - 1)
-    for face in prange(len(faces)):
-        place = np.int64(0)
-        for axis in range(3):
-            cell = min(np.int64((vertices[faces[face, 0], axis] - low[axis]) * scale), most)
-            # two zeros before each bit
-            cell = (cell | (cell << 16)) & 0x30000FF
-            cell = (cell | (cell << 8)) & 0x300F00F
-            cell = (cell | (cell << 4)) & 0x30C30C3
-            cell = (cell | (cell << 2)) & 0x9249249
-            place |= cell << axis
-        places[face] = (place << 32) | np.int64(face)
+def _places_on_curve(corner: Array, scale: float, bits: int) -> Array:
+    """Return the place of each triangle on the curve, by a corner's (m, 3) distance from the least one, and its number.
+
+    The number is in the lower half, (m,) int64.
+    """
+    cells = np.minimum((corner * scale).astype(np.int64), (1 << bits) - 1)
+    for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):  # two zeros before each bit
+        cells = (cells | (cells << shift)) & mask
+    place = cells[:, 0] | cells[:, 1] << 1 | cells[:, 2] << 2
+    return np.asarray(place << 32 | np.arange(len(place)))
 
 
 @kernel(parallel=True)
@@ -94,19 +91,6 @@ def _find_vertices(faces: Array, places: Array, face: Array, corner: Array, used
                 table[entry] = slot
                 corner[place, c] = slot
         start[cluster + 1] = known
-
-
-@kernel(parallel=True)
-def _copy_vertices(vertices: Array, used: Array, start: Array, vertex: Array, box: Array) -> None:
-    for cluster in prange(len(box)):
-        for axis in range(3):
-            box[cluster, axis], box[cluster, 3 + axis] = np.inf, -np.inf
-        for slot in range(start[cluster + 1] - start[cluster]):
-            for axis in range(3):
-                value = vertices[used[cluster, slot], axis]
-                vertex[axis, start[cluster] + slot] = value
-                box[cluster, axis] = min(box[cluster, axis], value)
-                box[cluster, 3 + axis] = max(box[cluster, 3 + axis], value)
 
 
 @kernel(parallel=True)

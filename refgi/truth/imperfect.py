@@ -71,13 +71,7 @@ class ImperfectDepth(NamedTuple):
     bias: float  # in what a receiver's own surface may differ by within a box or a texel
 
 
-def _steps(*arguments: Any, **named: Any) -> dict[str, Array] | None:
-    from refgi.truth.map_steps import map_steps
-
-    return map_steps(*arguments, **named)
-
-
-@stage("vpl.imperfect_maps", steps=_steps)
+@stage("vpl.imperfect_maps", steps="refgi.truth.map_steps.map_steps")
 def imperfect_maps(geometry: Geometry, lights: "PixelLights", settings: Imperfect, seed: int = 0) -> ImperfectDepth:
     """Draw the map of each pixel light.
 

@@ -1,6 +1,7 @@
 """Imperfect shadow maps one step after the other: points of each light's map, their splats, filled holes, look-up."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -164,7 +165,7 @@ def map_steps(
 
 def light_steps(
     geometry: Geometry, position: Array, normal: Array, triangle_id: Array, lights: PixelLights,
-    maps: ImperfectDepth | None, visibility: bool,
+    maps: ImperfectDepth | None, visibility: bool, *_: Any,
 ) -> Array:
     """Return the irradiance of pixel lights at pixels, made by steps."""
     seen = None

@@ -107,13 +107,7 @@ def trace_lobes(frame: "Frame", settings: TruthSettings | None = None) -> TruthR
                             settings or TruthSettings())
 
 
-def _steps(*arguments: Any, **named: Any) -> dict[str, Array]:
-    from refgi.truth.path_steps import truth_steps
-
-    return truth_steps(*arguments, **named)
-
-
-@stage("truth.accumulate", steps=_steps)
+@stage("truth.accumulate", steps="refgi.truth.path_steps.truth_steps")
 def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
                settings: TruthSettings) -> TruthResult:
     """Average independent passes over a G-buffer until the settings say stop.

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import thread_count
-from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, resolve_at, resolve_materials, tint
+from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, tint
 from refgi.rsm.buffers.facing import facing_normals
 from refgi.rsm.buffers.surfaces import Surface
 from refgi.rsm.buffers.textures import paint
@@ -21,7 +21,7 @@ from refgi.stages import stage
 from refgi.types import Array
 
 MANY = 8  # as soon as one texel in so many is asked for, all are computed
-OF_MATERIALS = {"albedo", "material_id"}  # channels that need no geometry but the triangle
+NO_TEXELS = np.zeros(0, np.int64)
 
 
 class GBuffer:
@@ -180,7 +180,8 @@ class GBuffer:
             planes = _planes(missing, (1, len(texel)), self.dtype)
             surface = _surface(self._geometry, self._materials, self.dtype)
             channels = ChannelMask(*(name in missing for name in ChannelMask._fields))
-            resolve_at(surface, self.projection, self.visibility.triangle_id, texel, channels, planes, allocate(1, 1))
+            resolve(surface, self.projection, self.visibility.triangle_id, texel, True, channels, planes,
+                    allocate(1, 1))
             paint(self._geometry, self._materials, self.projection, self.visibility.triangle_id, planes.albedo, texel)
             tint(self._geometry, self.projection, self.visibility.triangle_id, planes.albedo, texel)
             computed = {name: getattr(planes, name)[..., 0, :] for name in missing}
@@ -238,10 +239,7 @@ def _resolve(
     planes = _planes(names, triangle_id.shape, dtype)
     channels = ChannelMask(*(name in names for name in ChannelMask._fields))
     surface = _surface(geometry, materials, dtype)
-    if set(names) <= OF_MATERIALS:
-        resolve_materials(surface, triangle_id, planes.albedo, planes.material_id)
-    else:
-        resolve(surface, projection, triangle_id, channels, planes, allocate(thread_count()))
+    resolve(surface, projection, triangle_id, NO_TEXELS, False, channels, planes, allocate(thread_count()))
     paint(geometry, materials, projection, triangle_id, planes.albedo)
     tint(geometry, projection, triangle_id, planes.albedo)
     return {name: getattr(planes, name) for name in names}
@@ -258,6 +256,5 @@ def _planes(names: tuple[str, ...], shape: tuple[int, ...], dtype: np.dtype[Any]
 
 
 def _surface(geometry: Geometry, materials: MaterialTable, dtype: np.dtype[Any]) -> Surface:
-    normals = np.zeros((0, 3)) if geometry.vertex_normals is None else geometry.vertex_normals
-    return Surface(geometry.vertices, geometry.faces, normals, geometry.material_of_face,
+    return Surface(geometry.vertices, geometry.faces, geometry.vertex_normals, geometry.material_of_face,
                    materials.diffuse.astype(dtype, copy=False))  # fmt: skip

@@ -191,8 +191,8 @@ def _draw_clusters(
 ) -> None:
     """Draw one map in bands of rows, each from the clusters that reach it, the nearest first."""
     clusters, (height, width) = geometry.clusters, projection.shape
-    placed, starts = place(projection, clusters), np.zeros(-(-height // rows) + 1, np.int64)
-    members = list_clusters(placed.rect, np.argsort(-placed.nearest, kind="stable"), rows, starts)
+    placed = place(projection, clusters)
+    starts, members = list_clusters(placed.rect, np.argsort(-placed.nearest, kind="stable"), rows, -(-height // rows))
     lists, passed = ClusterLists(starts, members, rows), np.zeros(len(starts) - 1, np.int64)
     keys = plane((thread_count(), rows * (width + LANES)), np.int64)
 

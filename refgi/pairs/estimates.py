@@ -57,7 +57,7 @@ def sample_pixels(receivers: Receivers, count: int) -> Sample:
     are fewer.
     """
     covered = np.asarray(receivers.covered, np.bool_)
-    shown = np.count_nonzero(covered)
+    shown = int(np.count_nonzero(covered))
     count = min(count, shown)
     ends = np.arange(count + 1) * shown // max(1, count)
     nth = ends[:-1] + (_van_der_corput(count) * np.diff(ends)).astype(np.int64)

@@ -78,7 +78,7 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     return irradiance
 
 
-@stage("vpl.light", kept=False, steps="refgi.truth.map_steps.light_steps")
+@stage("vpl.light", kept=False, steps="refgi.truth.steps.light_steps")
 def light_of_pixel_lights(
     geometry: Geometry, position: Array, normal: Array, triangle_id: Array, lights: "PixelLights",
     maps: ImperfectDepth | None, visibility: bool, tracer: Tracer, batch: int = BATCH,

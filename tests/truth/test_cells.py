@@ -16,7 +16,7 @@ from refgi.truth.cell_pass import beside_of
 from refgi.truth.cell_rays import pick_cells, picks_for
 from refgi.truth.cell_walk import cell_at, fill_tops, found_up
 from refgi.truth.light_grid import fill_rays, light_squares, place_of
-from refgi.truth.lobe_receivers import glossy_triangles
+from refgi.truth.lobe_cells import glossy_triangles
 from refgi.truth.passes import one_pass
 from refgi.truth.truth import _guided, _with_lobes, task_of
 from tests.truth.scenes import rectangle

@@ -6,7 +6,7 @@ t = v0 . N / (d . N), and t is the depth itself. Positions therefore lie on the 
 rounding, before the cast to the buffer's type. `surfaces` has how normals are interpolated.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -120,7 +120,8 @@ def resolve(
     shaped = channels.depth | channels.distance | channels.position | channels.normal
     for worker in prange(workers):
         runs, records, line = _runs_of(scratch, worker), _records_of(scratch, worker), scratch.line[worker]
-        strip, left = worker, np.int64(0)  # no literal, for which callees would be compiled again
+        strip = worker
+        left: Any = np.int64(0)  # no literal, for which callees would be compiled again
         while left < len(texel) if listed else strip < strips * len(projection.origin):
             if listed:
                 m, columns = _list_runs(projection, triangle_id, texel, left, runs, records, line)

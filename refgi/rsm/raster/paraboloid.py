@@ -24,8 +24,8 @@ from refgi.rsm.raster.paraboloid_chunks import ANY, KINDS, next_batch
 from refgi.rsm.raster.paraboloid_texels import Scratch, draw_rows, draw_texels, scratch
 from refgi.rsm.raster.projection import Projection, paraboloid_projection
 from refgi.rsm.raster.triangle import CHUNK, LANES, Chunks, chunks
-from refgi.scene.cutouts import CutFaces
 from refgi.scene.model import Geometry
+from refgi.scene.triangles import CutFaces
 from refgi.stages import stage
 from refgi.types import Array
 

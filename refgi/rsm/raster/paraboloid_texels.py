@@ -27,8 +27,8 @@ from refgi.rsm.raster.paraboloid_batch import (
 )
 from refgi.rsm.raster.paraboloid_chunks import KINDS
 from refgi.rsm.raster.triangle import CHUNK, LANES, SPAN_CUT
-from refgi.scene.cutouts import CutFaces
 from refgi.scene.texture.lookup import is_opaque, lent
+from refgi.scene.triangles import CutFaces
 from refgi.types import Array
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from refgi.jit import kernel, prange
 from refgi.rsm.raster.batch import EMPTY, key_of
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, view_coordinates
-from refgi.scene.clusters import Clusters
+from refgi.scene.triangles import Clusters
 from refgi.types import Array
 
 SLACK = 1e-3  # share by which a sound triangle's nearness may exceed its nearest corner's

@@ -19,9 +19,8 @@ from refgi.rsm.raster.paraboloid import cut_chunks, draw_paraboloids
 from refgi.rsm.raster.placed_clusters import Placed, list_clusters, place
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.rsm.raster.triangle import LANES, bound_triangles, project_vertices
-from refgi.scene.clusters import Clusters
-from refgi.scene.cutouts import CutFaces
 from refgi.scene.model import Geometry
+from refgi.scene.triangles import Clusters, CutFaces
 from refgi.skips import left_out
 from refgi.stages import stage
 from refgi.types import Array

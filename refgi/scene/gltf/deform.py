@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from refgi.errors import expect
-from refgi.scene.gltf.accessors import accessor
-from refgi.scene.gltf.container import Document
+from refgi.scene.gltf.container import Document, accessor
 from refgi.scene.gltf.nodes import Nodes, all_nodes
 from refgi.scene.mesh import as_float64
 from refgi.types import Array

@@ -12,7 +12,7 @@ from refgi.rsm.raster.placed_clusters import SLACK, place
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, camera_projection, directional_projection, view_frame
 from refgi.rsm.raster.visibility_buffer import Visibility, rasterize, scratch
 from refgi.scene import Camera, DirectionalLight
-from refgi.scene.clusters import CLUSTER
+from refgi.scene.triangles import CLUSTER
 from refgi.skips import count_skips, without_skip
 from tests.rsm.shapes import geometry, height_field, rotation, sheet, soup, sphere
 

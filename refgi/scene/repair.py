@@ -78,20 +78,14 @@ def repaired(mesh: Mesh, where: str) -> tuple[Mesh, int]:
 
 
 def warn_of_flat_faces(count: int, where: str) -> None:
-    """Say how many zero-area faces were passed over, if any.
-
-    `where`: the scene or file they came from.
-    """
+    """Say how many zero-area faces were passed over, if any; `where`: the scene or file they came from."""
     if count:
         noun = "face" if count == 1 else "faces"
         warnings.warn(RefgiWarning(f"{where}: {count} {noun} of zero area skipped"), stacklevel=3)
 
 
 def warn_of_unit(geometry: Geometry, where: str) -> None:
-    """Say that a file's unit may not be the metre, if its size is no usual one.
-
-    `where`: the file they came from.
-    """
+    """Say that a file's unit may not be the metre, if its size is no usual one; `where`: the file they came from."""
     if not SMALLEST_USUAL <= geometry.diagonal <= LARGEST_USUAL:
         text = (f"{where}: {geometry.diagonal:.3g} m across; lengths are taken as metres. If the file has another unit "
                 "of s metres, scale its objects in a scene file: \"transform\": "

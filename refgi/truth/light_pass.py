@@ -49,10 +49,7 @@ def aim_at_eye(view: Projection, offset: float, y: tuple[float, float, float], g
 
 
 def visible_vertices(tracer: Tracer, view: Projection, points: LightVertices) -> LightVertices:
-    """Return the light vertices that are visible to a camera.
-
-    Result: the visible ones, in their order.
-    """
+    """Return the light vertices that are visible to a camera, in their order."""
     count = len(points.power)
     origins, directions = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
     reach, blocked = np.empty(count, np.float32), np.empty(count, np.bool_)
@@ -124,10 +121,7 @@ def add_light_side(task: Task, words: Array, sums: Array) -> None:
 
 
 def fresh_points(task: Task, random: np.random.Generator) -> PointSets:
-    """Trace fresh rays from every light to light vertices.
-
-    `random`: places the rays in their cells.
-    """
+    """Trace fresh rays from every light to light vertices; `random`: places the rays in their cells."""
     n, side = task.settings.light_grid, task.settings.interleave
     count = len(task.scene.lights)
     squares = [stratified_sets(n, side, random) for _ in range(count)]

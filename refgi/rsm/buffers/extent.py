@@ -73,10 +73,7 @@ def illuminated_extent(rsms: Sequence[Rsm]) -> Extent:
 
 
 def joined(one: Extent, other: Extent) -> Extent:
-    """Return the box around two.
-
-    Result: the smallest that holds both.
-    """
+    """Return the smallest box that holds two."""
     return Extent(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
 
 

@@ -136,10 +136,7 @@ def clear_outside_disc(projection: Projection, nearness: Array, ids: Array) -> N
 
 @kernel
 def to_distance(projection: Projection, keys: Array, distance: Array) -> float:
-    """Write distances of a map from its keys, inf where there is no surface and outside the disc.
-
-    Result: the smallest.
-    """
+    """Write distances of a map from its keys, inf where there is no surface and outside the disc."""
     n, half, least = projection.width, projection.half[0], np.inf
     step, real, nearness = 2.0 * half / n, distance.dtype.type, keys.view(np.float64)
     for row in range(n):

@@ -44,10 +44,7 @@ def stage(faces: int = 6_328) -> Scene:
 
 
 def vase(faces: int) -> Mesh:
-    """Return a thin-walled vase standing on y = 0.
-
-    Result: watertight, with smooth outward normals.
-    """
+    """Return a thin-walled vase standing on y = 0; watertight, with smooth outward normals."""
     rows = max(8, round(math.sqrt(faces / 2)))
     columns = max(3, round(faces / (2 * (rows - 1))))
     turned = lathe(_smoothed(VASE, rows + 1), columns, GLAZE, "vase")

@@ -27,10 +27,7 @@ class Pose(NamedTuple):
 
 
 def pose_of(document: Document, node: dict[str, Any], where: str) -> Pose:
-    """Return the pose of a node's mesh.
-
-    Raises `InputError` if a key is not usable.
-    """
+    """Return the pose of a node's mesh; raises `InputError` if a key is not usable."""
     mesh = document.item("meshes", node["mesh"], f"{where}.mesh")
     owner, place = (node, where) if "weights" in node else (mesh, f"meshes[{node['mesh']}]")
     weights = document.all_numbers(owner, "weights", place)

@@ -19,8 +19,7 @@ from refgi.errors import expect
 from refgi.jit import kernel, prange, thread_count
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.batch import EMPTY, unpack
-from refgi.rsm.raster.paraboloid_batch import gather, orient, transform
-from refgi.rsm.raster.paraboloid_chunks import ANY, KINDS, next_batch
+from refgi.rsm.raster.paraboloid_batch import ANY, KINDS, gather, next_batch, orient, transform
 from refgi.rsm.raster.paraboloid_texels import Scratch, draw_rows, draw_texels, scratch
 from refgi.rsm.raster.projection import Projection, paraboloid_projection
 from refgi.rsm.raster.triangle import CHUNK, LANES, Chunks, chunks

@@ -17,6 +17,7 @@ from refgi.rsm.raster.paraboloid_batch import (
     BEHIND,
     BETWEEN_TEXELS,
     BOX,
+    KINDS,
     LIMIT,
     NEAR,
     NEARNESS,
@@ -25,7 +26,6 @@ from refgi.rsm.raster.paraboloid_batch import (
     STATE,
     bound_across,
 )
-from refgi.rsm.raster.paraboloid_chunks import KINDS
 from refgi.rsm.raster.triangle import CHUNK, LANES, SPAN_CUT
 from refgi.scene.texture.lookup import is_opaque, lent
 from refgi.scene.triangles import CutFaces

@@ -108,7 +108,8 @@ def test_direct_light_is_exact_up_to_the_edge_of_the_cone(real, limit, degrees):
     points = np.stack([np.array(light.position) + d / np.linalg.norm(d) for d in directions]).astype(real)
     normal = np.broadcast_to(np.array([0, 1, 0], real)[:, None, None], (3, 1, len(points))).copy()
     out = np.empty((3, 1, len(points)), real)
-    _spot_irradiance(table, np.ascontiguousarray(points.T[:, None]), normal, np.ones((1, len(points)), bool), NO_SHADOW, out)
+    _spot_irradiance(table, np.ascontiguousarray(points.T[:, None]), normal, np.ones((1, len(points)), bool),
+                     NO_SHADOW, out)
     for point, got in zip(points, out[0, 0], strict=True):
         away = point.astype(float) - light.position
         share = float(exact_falloff(away, table.direction[0], light.inner_half_angle, light.outer_half_angle))

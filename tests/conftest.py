@@ -22,7 +22,7 @@ MAKES_THE_KIT = "tests/vectors/test_forms.py"
 QUICK = (
     "tests/settings", "tests/image", "tests/scene/test_scenefile", "tests/compare", "tests/provenance",
     "tests/test_stages.py", "tests/test_draws.py", "tests/test_errors.py", "tests/test_docstrings.py",
-    "tests/jit/test_kernel.py", "tests/jit/test_kernel.py", "tests/cli/test_settings.py", "tests/cli/test_render.py",
+    "tests/jit/test_kernel.py", "tests/cli/test_settings.py", "tests/cli/test_render.py",
     "tests/pairs/test_pair_sum.py", "tests/pairs/test_clamps.py", "tests/sssil/crown/test_pattern.py",
     "tests/cluster/clustering", "tests/lights/test_warp.py")
 

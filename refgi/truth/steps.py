@@ -9,6 +9,7 @@ import numpy as np
 
 from refgi.jit import kernel
 from refgi.pairs.pixel_lights import PixelLights
+from refgi.pairs.shadow_rays import BATCH
 from refgi.pairs.steps import facing, placed, shadow_rays, shadowed_sum, visible
 from refgi.rays import Tracer
 from refgi.sampling import FIRST_STEP, IMPERFECT_MAPS, SECOND_STEP, draws
@@ -172,7 +173,7 @@ def map_steps(
 
 def light_steps(
     geometry: Geometry, position: Array, normal: Array, triangle_id: Array, lights: PixelLights,
-    maps: ImperfectDepth | None, visibility: bool, tracer: Tracer, batch: int = 0,  # noqa: ARG001
+    maps: ImperfectDepth | None, visibility: bool, tracer: Tracer, batch: int = BATCH,  # noqa: ARG001
 ) -> Array:
     """Return the irradiance of pixel lights at pixels, made by steps."""
     seen = None

@@ -188,7 +188,7 @@ def _warn_of_backs(frame: "Frame") -> None:
     one_sided = [material.one_sided for material in frame.scene.materials]
     if not any(one_sided) or not is_due("rsm.backs"):
         return
-    from refgi.rsm.buffers.facing import share_of_backs
+    from refgi.rsm.buffers.gbuffer import share_of_backs
 
     scene = frame.scene
     share = share_of_backs(scene.geometry, np.array(one_sided), scene.camera.eye, frame.gbuffer.triangle_id)

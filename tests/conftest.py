@@ -21,8 +21,8 @@ MAKES_THE_KIT = "tests/vectors/test_forms.py"
 # what `make quick` runs: a minute with warm kernels
 QUICK = (
     "tests/settings", "tests/image", "tests/scene/test_scenefile", "tests/compare", "tests/provenance",
-    "tests/test_stages.py", "tests/test_draws.py", "tests/test_limits.py", "tests/test_docstrings.py",
-    "tests/jit/test_bands.py", "tests/jit/test_kernel.py", "tests/cli/test_settings.py", "tests/cli/test_render.py",
+    "tests/test_stages.py", "tests/test_draws.py", "tests/test_errors.py", "tests/test_docstrings.py",
+    "tests/jit/test_kernel.py", "tests/cli/test_settings.py", "tests/cli/test_render.py",
     "tests/pairs/test_pair_sum.py", "tests/pairs/test_clamps.py", "tests/sssil/test_pattern.py",
     "tests/cluster/test_kmeans.py", "tests/cluster/test_rectangle.py", "tests/lights/test_warp.py")
 

@@ -20,7 +20,7 @@ from refgi.vectors.bugfile import BugEntry, BugWriter, Told
 from refgi.vectors.check import Asked, Kit, check_output
 from tests.scene.samples import FACES, TRIANGLES
 from tests.scene.test_gltf_pose import File
-from tests.scene.test_ply_files import ply
+from tests.scene.test_ply import ply
 from tests.vectors.test_kit_safety import npy, write_kit
 
 RANDOM = np.random.default_rng(37)

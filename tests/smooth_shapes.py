@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from refgi.scene.builtin.metaballs import Balls, blob
+from refgi.scene.builtin.surfaces import Balls, blob
 from refgi.scene.mesh import Mesh
 from refgi.scene.model import Camera, Material, Scene, SpotLight, merge
 from tests.rsm.shapes import sphere

@@ -27,9 +27,9 @@ from refgi.truth.imperfect import Imperfect, imperfect_maps
 from refgi.truth.truth import trace_truth
 from tests.cluster.lights import area_lights
 from tests.cutouts import half_plate, heap, opaque, pierced
-from tests.ledger.test_ledger import WHOLE, balance
 from tests.naive import cutouts as naive
 from tests.naive.textures import barycentric
+from tests.test_ledger import WHOLE, balance
 from tests.truth.test_imperfect import _one_light
 
 # a method's settings, and how much a picture of the strip that is cut out may differ from that of its mesh, of the mean

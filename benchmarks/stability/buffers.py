@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.stability.promise import Case, Promise
 from refgi import Frame, load_scene
 from refgi.rsm import shadow_map_visibility
-from refgi.rsm.buffers.facing import facing_normals
+from refgi.rsm.buffers.gbuffer import facing_normals
 from refgi.scene import Camera, DirectionalLight, Geometry, Material, PointLight, Scene
 from refgi.stress.changes import mapped
 from refgi.types import Array

@@ -10,7 +10,7 @@ from PIL import Image
 
 from refgi import Frame, load_scene
 from refgi.compare.pictures import error_scale, luminance, paint
-from refgi.image.png import tone_map
+from refgi.image.picture import tone_map
 from refgi.methods import METHODS
 from refgi.settings import of
 

@@ -17,10 +17,7 @@ DIGITS = 60  # of decimal arithmetic, for what is computed once
 
 
 def sine_cosine_digits(angle: float) -> tuple[decimal.Decimal, decimal.Decimal]:
-    """Return sine and cosine, off by less than 1e-58.
-
-    `angle`: 0 to pi/2, rad; taken as the exact number it is.
-    """
+    """Return sine and cosine, off by less than 1e-58; `angle`: 0 to pi/2, rad; taken as the exact number it is."""
     with decimal.localcontext(prec=DIGITS):
         x = decimal.Decimal(angle)
         sums, term, n = [decimal.Decimal(0), decimal.Decimal(0)], decimal.Decimal(1), 0
@@ -32,10 +29,7 @@ def sine_cosine_digits(angle: float) -> tuple[decimal.Decimal, decimal.Decimal]:
 
 
 def twofold(value: decimal.Decimal) -> Pair:
-    """Return a number as a pair.
-
-    Returns `high, low`: the nearest float64, and the float64 nearest to the rest.
-    """
+    """Return a number as a pair: `high, low`, the nearest float64, and the float64 nearest to the rest."""
     with decimal.localcontext(prec=DIGITS):
         high = float(value)
         return high, float(value - decimal.Decimal(high))
@@ -43,10 +37,7 @@ def twofold(value: decimal.Decimal) -> Pair:
 
 @kernel
 def two_sum(a: float, b: float) -> Pair:
-    """Return a + b as a pair.
-
-    Returns `high, low`: the rounded sum, and what rounding took; exact.
-    """
+    """Return a + b as a pair: `high, low`, the rounded sum, and what rounding took; exact."""
     total = a + b
     part = total - a
     return total, (a - (total - part)) + (b - part)
@@ -67,20 +58,14 @@ def two_product(a: float, b: float) -> Pair:
 
 @kernel
 def add(x: Pair, y: Pair) -> Pair:
-    """Return the sum of two pairs.
-
-    Returns `high, low`: their sum, to some 2^-100 of the larger.
-    """
+    """Return the sum of two pairs: `high, low`, their sum, to some 2^-100 of the larger."""
     high, low = two_sum(x[0], y[0])
     return two_sum(high, low + (x[1] + y[1]))
 
 
 @kernel
 def multiply(x: Pair, y: Pair) -> Pair:
-    """Return the product of two pairs.
-
-    Returns `high, low`: their product, to some 2^-100 of it.
-    """
+    """Return the product of two pairs: `high, low`, their product, to some 2^-100 of it."""
     high, low = two_product(x[0], y[0])
     return two_sum(high, low + (x[0] * y[1] + x[1] * y[0]))
 

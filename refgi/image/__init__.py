@@ -1,7 +1,7 @@
 """Image files: EXR (lossless) and PNG (tone-mapped), written atomically and marked as refgi's."""
 
 from refgi.image.exr import read_exr, write_exr
-from refgi.image.png import NOT_FINITE, png_bytes, read_png_attributes, tone_map, write_encoded, write_png
+from refgi.image.picture import NOT_FINITE, png_bytes, read_png_attributes, tone_map, write_encoded, write_png
 from refgi.image.whole import (
     MARK,
     canonical_json,

@@ -25,8 +25,8 @@ from refgi.errors import RefgiWarning
 from refgi.pairs.irradiance import Receivers, add_lights
 from refgi.pairs.packing import pack
 from refgi.pairs.pixel_lights import warn_of_mirrors
-from refgi.pairs.settings import DiscClamp, PairSettings
-from refgi.pairs.tiles import nth_by_block, strip_starts, taken
+from refgi.pairs.settings import STRONGEST_CLAMP, DiscClamp, GeometryClamp, PairSettings
+from refgi.pairs.tiles import block_by_block, taken
 from refgi.stages import stage
 from refgi.types import Array
 
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 PAIRS = 1 << 20  # about as many are summed: a millisecond's work
 LEAST_SAMPLED = 2048  # pixels, however many lights there are
 THINNED = 2048  # lights, where there are too many to sum in full
+UNREACHED = GeometryClamp(STRONGEST_CLAMP)  # a bound in place of no clamp: one kernel less to compile
 LEAST_LOSS = 0.02  # share of the light below which a loss gives no warning
 
 
@@ -56,11 +57,11 @@ def sample_pixels(receivers: Receivers, count: int) -> Sample:
     are fewer.
     """
     covered = np.asarray(receivers.covered, np.bool_)
-    starts = strip_starts(covered)
-    count = min(count, int(starts[-1]))
-    ends = np.arange(count + 1) * starts[-1] // max(1, count)
+    shown = int(np.count_nonzero(covered))
+    count = min(count, shown)
+    ends = np.arange(count + 1) * shown // max(1, count)
     nth = ends[:-1] + (_van_der_corput(count) * np.diff(ends)).astype(np.int64)
-    chosen = nth_by_block(covered, starts, nth)
+    chosen = block_by_block(covered, nth)
     return Sample(chosen, *(taken(np.asarray(plane), chosen) for plane in (receivers.position, receivers.normal)))
 
 
@@ -104,7 +105,7 @@ def clamp_loss(
     """
     sample = sample_for(receivers, lights)
     clamped = light_at(sample, lights, settings, footprint)
-    return lost_share(light_at(sample, lights, dataclasses.replace(settings, clamp=None)), clamped)
+    return lost_share(light_at(sample, lights, dataclasses.replace(settings, clamp=UNREACHED)), clamped)
 
 
 def lost_share(whole: float, left: float) -> float:
@@ -190,7 +191,7 @@ def seen_light(camera: "Camera", albedo: Array, direct: Array, receivers: Receiv
         rather lowers their light.
     """
     sample = sample_pixels(receivers, SENDERS)
-    whole = light_at(sample, lights, PairSettings(clamp=None))
+    whole = light_at(sample, lights, PairSettings(clamp=UNREACHED))
     if whole <= 0:
         return 0.0
     area = _areas(camera, direct.shape[1], sample) * (np.count_nonzero(receivers.covered) / max(1, len(sample.place)))

@@ -15,13 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from refgi.jit import kernel, prange
+from refgi.jit import kernel
 from refgi.rsm.pool import plane
 from refgi.skips import left_out
 from refgi.types import Array
 
 BLOCK = 16  # BLOCK^2 pixels fill one tile of the kernels
-AT_ONCE = 1 << 12  # pixels that a thread copies at once
 ROUNDING = 32.0  # units of rounding of |d| that a cosine computed from d may be off; about 6 are possible
 
 
@@ -38,125 +37,31 @@ def clear(picture: Array, covered: Array, receiving: Array) -> None:
         picture[:, ~covered] = 0
 
 
-def strip_starts(covered: Array) -> Array:
-    """Return how many covered pixels (h, w) come before each strip of blocks, and before its end, (s + 1,) int64."""
-    counts = np.empty(-(-len(covered) // BLOCK), np.int64)
-    _count_strips(covered, counts)
-    return np.concatenate([[0], np.cumsum(counts)])
-
-
-def block_by_block(covered: Array) -> Array:
-    """Return the flat indices of covered pixels (h, w), block by block, (n,) int64."""
-    starts = strip_starts(covered)
-    places = plane((int(starts[-1]),), np.int64)
-    _fill_strips(covered, _path(), starts, places)
-    return places
-
-
-def nth_by_block(covered: Array, starts: Array, nth: Array) -> Array:
-    """Return `block_by_block(covered)[nth]`, of which only those (m,), rising, are found; `starts`: `strip_starts`."""
-    places = np.empty(len(nth), np.int64)
-    _choose(covered, _path(), starts, nth, places)
+def block_by_block(covered: Array, nth: Array | slice = slice(None)) -> Array:
+    """Return the flat indices of covered pixels (h, w), block by block, (n,) int64; only the `nth` ones where given."""
+    height, width = covered.shape
+    down, across = -(-height // BLOCK), -(-width // BLOCK)
+    whole = np.zeros((down * BLOCK, across * BLOCK), np.bool_)
+    whole[:height, :width] = covered
+    fours = whole.view(np.uint32).reshape(down, 2, 2, 4, across, 2, 2).transpose(0, 4, 1, 5, 2, 6, 3)
+    index = np.flatnonzero(fours.reshape(-1).view(np.bool_))[nth]
+    corner = np.add.outer(np.arange(down) * (BLOCK * width), np.arange(across) * BLOCK).reshape(-1)
+    row, column = np.divmod(np.arange(BLOCK * BLOCK), BLOCK)
+    inside = (row * width + column).reshape(2, 2, 4, 2, 2, 4).transpose(0, 3, 1, 4, 2, 5).reshape(-1)
+    places: Array = corner[index // BLOCK**2] + inside[index % BLOCK**2]
     return places
 
 
 def taken(values: Array, places: Array) -> Array:
     """Return the values of three channels (3, h, w) at pixels of flat indices (n,), (3, n)."""
     some = plane((3, len(places)), values.dtype)
-    _take(np.ascontiguousarray(values).reshape(3, -1), places, some)
-    return some
+    return np.take(values.reshape(3, -1), places, axis=1, out=some, mode="clip")
 
 
 def put(picture: Array, places: Array, values: Array) -> None:
     """Store the values (3, n) of three channels at pixels of distinct flat indices (n,) of a contiguous picture."""
-    _put(values, places, picture.reshape(3, -1))
-
-
-def _path() -> Array:
-    """Return row and column within a block in the order of its pixels, (2, BLOCK^2)."""
-    index = np.arange(BLOCK * BLOCK).reshape(2, 2, 4, 2, 2, 4).transpose(0, 3, 1, 4, 2, 5).reshape(-1)
-    return np.stack([index // BLOCK, index % BLOCK])
-
-
-@kernel(parallel=True)
-def _count_strips(covered: Array, counts: Array) -> None:
-    for strip in prange(len(counts)):
-        count = 0
-        for row in range(strip * BLOCK, min((strip + 1) * BLOCK, len(covered))):
-            for column in range(covered.shape[1]):
-                count += covered[row, column]
-        counts[strip] = count
-
-
-@kernel(parallel=True)
-def _fill_strips(covered: Array, path: Array, starts: Array, places: Array) -> None:
-    height, width = covered.shape
-    for strip in prange(len(starts) - 1):
-        top, count = strip * BLOCK, starts[strip]
-        for left in range(0, width, BLOCK):
-            first = top * width + left
-            if _is_full(covered, top, left):
-                for i in range(BLOCK * BLOCK):
-                    places[count + i] = first + path[0, i] * width + path[1, i]
-                count += BLOCK * BLOCK
-                continue
-            for i in range(BLOCK * BLOCK):
-                row, column = top + path[0, i], left + path[1, i]
-                if row < height and column < width and covered[row, column]:
-                    places[count] = row * width + column
-                    count += 1
-
-
-@kernel(parallel=True)
-def _choose(covered: Array, path: Array, starts: Array, nth: Array, places: Array) -> None:
-    height, width = covered.shape
-    for strip in prange(len(starts) - 1):
-        top, count = strip * BLOCK, starts[strip]
-        wanted, stop = np.searchsorted(nth, count), np.searchsorted(nth, starts[strip + 1])
-        for left in range(0, width, BLOCK):
-            if wanted == stop:
-                break
-            here = 0
-            for row in range(top, min(top + BLOCK, height)):
-                for column in range(left, min(left + BLOCK, width)):
-                    here += covered[row, column]
-            i, passed = -1, count  # of the block's pixels in order, and how many are passed
-            while wanted < stop and nth[wanted] < count + here:
-                while passed <= nth[wanted]:
-                    i += 1
-                    row, column = top + path[0, i], left + path[1, i]
-                    passed += row < height and column < width and covered[row, column]
-                places[wanted] = (top + path[0, i]) * width + left + path[1, i]
-                wanted += 1
-            count += here
-
-
-@kernel
-def _is_full(covered: Array, top: int, left: int) -> bool:
-    """Return whether a whole block lies on the picture and shows surfaces alone."""
-    if top + BLOCK > covered.shape[0] or left + BLOCK > covered.shape[1]:
-        return False
-    full = True
-    for row in range(top, top + BLOCK):
-        for column in range(left, left + BLOCK):
-            full &= covered[row, column]
-    return full
-
-
-@kernel(parallel=True)
-def _take(values: Array, places: Array, some: Array) -> None:
-    for part in prange(-(-len(places) // AT_ONCE)):
-        for c in range(3):
-            for i in range(part * AT_ONCE, min((part + 1) * AT_ONCE, len(places))):
-                some[c, i] = values[c, places[i]]
-
-
-@kernel(parallel=True)
-def _put(some: Array, places: Array, values: Array) -> None:
-    for part in prange(-(-len(places) // AT_ONCE)):
-        for c in range(3):
-            for i in range(part * AT_ONCE, min((part + 1) * AT_ONCE, len(places))):
-                values[c, places[i]] = some[c, i]
+    for channel, part in zip(picture.reshape(3, -1), values, strict=True):
+        channel[places] = part
 
 
 @kernel

@@ -73,10 +73,7 @@ _pool = _Pool()
 
 
 def plane(shape: tuple[int, ...], dtype: npt.DTypeLike) -> Array:
-    """Allocate an uninitialised array from the pool.
-
-    Result: C-contiguous, of any content.
-    """
+    """Allocate an uninitialised array from the pool; C-contiguous, of any content."""
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < SMALL:
         return np.empty(shape, dtype)
@@ -86,10 +83,7 @@ def plane(shape: tuple[int, ...], dtype: npt.DTypeLike) -> Array:
 
 
 def zeros(shape: tuple[int, ...], dtype: npt.DTypeLike) -> Array:
-    """Allocate an array of zeros from the pool.
-
-    Result: C-contiguous.
-    """
+    """Allocate an array of zeros from the pool; C-contiguous."""
     array = plane(shape, dtype)
     array[...] = 0
     return array

@@ -1,9 +1,11 @@
-"""File access of the readers, and what the caller chooses of it."""
+"""File access of the readers, what the caller chooses of it, and which files were read for a scene."""
 
 import codecs
 import contextlib
+import hashlib
 import itertools
 import math
+import os
 import tomllib
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,7 +15,48 @@ from typing import Any, Literal, NamedTuple, get_args
 
 from refgi.errors import InputError, RefgiWarning, expect, first_faults, nearest, shortened
 from refgi.memory import physical_memory
-from refgi.scene.source import record_file
+
+_reading: ContextVar[dict[Path, str] | None] = ContextVar("_reading", default=None)
+
+
+class Source(NamedTuple):
+    """How a scene was named, and SHA-256 of every file read for it, named relative to the folder of the first."""
+
+    name: str
+    files: tuple[tuple[str, str], ...] = ()
+
+
+@contextlib.contextmanager
+def reading() -> Iterator[dict[Path, str]]:
+    """Gather the files that are read inside the block.
+
+    Result: SHA-256 by path, in the order of reading; complete when the block ends.
+    """
+    files: dict[Path, str] = {}
+    token = _reading.set(files)
+    try:
+        yield files
+    finally:
+        _reading.reset(token)
+
+
+def record_file(path: Path, content: bytes) -> None:
+    """Record a file's content inside a block of `reading`."""
+    files = _reading.get()
+    if files is not None:
+        files[path] = hashlib.sha256(content).hexdigest()
+
+
+def source_of(name: str, files: dict[Path, str]) -> Source:
+    """Return the source of a scene.
+
+    `name`: the argument of `load_scene`. Result: with each file's path as seen from the first one's folder, so that it
+    stays the same when all are moved.
+    """
+    folder = next(iter(files), Path()).parent
+    return Source(name, tuple((Path(os.path.relpath(path, folder)).as_posix(), digest)
+                              for path, digest in files.items()))
+
 
 LightUnit = Literal["cd", "lm", "W/sr"]
 Emissive = Literal["seen", "lamps"]

@@ -7,12 +7,21 @@ from pathlib import Path
 
 from refgi.errors import InputError, RefgiWarning, blame, first_faults, shortened
 from refgi.scene.builtin import SCENES, build_named
-from refgi.scene.files import Emissive, LightUnit, did_you_mean, is_there, reading_as, text_of, warn_of_undefined
+from refgi.scene.files import (
+    Emissive,
+    LightUnit,
+    did_you_mean,
+    is_there,
+    reading,
+    reading_as,
+    source_of,
+    text_of,
+    warn_of_undefined,
+)
 from refgi.scene.model import Camera, Light, Scene, merge
 from refgi.scene.placed import default_camera, default_light, lamps_where_asked
 from refgi.scene.repair import lights_with_power, repaired_all, warn_of_flat_faces, warn_of_unit
 from refgi.scene.scenefile import READERS, read_mesh_file, read_scene_file
-from refgi.scene.source import reading, source_of
 from refgi.stages import stage
 
 

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from refgi.errors import expect
-from refgi.scene.clusters import Clusters, clusters
-from refgi.scene.cutouts import CutFaces, CutOuts, cut_outs
+from refgi.scene.files import Source
 from refgi.scene.light import (
     DIRECTIONAL,
     POINT,
@@ -30,7 +29,7 @@ from refgi.scene.light import (
 )
 from refgi.scene.material import Material, MaterialTable, material_table
 from refgi.scene.mesh import Mesh, at_corners, expect_all_sound, expect_colours, expect_coordinates, expect_memory
-from refgi.scene.source import Source
+from refgi.scene.triangles import Clusters, CutFaces, CutOuts, clusters, cut_outs
 from refgi.scene.values import (
     BLACK,
     LARGEST,

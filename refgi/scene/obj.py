@@ -18,7 +18,7 @@ from refgi.scene.material import UNPAINTED, WHITE, factors
 from refgi.scene.mesh import expect_all_sound, expect_coordinates
 from refgi.scene.model import Contents, Material, Mesh
 from refgi.scene.mtl import Maps, lines_of, numbers_of, read_library
-from refgi.scene.polygons import triangles_of
+from refgi.scene.repair import triangles_of
 from refgi.scene.texture.image import expect_all_fit
 from refgi.types import Array
 

@@ -11,7 +11,7 @@ from refgi.scene.files import is_there, tolerate
 from refgi.scene.material import UNPAINTED, WHITE, factors, from_codes
 from refgi.scene.model import Contents, Material, Mesh
 from refgi.scene.plydata import Column, Ply, read_entries
-from refgi.scene.polygons import triangles_of
+from refgi.scene.repair import triangles_of
 from refgi.scene.texture.image import image_file
 from refgi.scene.texture.table import Texture
 from refgi.types import Array

@@ -97,10 +97,7 @@ class Ply(NamedTuple):
 
 
 def read_entries(path: Path) -> Ply:
-    """Read all entries of a PLY file.
-
-    Raises `InputError` if it is damaged, cut short, or a row lacks a number.
-    """
+    """Read all entries of a PLY file; raises `InputError` if it is damaged, cut short, or a row lacks a number."""
     content = expect_utf8(read_bytes(path), path)
     elements, encoding, comments, start = read_header(content, path)
     if encoding == "ascii":

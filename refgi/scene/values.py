@@ -13,10 +13,7 @@ LARGEST = 1e9  # m; squares and cubes of coordinates stay within float32
 
 
 def is_number(value: Any) -> bool:
-    """Return whether a value is one finite number.
-
-    Result: false for text, and for what is no number at all.
-    """
+    """Return whether a value is one finite number; false for text, and for what is no number at all."""
     try:
         return math.isfinite(value)
     except (TypeError, OverflowError):
@@ -32,10 +29,7 @@ def is_count(value: Any) -> bool:
 
 
 def is_vector(value: Any) -> bool:
-    """Return whether a value is three finite numbers.
-
-    Result: false for what is no sequence of numbers at all.
-    """
+    """Return whether a value is three finite numbers; false for what is no sequence of numbers at all."""
     try:
         return len(value) == 3 and all(math.isfinite(c) for c in value)
     except (TypeError, OverflowError):
@@ -68,8 +62,5 @@ def is_direction(value: Any) -> bool:
 
 
 def degrees(angle: float) -> float:
-    """Return an angle in degrees, as it was written in a file.
-
-    `angle`: in rad.
-    """
+    """Return an angle in degrees, as it was written in a file; `angle`: in rad."""
     return round(math.degrees(angle), 9)

@@ -6,8 +6,7 @@ from functools import cache
 from typing import Any, TypeVar
 
 from refgi.errors import InputError, first_faults, nearest
-from refgi.settings.fields import Settings, checked, choices_of, expected, hints, is_choice, may_be_none
-from refgi.settings.tree import Leaf, leaves
+from refgi.settings.fields import Leaf, Settings, checked, choices_of, expected, hints, is_choice, leaves, may_be_none
 
 S = TypeVar("S", bound=Settings)
 

@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar, get_args, get_origin
 
 from refgi.errors import InputError
-from refgi.settings.fields import Settings, choices_of, may_be_none
+from refgi.settings.fields import Leaf, Settings, choices_of, leaves, may_be_none
 from refgi.settings.keys import PRINTED, SEED, find_key, meant, raise_all, replaced
-from refgi.settings.tree import Leaf, leaves
 
 S = TypeVar("S", bound=Settings)
 

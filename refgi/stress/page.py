@@ -9,7 +9,7 @@ import numpy as np
 
 from refgi.compare.pages import number, page_of, sort_key
 from refgi.image import write_text
-from refgi.image.png import png_bytes
+from refgi.image.picture import png_bytes
 from refgi.stress.promises import Row, Stability, strain
 from refgi.stress.run import Found, Silence
 from refgi.types import Array

@@ -97,10 +97,7 @@ def photon_pass(film: Film, tracer: Tracer, lights: LightTable, photons: int, ra
 
 
 def photons_of(origins: Array, directions: Array) -> Photons:
-    """Allocate photons that start out.
-
-    `origins`, `directions` (n, 3): m, unit vectors. Result: without flux.
-    """
+    """Allocate photons without flux that start out; `origins`, `directions` (n, 3): m, unit vectors."""
     count = len(origins)
     return Photons(origins.astype(np.float32), directions.astype(np.float32), np.full(count, np.inf, np.float32),
                    np.empty(count, np.int32), np.empty(count, np.float32), *(np.zeros((count, 3)) for _ in range(3)))

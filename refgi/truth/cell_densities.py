@@ -29,8 +29,7 @@ from refgi.jit import by_type, kernel
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import DIRECTIONAL, lobe_gap, lobe_power
 from refgi.truth.cell_walk import Found, Receiver, column, fill_tops, found_at
-from refgi.truth.lobe_cells import LobeCells
-from refgi.truth.lobe_receivers import Lobes
+from refgi.truth.lobe_cells import LobeCells, Lobes
 from refgi.truth.lobe_tree import LobeTree
 from refgi.truth.paths import Paths, dot, row
 from refgi.types import Array

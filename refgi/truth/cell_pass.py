@@ -12,7 +12,6 @@ from refgi.jit import kernel, prange
 from refgi.radiometry import DIRECTIONAL, incident_light, radiant_intensity
 from refgi.rays import MISS, far_offset, ray_offset
 from refgi.scene import LightTable
-from refgi.truth.camera_visibility import hidden_from_camera
 from refgi.truth.cell_densities import (
     Beside,
     Tops,
@@ -27,6 +26,7 @@ from refgi.truth.cell_densities import (
 )
 from refgi.truth.cell_rays import Picks, pick_cells, picks_for
 from refgi.truth.cell_walk import CHUNK, on_face
+from refgi.truth.light_pass import hidden_from_camera
 from refgi.truth.lobe_cells import lobe_cells
 from refgi.truth.paths import Shadows, aim_at_light, dot, hit_point, pass_through, row, toward_light
 from refgi.truth.surfaces import Surfaces, face_normal, height_above, lift, lobe_pattern, shading_normal

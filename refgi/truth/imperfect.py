@@ -27,8 +27,8 @@ from refgi.pairs.shadow_rays import RayReceivers, Senders
 from refgi.radiometry import orthonormal_basis
 from refgi.sampling import FIRST_STEP, IMPERFECT_MAPS, SECOND_STEP, draws
 from refgi.scene import Geometry
-from refgi.scene.cutouts import NO_CUT, CutFaces
 from refgi.scene.texture.lookup import is_opaque
+from refgi.scene.triangles import NO_CUT, CutFaces
 from refgi.settings import Settings, setting
 from refgi.stages import stage
 from refgi.types import Array
@@ -71,13 +71,7 @@ class ImperfectDepth(NamedTuple):
     bias: float  # in what a receiver's own surface may differ by within a box or a texel
 
 
-def _steps(*arguments: Any, **named: Any) -> dict[str, Array] | None:
-    from refgi.truth.map_steps import map_steps
-
-    return map_steps(*arguments, **named)
-
-
-@stage("vpl.imperfect_maps", steps=_steps)
+@stage("vpl.imperfect_maps", steps="refgi.truth.steps.map_steps")
 def imperfect_maps(geometry: Geometry, lights: "PixelLights", settings: Imperfect, seed: int = 0) -> ImperfectDepth:
     """Draw the map of each pixel light.
 

@@ -1,28 +1,106 @@
 """The light side of a pass: fresh light vertices from every light, picks among them, a shadow ray for each pick.
 
-A pilot pass finds which cells of a light contribute to the picture; other passes importance-sample by it.
+A pilot pass finds which cells of a light contribute, other passes importance-sample by it: rays through the centres of
+a fixed grid of cells, and each unblocked pick of some of the receivers counts for its cell. It depends on the scene,
+the receivers and the settings alone, not on the seed, and only says where rays go: every pass divides by the density,
+and a share of the rays stays uniform.
 
-Rays through the centres of a fixed grid of cells find light vertices; some of the receivers pick among these as in a
-pass, shadow rays included, and each unblocked pick is a contribution of its cell. The pilot depends on the scene, the
-receivers and the settings alone, not on the seed. Its contributions only say where rays go: every pass divides by the
-density and is unbiased whatever the pilot found, since a share of the rays stays uniform.
+A screen-space method knows no emitters but those inside the camera's picture, on the side that faces the eye, with
+nothing between. With only these the truth is what it can reach at best.
 """
 
 from typing import Any
 
 import numpy as np
 
+from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
+from refgi.rays import MISS, Tracer, ray_offset
 from refgi.rsm.pool import plane
-from refgi.truth.camera_visibility import visible_vertices
+from refgi.rsm.raster.projection import Projection, texel_of
 from refgi.truth.light_grid import Density, cell_centres, density_of, footprint, rays_through, stratified_sets
 from refgi.truth.light_side import pick, tiles
-from refgi.truth.light_vertices import PointSets, closest_of, join, light_vertices, with_areas
+from refgi.truth.light_vertices import LightVertices, PointSets, closest_of, join, light_vertices, with_areas
+from refgi.truth.lobe_cells import subset_of
 from refgi.truth.lobe_light_side import pick_for_lobes
-from refgi.truth.lobe_receivers import subset_of
-from refgi.truth.paths import Shadows
+from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point
+from refgi.truth.surfaces import Surfaces, face_normal, lift
 from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
 from refgi.types import Array
+
+
+@kernel
+def aim_at_eye(view: Projection, offset: float, y: tuple[float, float, float], g: tuple[float, float, float],
+               rays: tuple[Array, Array, Array], ray: int) -> None:
+    """Write the ray from a point to the eye.
+
+    `offset`: how far along g the ray starts, m. `y`: the point, m. `g`: unit face normal on the side that emits.
+    `rays`: origins and directions (n, 3) and reach (n,), float32: filled at `ray`; the reach is 1, or 0 where the point
+    lies outside the picture or that side faces away.
+    """
+    origins, directions, reach = rays
+    eye = (view.origin[0, 0], view.origin[0, 1], view.origin[0, 2])
+    toward = (eye[0] - y[0], eye[1] - y[1], eye[2] - y[2])
+    row, _, _ = texel_of(view, y[0], y[1], y[2])
+    for c in range(3):
+        origins[ray, c] = y[c] + offset * g[c]
+        directions[ray, c] = toward[c] - offset * g[c]
+    reach[ray] = 1 if dot(toward, g) > 0 and not np.isnan(row) else 0
+
+
+def visible_vertices(tracer: Tracer, view: Projection, points: LightVertices) -> LightVertices:
+    """Return the light vertices that are visible to a camera, in their order."""
+    count = len(points.power)
+    origins, directions = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
+    reach, blocked = np.empty(count, np.float32), np.empty(count, np.bool_)
+    _aim_points(view, tracer.grain, points.position, points.facing, (origins, directions, reach))
+    tracer.fill_occluded(origins, directions, reach, blocked)
+    return LightVertices(*(part[..., ~blocked] for part in points))
+
+
+@kernel
+def _aim_points(view: Projection, grain: float, position: Array, facing: Array,
+                rays: tuple[Array, Array, Array]) -> None:
+    for i in range(position.shape[1]):
+        y = (np.float64(position[0, i]), np.float64(position[1, i]), np.float64(position[2, i]))
+        g = (np.float64(facing[0, i]), np.float64(facing[1, i]), np.float64(facing[2, i]))
+        aim_at_eye(view, ray_offset(y[0], y[1], y[2], grain), y, g, rays, i)
+
+
+@kernel(parallel=True)
+def aim_paths(view: Projection, surfaces: Surfaces, grain: float, paths: Paths, rays: Shadows) -> None:
+    """Write a ray to the eye from each surface that paths found.
+
+    `grain`: the tracer's: how far rays start above faces, m. `rays`: origins, directions and reach are filled; the
+    reach is 0 where nothing was hit or it cannot be visible.
+    """
+    count = len(paths.reach)
+    for chunk in prange((count + CHUNK - 1) // CHUNK):
+        _aim_paths(view, surfaces, grain, paths, rays, (chunk * CHUNK, min(count, chunk * CHUNK + CHUNK)))
+
+
+@kernel
+def _aim_paths(view: Projection, surfaces: Surfaces, grain: float, paths: Paths, rays: Shadows,
+               span: tuple[int, int]) -> None:
+    written = (rays.origin, rays.direction, rays.reach)
+    for ray in range(span[0], span[1]):
+        rays.reach[ray] = 0
+        if paths.triangle_id[ray] != MISS:
+            _, y = hit_point(paths, ray)
+            g = face_normal(surfaces, paths.triangle_id[ray], y[0] - view.origin[0, 0], y[1] - view.origin[0, 1],
+                            y[2] - view.origin[0, 2])  # on the eye's side; `leaves` asks whether that is the light's
+            aim_at_eye(view, lift(surfaces, paths.triangle_id[ray], y, g, grain), y, g, written, ray)
+
+
+def hidden_from_camera(task: Task, paths: Paths) -> Array | None:
+    """Return which paths end at points that the camera does not see; None where that does not matter."""
+    if task.view is None:
+        return None
+    rays = shadow_batch(len(paths.reach))
+    aim_paths(task.view, task.surfaces, task.tracer.grain, paths, rays)
+    task.tracer.fill_occluded(rays.origin, rays.direction, rays.reach, rays.blocked)
+    return rays.blocked
+
 
 CELLS = 64  # along one side of a light's grid
 RECEIVERS, PICKS = 2048, 1 << 15  # sampled receivers, at most; picks of all of them together, at least
@@ -43,10 +121,7 @@ def add_light_side(task: Task, words: Array, sums: Array) -> None:
 
 
 def fresh_points(task: Task, random: np.random.Generator) -> PointSets:
-    """Trace fresh rays from every light to light vertices.
-
-    `random`: places the rays in their cells.
-    """
+    """Trace fresh rays from every light to light vertices; `random`: places the rays in their cells."""
     n, side = task.settings.light_grid, task.settings.interleave
     count = len(task.scene.lights)
     squares = [stratified_sets(n, side, random) for _ in range(count)]

@@ -21,7 +21,7 @@ from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.truth.light_side import BELOW_1, TILE, aim, random_shift
 from refgi.truth.light_vertices import BLOCK, LightVertices
-from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, density_on_axis
+from refgi.truth.lobe_cells import SHARPEST_VERTEX, Lobes, density_on_axis
 from refgi.types import Array
 
 PART = 8  # senders whose terms a pick may have to compute again

@@ -3,7 +3,7 @@
 Paths start along the receiver's lobe, and scatter at surfaces by every lobe; light vertices share the first bounce.
 
 A direction of density (P + 1) / (2 pi) <m.w>^P that finds radiance L contributes s (P + 2) / (P + 1) <n.w> L: bounded,
-however sharp the lobe. Symbols: as in `refgi.truth.lobe_receivers` and `refgi.truth.surfaces`; x the receiver, y where
+however sharp the lobe. Symbols: as in `refgi.truth.lobe_cells` and `refgi.truth.surfaces`; x the receiver, y where
 a direction lands, A = r^2 n_a / n_b with n_a = D <m.w>^P <g.w> / r^2, D of `density_on_axis`, and n_b = <g.l> / (Omega
 d^2) for a light one of whose rays has Omega.
 
@@ -23,14 +23,13 @@ from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import DIRECTIONAL, incident_light, lobe_direction, lobe_gap, lobe_power, receiver_norm
 from refgi.rays import MISS
 from refgi.scene import DirectionalLight, LightTable
-from refgi.truth.camera_visibility import hidden_from_camera
 from refgi.truth.caustics import Film, photons_of, power_of, reflect, seen
 from refgi.truth.cell_densities import Beside, share_beside, tops_for
 from refgi.truth.cell_pass import add_cells, beside_of
 from refgi.truth.hemisphere import scrambled_points, shifted, to_far_side
 from refgi.truth.light_grid import footprint, light_rays
-from refgi.truth.light_pass import add_light_side
-from refgi.truth.lobe_receivers import SHARPEST_VERTEX, Lobes, comes_by_photons, density_on_axis
+from refgi.truth.light_pass import add_light_side, hidden_from_camera
+from refgi.truth.lobe_cells import SHARPEST_VERTEX, Lobes, comes_by_photons, density_on_axis
 from refgi.truth.passes import follow, scatter
 from refgi.truth.paths import (
     CHUNK,

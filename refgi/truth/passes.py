@@ -1,6 +1,12 @@
 """One pass of the ground truth: an independent, unbiased estimate of every receiver's one-bounce irradiance.
 
 At a surface a path passes through (without visibility), or scatters by the surface's reflection.
+
+What the bound leaves to directions lies near lit surfaces: in corners nearly all of its variance, elsewhere nothing.
+A pilot sends two directions from every second receiver, twice; the difference tells the standard deviation s of each
+block of 8 x 8 pixels, averaged with its neighbours'. A block then gets n = N s / rms(s) directions, as a power of two:
+least error for so many rays. The pilot does not depend on the seed and leaves no receiver without directions: passes
+stay independent and unbiased whatever it found.
 """
 
 from typing import Any
@@ -12,16 +18,16 @@ from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import inverse_fraction, lobe_direction
 from refgi.rays import MISS
 from refgi.sampling import hash_bits
-from refgi.truth.camera_visibility import hidden_from_camera
 from refgi.truth.caustics import photon_pass
 from refgi.truth.cell_densities import Beside
 from refgi.truth.cell_pass import add_cells, beside_of
 from refgi.truth.hemisphere import cosine_direction, gather, scrambled_points, send
 from refgi.truth.light_grid import footprint
-from refgi.truth.light_pass import add_light_side
+from refgi.truth.light_pass import add_light_side, hidden_from_camera
 from refgi.truth.paths import Paths, diffuse_at, dot, hit_point, pass_through, paths_for, row
+from refgi.truth.result import blocks_of
 from refgi.truth.surfaces import Surfaces, around, face_normal, lift, shading_normal
-from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
+from refgi.truth.task import Group, Task, add_unblocked, shadow_batch, spans
 from refgi.types import Array
 
 
@@ -163,3 +169,41 @@ def directions_reach(task: Task) -> float:
     most = max((footprint(light, task.scene.geometry, task.settings.light_grid)[1] for light in task.scene.lights),
                default=0.0)
     return float(np.sqrt(most / bound))
+
+
+PILOT, EVERY = 2, 2  # directions of each half, of every second receiver
+FEWEST, MOST = 0.125, 8.0  # of N
+
+
+def directions_shared_out(task: Task) -> tuple[Group, ...]:
+    """Return groups of receivers with as many directions each; none where all have the same.
+
+    Only where directions are short: there the light side has nearly all light.
+    """
+    count, pixel = task.settings.directions_per_pass, task.receivers.pixel
+    if task.lobes is not None or not count or not len(pixel) or np.isinf(directions_reach(task)):
+        return ()
+    sampled = task._replace(receivers=_some(task.receivers, np.arange(0, len(pixel), EVERY)))
+    halves = np.zeros((2, 3, len(sampled.receivers.pixel)))
+    for half, words in zip(halves, np.random.SeedSequence(0).generate_state(8).reshape(2, 4), strict=True):
+        add_directions(sampled, PILOT, words, half)
+    block, grid = blocks_of(pixel, task.shape)
+    sums = [_with_neighbours(np.bincount(block[::EVERY], weights, grid[0] * grid[1]).reshape(grid))
+            for weights in (((halves[0] - halves[1]) ** 2).mean(axis=0), None)]
+    deviation = np.sqrt(sums[0] / np.maximum(sums[1], 1)).ravel()[block]
+    rms = np.sqrt((deviation**2).mean())
+    share = np.clip(deviation / rms, FEWEST, MOST) if rms > 0 else np.full(len(block), FEWEST)
+    counts = 2 ** np.rint(np.log2(np.maximum(count * share, 1))).astype(np.int64)
+    return tuple(Group(int(n), chosen, _some(task.receivers, chosen))
+                 for n in np.unique(counts) for chosen in (np.flatnonzero(counts == n),))
+
+
+def _some(receivers: RayReceivers, chosen: Array) -> RayReceivers:
+    return RayReceivers(*(np.ascontiguousarray(field[..., chosen]) for field in receivers))
+
+
+def _with_neighbours(values: Array) -> Array:
+    """Return the sum over each value and the eight around it."""
+    wide = np.pad(values.astype(np.float64), 1)
+    rows, columns = values.shape
+    return np.asarray(sum(wide[i : i + rows, j : j + columns] for i in range(3) for j in range(3)))

@@ -64,10 +64,7 @@ def dot(a: tuple[float, float, float], b: tuple[float, float, float]) -> float:
 
 @kernel
 def row(rows: Array, i: int) -> tuple[float, float, float]:
-    """Return a row of three as float64 scalars.
-
-    `rows` (n, 3): vectors or colours.
-    """
+    """Return a row of three as float64 scalars; `rows` (n, 3): vectors or colours."""
     return np.float64(rows[i, 0]), np.float64(rows[i, 1]), np.float64(rows[i, 2])
 
 

@@ -59,10 +59,7 @@ def surfaces(scene: Scene, mirror_exponent: float = math.inf) -> Surfaces:
 
 
 def lights_of(scene: Scene) -> LightTable:
-    """Return a scene's lights for kernels in float64.
-
-    Result: one row a light.
-    """
+    """Return a scene's lights for kernels in float64; one row a light."""
     return light_table(scene.lights)
 
 
@@ -170,9 +167,6 @@ def lobe_pattern(surfaces: Surfaces, material: int, n: tuple[float, float, float
 
 @kernel
 def around(axis: tuple[float, float, float], x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Return a local direction (z along the axis) in world space.
-
-    Result: world direction of the same length.
-    """
+    """Return a local direction (z along the axis) in world space, of the same length."""
     tx, ty, tz, bx, by, bz = orthonormal_basis(axis[0], axis[1], axis[2])
     return (tx * x + bx * y + axis[0] * z, ty * x + by * y + axis[1] * z, tz * x + bz * y + axis[2] * z)

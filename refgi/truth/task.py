@@ -13,8 +13,7 @@ from refgi.scene import LightTable, Scene
 from refgi.truth.caustics import Film
 from refgi.truth.cell_densities import Counts
 from refgi.truth.light_grid import Density
-from refgi.truth.lobe_cells import LobeCells
-from refgi.truth.lobe_receivers import Lobes
+from refgi.truth.lobe_cells import LobeCells, Lobes
 from refgi.truth.paths import Shadows, Sides
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import Surfaces

@@ -22,11 +22,10 @@ from refgi.stages import report_progress, stage
 from refgi.truth.caustics import MIRROR_EXPONENT, SHARP_LOBE, Film, film
 from refgi.truth.cell_pass import with_cells
 from refgi.truth.checkpoint import FIRST_LINE, Checkpoint
-from refgi.truth.direction_shares import directions_shared_out
 from refgi.truth.light_pass import pilot
+from refgi.truth.lobe_cells import glossy_triangles, lobes_of, meets_photons
 from refgi.truth.lobe_pass import lobe_pass
-from refgi.truth.lobe_receivers import glossy_triangles, lobes_of, meets_photons
-from refgi.truth.passes import one_pass
+from refgi.truth.passes import directions_shared_out, one_pass
 from refgi.truth.result import (
     Moments,
     TruthResult,
@@ -107,13 +106,7 @@ def trace_lobes(frame: "Frame", settings: TruthSettings | None = None) -> TruthR
                             settings or TruthSettings())
 
 
-def _steps(*arguments: Any, **named: Any) -> dict[str, Array]:
-    from refgi.truth.path_steps import truth_steps
-
-    return truth_steps(*arguments, **named)
-
-
-@stage("truth.accumulate", steps=_steps)
+@stage("truth.accumulate", steps="refgi.truth.steps.truth_steps")
 def accumulate(scene: Scene, tracer: Any, position: Array, normal: Array, triangle_id: Array,
                settings: TruthSettings) -> TruthResult:
     """Average independent passes over a G-buffer until the settings say stop.

@@ -78,13 +78,7 @@ def vpl(frame: "Frame", settings: VplSettings | None = None) -> Array:
     return irradiance
 
 
-def _steps(*arguments: Any, **named: Any) -> Array:
-    from refgi.truth.map_steps import light_steps
-
-    return light_steps(*arguments[:7], **named)
-
-
-@stage("vpl.light", kept=False, steps=_steps)
+@stage("vpl.light", kept=False, steps="refgi.truth.steps.light_steps")
 def light_of_pixel_lights(
     geometry: Geometry, position: Array, normal: Array, triangle_id: Array, lights: "PixelLights",
     maps: ImperfectDepth | None, visibility: bool, tracer: Tracer, batch: int = BATCH,

@@ -13,7 +13,7 @@ import pytest
 from refgi.compare.pages import PAGE, SCRIPTS, Axes, Curve, Point, curves_plot, number, sort_key, time_against_error
 from refgi.compare.report import ledger_cells, page, write_report
 from refgi.image import is_from_refgi
-from refgi.scene.source import Source
+from refgi.scene.files import Source
 from tests.compare.conftest import make_comparison, make_scene
 
 VOID = {"meta", "img", "input", "br", "link", "hr"}

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from refgi.jit.kernelfile import text_of, types_of
 from refgi.methods import BUILT_IN
 
 ROOT = Path(__file__).parents[2]
+MOST = {"sii": 10, "multires": 20, "val": 34, "hssil": 17, "gather": 11, "vpl": 11, "truth": 19}  # kernels
 KINDS = [types.float32, types.boolean, types.none, types.int64[:], types.float32[:, ::1], types.float64[::1, :],
          types.float32[:, :, ::1], types.float32[:, :, :], types.float32[::1].copy(readonly=True),
          types.Tuple((types.int64, types.float32)), types.UniTuple(types.float32[::1], 1), types.Omitted(1.5)]
@@ -47,6 +49,11 @@ def test_the_list_is_what_methods_call(method):
     ).splitlines()}
     listed = {f"{one.kernel}({one.arguments})" for one in read_list() if f"{method}/float32" in one.needed_by}
     assert called == listed
+
+
+def test_a_first_picture_of_a_plain_scene_waits_for_few_kernels():
+    needed = Counter(key for one in read_list() for key in one.needed_by)
+    assert {method: needed[f"{method}/float32"] for method in MOST} == MOST
 
 
 def test_what_is_compiled_ahead_is_kept(tmp_path):

@@ -12,7 +12,7 @@ from refgi.rays.cutouts import is_there, ray_holes
 from refgi.rays.embree import AddressBackend, RunBackend
 from refgi.scene import Geometry, Material, PointLight, Texture, load_scene, merge
 from refgi.scene.builtin.surfaces import rectangle
-from refgi.scene.cutouts import cut_outs
+from refgi.scene.triangles import cut_outs
 from tests.cutouts import CORNERS, half_plate, heap, opaque, spots
 from tests.naive import cutouts as naive
 from tests.rays.test_rays import unit_vectors

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from refgi.errors import InputError
 from refgi.scene import Scene, builtin_scenes, load_scene
-from refgi.scene.builtin.metaballs import balls_at, blob, field, gradient
 from refgi.scene.builtin.stage import vase
-from refgi.scene.builtin.surfaces import ring_surface, sphere
+from refgi.scene.builtin.surfaces import balls_at, blob, field, gradient, ring_surface, sphere
 from refgi.scene.model import Material, Mesh
 
 NAMES = ("cornell_box", "cornell_sphere", "atrium", "textured_atrium", "leaf_grid", "integrating_sphere", "wedge",
@@ -140,7 +139,7 @@ def test_metaball_vertices_lie_on_the_surface_and_normals_are_its_gradient() -> 
 
 @pytest.mark.parametrize("t", np.arange(24) / 24)
 def test_the_grid_holds_the_whole_blob(t: float) -> None:
-    from refgi.scene.builtin.metaballs import HALF_SIZE, MIDDLE
+    from refgi.scene.builtin.surfaces import HALF_SIZE, MIDDLE
 
     u = np.linspace(-HALF_SIZE, HALF_SIZE, 33)
     x, y = (a.ravel() for a in np.meshgrid(u, u))

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from refgi.scene.polygons import triangles_of
+from refgi.scene.repair import triangles_of
 
 SHAPES = {
     "square": [(0, 0), (1, 0), (1, 1), (0, 1)],

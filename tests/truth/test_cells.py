@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,8 +17,9 @@ from refgi.truth.cell_pass import beside_of
 from refgi.truth.cell_rays import pick_cells, picks_for
 from refgi.truth.cell_walk import cell_at, fill_tops, found_up
 from refgi.truth.light_grid import fill_rays, light_squares, place_of
-from refgi.truth.lobe_receivers import glossy_triangles
+from refgi.truth.lobe_cells import glossy_triangles
 from refgi.truth.passes import one_pass
+from refgi.truth.task import spans
 from refgi.truth.truth import _guided, _with_lobes, task_of
 from tests.truth.scenes import rectangle
 from tests.truth.scenes import scene as by_hand
@@ -159,3 +161,13 @@ def test_the_same_bits_for_any_batch():
     frame = Frame(scene, width=16, height=12)
     results = [trace_truth(frame, TruthSettings(samples=48, batch=batch)).mean for batch in (1 << 18, 500)]
     np.testing.assert_array_equal(*results)
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 16, 17])
+@pytest.mark.parametrize(("batch", "per_receiver", "most"), [(32, 4, 8), (35, 4, 8), (3, 4, 1)])
+def test_each_receiver_is_in_one_span(count, batch, per_receiver, most):
+    task = SimpleNamespace(settings=SimpleNamespace(batch=batch), receivers=SimpleNamespace(pixel=np.zeros(count)))
+    found = spans(task, per_receiver)
+    assert [k for first, end in found for k in range(first, end)] == list(range(count))
+    assert all(0 < end - first <= most for first, end in found)
+    assert len(found) == -(-count // most)

@@ -7,8 +7,7 @@ from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.scene import Material, SpotLight, load_scene
 from refgi.truth import TruthSettings
-from refgi.truth.direction_shares import FEWEST, MOST
-from refgi.truth.passes import _hemisphere
+from refgi.truth.passes import FEWEST, MOST, _hemisphere
 from refgi.truth.truth import task_of
 from tests.truth.scenes import corner_room, rectangle, scene
 

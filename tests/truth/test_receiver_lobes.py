@@ -446,7 +446,7 @@ def test_photons_that_can_count_for_nobody_are_left_out():
 
 
 def task_of_lobes(frame, settings):
-    from refgi.truth.lobe_receivers import glossy_triangles
+    from refgi.truth.lobe_cells import glossy_triangles
 
     buffer = frame.gbuffer
     glossy = glossy_triangles(frame.scene, buffer.position, buffer.normal, buffer.triangle_id)

@@ -26,8 +26,8 @@ from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import DistanceClamp
 from refgi.scene import Scene, load_scene
 from refgi.scene.builtin.cornell import CAMERA, shell
-from refgi.scene.builtin.stage import GLAZE, VASE, walls
-from refgi.scene.builtin.surfaces import lathe, patch, sphere
+from refgi.scene.builtin.stage import GLAZE, VASE
+from refgi.scene.builtin.surfaces import lathe, patch, sphere, walls
 from refgi.scene.model import Camera, Material, Mesh, SpotLight, merge
 from refgi.scene.repair import mean_face_normals
 from refgi.settings import of, replaced

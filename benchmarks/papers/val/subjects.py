@@ -37,7 +37,7 @@ from refgi.lights.settings import with_clamp
 from refgi.pairs.irradiance import Receivers
 from refgi.scene import Camera, Material, Mesh, Scene, SpotLight, load_scene
 from refgi.scene.builtin.cornell import CAMERA, cornell_box, shell
-from refgi.scene.builtin.metaballs import HALF_SIZE, MIDDLE, Balls, blob, metaballs
+from refgi.scene.builtin.surfaces import HALF_SIZE, MIDDLE, Balls, blob, metaballs
 from refgi.scene.model import merge
 from refgi.settings import of, replaced
 from refgi.types import Array

@@ -17,7 +17,7 @@ from refgi.pairs.lightcuts.tree import light_tree
 from refgi.pairs.pair_sum import TILE, Clamp
 from refgi.pairs.settings import LEAST_LIGHTS, AutoLightcuts, Lightcuts
 from refgi.pairs.tile_counts import tiles_behind
-from refgi.pairs.tiles import nth_by_block, strip_starts, taken
+from refgi.pairs.tiles import block_by_block, taken
 from refgi.stages import counted_pixels, skip
 from refgi.types import Array
 
@@ -57,9 +57,8 @@ def chosen(lightcuts: AutoLightcuts, packed: "Packed", planes: tuple[Array, Arra
         return None
     if count * number < LEAST_PAIRS:  # a small picture that stands for a large one
         return Lightcuts(lightcuts.error)
-    starts = strip_starts(covered)
     first = np.linspace(0, number - TILE, TILES).astype(np.int64) // TILE * TILE
-    places = nth_by_block(covered, starts, (first[:, None] + np.arange(TILE)).reshape(-1))
+    places = block_by_block(covered, (first[:, None] + np.arange(TILE)).reshape(-1))
     position, normal = (taken(np.asarray(part, packed.diffuse.dtype), places) for part in planes)
     share = estimated_share(position, normal, packed.diffuse, packed.clamp, lightcuts.error, number)
     if share > SURE:

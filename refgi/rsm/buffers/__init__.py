@@ -5,8 +5,7 @@
 """
 
 from refgi.rsm.buffers.direct import direct_irradiance, shadow_map_visibility
-from refgi.rsm.buffers.facing import facing_normals
-from refgi.rsm.buffers.gbuffer import GBuffer, gbuffer
+from refgi.rsm.buffers.gbuffer import GBuffer, facing_normals, gbuffer
 from refgi.rsm.buffers.leaving import leaving_radiance
 from refgi.rsm.buffers.light_projection import incident_flux, texel_shares
 from refgi.rsm.buffers.reflective import Rsm, reflective_shadow_map

@@ -6,7 +6,7 @@ t = v0 . N / (d . N), and t is the depth itself. Positions therefore lie on the 
 rounding, before the cast to the buffer's type. `surfaces` has how normals are interpolated.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -105,47 +105,37 @@ def allocate(workers: int, rows: int = ROWS) -> Scratch:
 
 @kernel(parallel=True)
 def resolve(
-    surface: Surface, projection: Projection, triangle_id: Array, channels: ChannelMask, planes: Planes,
-    scratch: Scratch,
+    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, listed: bool, channels: ChannelMask,
+    planes: Planes, scratch: Scratch,
 ) -> None:
-    """Fill the planes of the chosen channels.
+    """Fill the planes of the chosen channels: of all texels, or of those `listed`, to the same bits.
 
-    `projection`: the maps that `triangle_id` was drawn on. `triangle_id` (H, W): triangle at each texel, -1 for none.
-    `channels`: which planes to fill. `scratch`: of each worker; strips of rows are assigned to them round-robin.
+    `projection`: the maps that `triangle_id` (H, W) was drawn on: triangle at each texel, -1 for none. `texel` (n,):
+    those listed, of the flattened maps; the planes then have one row of them, and one worker fills it. `scratch`: of
+    each worker; strips of rows are assigned to them round-robin.
     """
     workers, height, width = len(scratch.line), projection.height, projection.width
     strips = (height + ROWS - 1) // ROWS  # of a map
     painted = channels.albedo | channels.material_id
+    shaped = channels.depth | channels.distance | channels.position | channels.normal
     for worker in prange(workers):
         runs, records, line = _runs_of(scratch, worker), _records_of(scratch, worker), scratch.line[worker]
-        for strip in range(worker, strips * len(projection.origin), workers):
-            m = strip // strips
-            first = (strip - m * strips) * ROWS
-            for left in range(0, width, SIDE):
+        strip = worker
+        left: Any = np.int64(0)  # no literal, for which callees would be compiled again
+        while left < len(texel) if listed else strip < strips * len(projection.origin):
+            if listed:
+                m, columns = _list_runs(projection, triangle_id, texel, left, runs, records, line)
+                tile, count = Tile(m * height, left, 1, columns), columns + 1
+            else:
+                m = strip // strips
+                first = (strip - m * strips) * ROWS
                 tile = Tile(m * height + first, left, min(ROWS, height - first), min(SIDE, width - left))
                 count = find_runs(triangle_id, tile.top, tile.top + tile.rows, left, left + tile.columns, runs, records)
-                describe(surface, projection, m, count, painted, records)
-                _fill(projection, tile, False, len(surface.normals) > 0, runs, records, line, channels, planes)
-
-
-@kernel(parallel=True)
-def resolve_materials(surface: Surface, triangle_id: Array, albedo: Array, material_id: Array) -> None:
-    """Fill albedo (3, H, W) and material (H, W), or those of them that are not empty, without looking at geometry."""
-    faces, diffuse = surface.material_of_face, surface.diffuse
-    height, width = triangle_id.shape
-    for row in prange(height):
-        material = np.empty(width, np.int32)
-        for x in range(width):
-            face = triangle_id[row, x]
-            material[x] = faces[np.uint32(max(face, np.int32(0)))] if face >= 0 else np.int32(-1)
-        if material_id.size > 0:
-            for x in range(width):
-                material_id[row, x] = material[x]
-        if albedo.size > 0:
-            for channel in range(3):
-                for x in range(width):
-                    known = np.uint32(max(material[x], np.int32(0)))
-                    albedo[channel, row, x] = diffuse[known, channel] if material[x] >= 0 else diffuse.dtype.type(0)
+            describe(surface, surface.normals, projection, m, count, shaped, painted, records)
+            _fill(projection, tile, listed, surface.normals, runs, records, line, channels, planes)
+            left += tile.columns
+            if not listed and left >= width:
+                strip, left = strip + workers, np.int64(0)
 
 
 @kernel
@@ -161,38 +151,29 @@ def _records_of(scratch: Scratch, worker: int) -> Records:
 
 
 @kernel
-def resolve_at(
-    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, channels: ChannelMask, planes: Planes,
-    scratch: Scratch,
-) -> None:
-    """Fill the planes of the chosen channels at some texels, with the bits that `resolve` gives there.
+def _list_runs(
+    projection: Projection, triangle_id: Array, texel: Array, done: int, runs: Runs, records: Records, line: Array
+) -> tuple[int, int]:
+    """Make runs of one texel each and write their rays: of as many listed ones as follow one another on a map.
 
-    `projection`: the maps that `triangle_id` was drawn on. `triangle_id` (H, W): triangle at each texel, -1 for none.
-    `texel` (n,): texels of the flattened maps. `channels`: which planes to fill. `planes`: the result, one row of n
-    texels. `scratch`: of one worker.
+    Result: the map, and how many.
     """
-    runs, records, line = _runs_of(scratch, 0), _records_of(scratch, 0), scratch.line[0]
-    width, height, done = projection.width, projection.height, 0
-    painted = channels.albedo | channels.material_id
-    while done < len(texel):  # as many as follow one another on the same map
-        m, count = texel[done] // width // height, 0
-        while count < BATCH and done + count < len(texel) and texel[done + count] // width // height == m:
-            row, column = texel[done + count] // width, texel[done + count] % width
-            face = triangle_id[row, column]
-            records.face[count + 1] = max(face, 0)
-            runs.first[0, count], runs.record[0, count] = count, count + 1 if face >= 0 else 0
-            write_ray(projection, row, column, count, line)
-            count += 1
-        runs.first[0, count], runs.number[0] = count, count
-        describe(surface, projection, m, count + 1, painted, records)
-        tile = Tile(m * height, done, 1, count)
-        _fill(projection, tile, True, len(surface.normals) > 0, runs, records, line, channels, planes)
-        done += count
+    width, height = projection.width, projection.height
+    m, count = texel[done] // width // height, 0
+    while count < BATCH and done + count < len(texel) and texel[done + count] // width // height == m:
+        row, column = texel[done + count] // width, texel[done + count] % width
+        face = triangle_id[row, column]
+        records.face[count + 1] = max(face, 0)
+        runs.first[0, count], runs.record[0, count] = count, count + 1 if face >= 0 else 0
+        write_ray(projection, row, column, count, line)
+        count += 1
+    runs.first[0, count], runs.number[0] = count, count
+    return m, count
 
 
 @kernel
 def _fill(
-    projection: Projection, tile: Tile, listed: bool, smooth: bool, runs: Runs, records: Records, line: Array,
+    projection: Projection, tile: Tile, listed: bool, normals: Array | None, runs: Runs, records: Records, line: Array,
     channels: ChannelMask, planes: Planes,
 ) -> None:
     """Fill a tile of the planes row by row: what depends on the triangle run by run, the rest along the whole row.
@@ -214,12 +195,13 @@ def _fill(
             store_distance(kind, view, row, left, columns, line, planes.distance)
         if channels.position:
             store_points(kind, view, row, left, columns, line, planes.position)
-        if smooth and channels.normal:
-            mix_normals(kind, y, count, first, record, fixed, line)
-            store_units(row, left, columns, line, planes.normal)
-        elif channels.normal:
-            spread(NORMAL, y, count, first, record, fixed, line)
-            store(row, left, columns, line, planes.normal)
+        if channels.normal:
+            if normals is None:
+                spread(NORMAL, y, count, first, record, fixed, line)
+                store(row, left, columns, line, planes.normal)
+            else:
+                mix_normals(kind, y, count, first, record, fixed, line)
+                store_units(row, left, columns, line, planes.normal)
         if channels.albedo:
             spread(ALBEDO, y, count, first, record, fixed, line)
             store(row, left, columns, line, planes.albedo)

@@ -11,14 +11,14 @@ import numpy as np
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange, thread_count
-from refgi.radiometry import DIRECTIONAL, FOR_FLOAT32, POINT, SPOT, falloff_in_float64, incident_light
+from refgi.radiometry import DIRECTIONAL, FOR_FLOAT32, POINT, falloff_in_float64, incident_light
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.reflective import Rsm
 from refgi.rsm.buffers.surfaces import row_view
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection, image_of_view, texel_coordinates
 from refgi.scene.light import Lamp, light_of
-from refgi.scene.model import Light, LightTable, light_table
+from refgi.scene.model import Light, LightTable, SpotLight, light_table
 from refgi.stages import stage
 from refgi.types import Array
 
@@ -246,35 +246,55 @@ def lamp_irradiance(
     is the rounding of positions: relative to the cone's radius, 6e-8 of the largest coordinate.
     """
     out = plane(position.shape, position.dtype)
-    table = light_table((light,))
-    _irradiance(table, position, normal, covered, NO_SHADOW if visible is None else visible, out)
+    fill = _spot_irradiance if isinstance(light, SpotLight) else _irradiance
+    fill(light_table((light,)), position, normal, covered, NO_SHADOW if visible is None else visible, out)
     return out
+
+
+@kernel(parallel=True)
+def _spot_irradiance(
+    lights: LightTable, position: Array, normal: Array, covered: Array, visible: Array, out: Array
+) -> None:
+    width = covered.shape[1]
+    for row in prange(covered.shape[0]):
+        # a row of factors first: loops that write planes as well would be no SIMD lanes
+        reached, doubtful, factor = np.empty(width, np.bool_), np.empty(width, np.bool_), np.empty(width)
+        _reached(covered, visible, row, reached)
+        receivers = SurfacePoints(position, normal, covered)
+        _spot_factors(lights, receivers, row, out.itemsize == 4, reached, factor, doubtful)
+        _scale(lights, row, factor, out)
+        for x in range(width):
+            if doubtful[x]:
+                _irradiance_at(lights, receivers, row, x, out)
 
 
 @kernel(parallel=True)
 def _irradiance(
     lights: LightTable, position: Array, normal: Array, covered: Array, visible: Array, out: Array
 ) -> None:
-    red, green, blue = lights.intensity[0, 0], lights.intensity[0, 1], lights.intensity[0, 2]
+    """Fill irradiance of a point or directional light."""
     width = covered.shape[1]
     for row in prange(covered.shape[0]):
-        # a row of factors first: loops that write planes as well would be no SIMD lanes
-        reached, doubtful, factor = np.empty(width, np.bool_), np.empty(width, np.bool_), np.empty(width)
-        for x in range(width):
-            reached[x] = covered[row, x] if visible.size == 0 else covered[row, x] & visible[row, x]
-        receivers = SurfacePoints(position, normal, covered)
-        if lights.kind[0] == SPOT:
-            _spot_factors(lights, receivers, row, out.itemsize == 4, reached, factor, doubtful)
-        elif lights.kind[0] == POINT:
-            _point_factors(lights, receivers, row, reached, factor)
+        reached, factor = np.empty(width, np.bool_), np.empty(width)
+        _reached(covered, visible, row, reached)
+        if lights.kind[0] == POINT:
+            _point_factors(lights, SurfacePoints(position, normal, covered), row, reached, factor)
         else:
-            _directional_factors(lights, receivers, row, reached, factor)
-        for x in range(width):
-            out[0, row, x], out[1, row, x], out[2, row, x] = red * factor[x], green * factor[x], blue * factor[x]
-        if lights.kind[0] == SPOT:
-            for x in range(width):
-                if doubtful[x]:
-                    _irradiance_at(lights, receivers, row, x, out)
+            _directional_factors(lights, SurfacePoints(position, normal, covered), row, reached, factor)
+        _scale(lights, row, factor, out)
+
+
+@kernel
+def _reached(covered: Array, visible: Array, row: int, reached: Array) -> None:
+    for x in range(len(reached)):
+        reached[x] = covered[row, x] if visible.size == 0 else covered[row, x] & visible[row, x]
+
+
+@kernel
+def _scale(lights: LightTable, row: int, factor: Array, out: Array) -> None:
+    red, green, blue = lights.intensity[0, 0], lights.intensity[0, 1], lights.intensity[0, 2]
+    for x in range(len(factor)):
+        out[0, row, x], out[1, row, x], out[2, row, x] = red * factor[x], green * factor[x], blue * factor[x]
 
 
 @kernel

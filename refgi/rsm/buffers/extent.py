@@ -45,7 +45,7 @@ class Extent(NamedTuple):
         return self if self.diagonal > 0 else Extent(*geometry.bounds)
 
 
-@stage("frame.visible_extent", steps="refgi.rsm.buffers.extent_steps.visible_steps")
+@stage("frame.visible_extent", steps="refgi.rsm.buffers.steps.visible_steps")
 def visible_extent(buffer: GBuffer) -> Extent:
     """Return the bounding box of the visible surfaces.
 
@@ -61,7 +61,7 @@ def bounds_of(position: Array, covered: Array) -> Extent:
     return Extent(rows[:3].min(axis=1), rows[3:].max(axis=1))
 
 
-@stage("frame.illuminated_extent", steps="refgi.rsm.buffers.extent_steps.illuminated_steps")
+@stage("frame.illuminated_extent", steps="refgi.rsm.buffers.steps.illuminated_steps")
 def illuminated_extent(rsms: Sequence[Rsm]) -> Extent:
     """Return the bounding box of surfaces that reflect direct light, from a grid of each map's texels.
 
@@ -73,10 +73,7 @@ def illuminated_extent(rsms: Sequence[Rsm]) -> Extent:
 
 
 def joined(one: Extent, other: Extent) -> Extent:
-    """Return the box around two.
-
-    Result: the smallest that holds both.
-    """
+    """Return the smallest box that holds two."""
     return Extent(np.minimum(one.low, other.low), np.maximum(one.high, other.high))
 
 

@@ -1,5 +1,9 @@
-"""The G-buffer of a camera or a light: depth, position, normal, albedo, ids; each channel resolved on first use."""
+"""The G-buffer of a camera or a light: depth, position, normal, albedo, ids; each channel resolved on first use.
 
+Besides, face normals where shading normals are interpolated, and backs that are seen.
+"""
+
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -7,9 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from refgi.errors import expect
-from refgi.jit import thread_count
-from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, resolve_at, resolve_materials, tint
-from refgi.rsm.buffers.facing import facing_normals
+from refgi.jit import kernel, prange, thread_count
+from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, tint
 from refgi.rsm.buffers.surfaces import Surface
 from refgi.rsm.buffers.textures import paint
 from refgi.rsm.pool import plane
@@ -20,8 +23,70 @@ from refgi.skips import left_out
 from refgi.stages import stage
 from refgi.types import Array
 
+
+@stage("rsm.facing")
+def facing_normals(geometry: Geometry, triangle_id: Array, normal: Array) -> Array:
+    """Return the normal of each pixel's triangle on the side of its shading normal (docs/conventions).
+
+    normal (3, h, w): Shading normals; their dtype is that of the result.
+    -> (3, h, w): Unit vectors; 0 where there is no surface. The very array `normal` where nothing is interpolated.
+    """
+    if geometry.vertex_normals is None:
+        return normal
+    facing = plane(normal.shape, normal.dtype)
+    _fill_facing(geometry.vertices, geometry.faces, triangle_id, normal, facing)
+    return facing
+
+
+@stage("rsm.backs")
+def share_of_backs(geometry: Geometry, one_sided: Array, eye: tuple[float, float, float], triangle_id: Array) -> float:
+    """Return the share of pixels with a surface that show the back of one that its file leaves out.
+
+    geometry: The triangles; fronts are counter-clockwise.
+    one_sided (k,) bool: Which materials have no back.
+    eye: Where the camera is, m.
+    -> float: From 0 to 1.
+    """
+    pixels = np.bincount(triangle_id[triangle_id >= 0], minlength=1)
+    seen = np.flatnonzero(pixels)
+    a, b, c = (geometry.vertices[geometry.faces[seen, k]] for k in range(3))
+    turned = np.einsum("ij,ij->i", np.cross(b - a, c - a), np.asarray(eye) - a) < 0
+    backs = seen[turned & one_sided[geometry.material_of_face[seen]]]
+    return float(pixels[backs].sum() / max(1, pixels.sum()))
+
+
+@kernel(parallel=True)
+def _fill_facing(vertices: Array, faces: Array, triangle_id: Array, normal: Array, facing: Array) -> None:
+    for row in prange(triangle_id.shape[0]):
+        last, nx, ny, nz = -1, 0.0, 0.0, 0.0
+        for column in range(triangle_id.shape[1]):
+            face = triangle_id[row, column]
+            if face != last:  # neighbours mostly share their triangle
+                nx, ny, nz = _unit_normal(vertices, faces, face)
+                last = face
+            along = nx * normal[0, row, column] + ny * normal[1, row, column] + nz * normal[2, row, column]
+            sign = -1.0 if along < 0.0 else 1.0
+            facing[0, row, column] = sign * nx
+            facing[1, row, column] = sign * ny
+            facing[2, row, column] = sign * nz
+
+
+@kernel
+def _unit_normal(vertices: Array, faces: Array, face: int) -> Any:
+    if face < 0:
+        return 0.0, 0.0, 0.0
+    i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+    ax, ay, az = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1], vertices[j, 2] - vertices[i, 2]
+    bx, by, bz = vertices[k, 0] - vertices[i, 0], vertices[k, 1] - vertices[i, 1], vertices[k, 2] - vertices[i, 2]
+    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if length == 0.0:
+        return 0.0, 0.0, 0.0
+    return nx / length, ny / length, nz / length
+
+
 MANY = 8  # as soon as one texel in so many is asked for, all are computed
-OF_MATERIALS = {"albedo", "material_id"}  # channels that need no geometry but the triangle
+NO_TEXELS = np.zeros(0, np.int64)
 
 
 class GBuffer:
@@ -180,7 +245,8 @@ class GBuffer:
             planes = _planes(missing, (1, len(texel)), self.dtype)
             surface = _surface(self._geometry, self._materials, self.dtype)
             channels = ChannelMask(*(name in missing for name in ChannelMask._fields))
-            resolve_at(surface, self.projection, self.visibility.triangle_id, texel, channels, planes, allocate(1, 1))
+            resolve(surface, self.projection, self.visibility.triangle_id, texel, True, channels, planes,
+                    allocate(1, 1))
             paint(self._geometry, self._materials, self.projection, self.visibility.triangle_id, planes.albedo, texel)
             tint(self._geometry, self.projection, self.visibility.triangle_id, planes.albedo, texel)
             computed = {name: getattr(planes, name)[..., 0, :] for name in missing}
@@ -238,10 +304,7 @@ def _resolve(
     planes = _planes(names, triangle_id.shape, dtype)
     channels = ChannelMask(*(name in names for name in ChannelMask._fields))
     surface = _surface(geometry, materials, dtype)
-    if set(names) <= OF_MATERIALS:
-        resolve_materials(surface, triangle_id, planes.albedo, planes.material_id)
-    else:
-        resolve(surface, projection, triangle_id, channels, planes, allocate(thread_count()))
+    resolve(surface, projection, triangle_id, NO_TEXELS, False, channels, planes, allocate(thread_count()))
     paint(geometry, materials, projection, triangle_id, planes.albedo)
     tint(geometry, projection, triangle_id, planes.albedo)
     return {name: getattr(planes, name) for name in names}
@@ -258,6 +321,5 @@ def _planes(names: tuple[str, ...], shape: tuple[int, ...], dtype: np.dtype[Any]
 
 
 def _surface(geometry: Geometry, materials: MaterialTable, dtype: np.dtype[Any]) -> Surface:
-    normals = np.zeros((0, 3)) if geometry.vertex_normals is None else geometry.vertex_normals
-    return Surface(geometry.vertices, geometry.faces, normals, geometry.material_of_face,
+    return Surface(geometry.vertices, geometry.faces, geometry.vertex_normals, geometry.material_of_face,
                    materials.diffuse.astype(dtype, copy=False))  # fmt: skip

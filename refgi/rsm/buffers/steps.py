@@ -1,11 +1,13 @@
-"""Views one step after the other: which triangle each texel sees, what it is, what flux a lamp's texels reflect."""
+"""Views one step after the other: which triangle each texel sees, what it is, what flux is reflected, extents seen."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from refgi.rsm.buffers.direct import ShadowMap, SurfacePoints, looked_up
+from refgi.rsm.buffers.extent import SAMPLES, Extent, bounds_of, texel_grid
 from refgi.rsm.buffers.gbuffer import GBuffer
 from refgi.rsm.buffers.light_projection import MapShape, light_projection
 from refgi.rsm.buffers.reflective import Rsm
@@ -125,3 +127,48 @@ def map_steps(
     seen = _channels(triangle_id, *map_surface(geometry, materials, maps, triangle_id, np.dtype(dtype)))
     made = reflected_flux(geometry, materials, maps, lamp_of(light), seen["triangle_id"], np.dtype(dtype))
     return {**seen, **dict(zip(("solid_angle", "flux", "lobe_flux", "lobe_axis", "lobe_exponent"), made, strict=True))}
+
+
+@stage("rsm.visible_extent", kept=False)
+def visible_extent(position: Array, covered: Array) -> tuple[Array, Array]:
+    """Bound what the camera sees (docs/methods/val).
+
+    position (3, h, w): Surface points of pixels, m.
+    -> low (3,): Least coordinates of the pixels' surface points, m.
+    -> high (3,): Greatest ones, m.
+    """
+    low, high = bounds_of(position, covered)
+    return low, high
+
+
+@stage("rsm.illuminated_extent", kept=False)
+def illuminated_extent(
+    map_positions: tuple[Array, ...], map_fluxes: tuple[Array, ...], map_lobe_fluxes: tuple[Array | None, ...]
+) -> tuple[Array, Array]:
+    """Bound what reflects direct light, of all lamps, by a grid of 96 x 96 texels of each map (docs/methods/val).
+
+    map_positions tuple of (3, h, w): Surface points of each lamp's map, m.
+    map_fluxes tuple of (3, h, w): Flux that diffuse surfaces reflect, W.
+    map_lobe_fluxes tuple of (3, h, w): Flux that lobes reflect, W; none where no material has one.
+    -> low (3,): Least coordinates of texels with flux, m.
+    -> high (3,): Greatest ones, m.
+    """
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for position, flux, lobe_flux in zip(map_positions, map_fluxes, map_lobe_fluxes, strict=True):
+        reflects = np.asarray(flux.any(axis=0) if lobe_flux is None else flux.any(axis=0) | lobe_flux.any(axis=0))
+        texel = texel_grid(reflects, SAMPLES)
+        shown = position.reshape(3, -1)[:, texel[reflects.reshape(-1)[texel]]]
+        low, high = np.minimum(low, shown.min(axis=1, initial=np.inf)), np.maximum(
+            high, shown.max(axis=1, initial=-np.inf))
+    return low, high
+
+
+def visible_steps(buffer: GBuffer) -> Extent:
+    """Return the box of what a camera sees, made by steps."""
+    return Extent(*visible_extent(*buffer.resolve("position", "covered")))
+
+
+def illuminated_steps(rsms: Sequence[Rsm]) -> Extent:
+    """Return the box of what reflects direct light, made by steps."""
+    return Extent(*illuminated_extent(*(tuple(getattr(rsm, name) for rsm in rsms) for name in (
+        "position", "flux", "lobe_flux"))))

@@ -35,7 +35,7 @@ class Surface(NamedTuple):
 
     vertices: Array  # (n, 3) float64, m
     faces: Array  # (m, 3) int32
-    normals: Array  # (n, 3) float64, or (0, 3): the faces' normals count
+    normals: Any  # (n, 3) float64; None: the faces' normals count
     material_of_face: Array  # (m,) int32
     diffuse: Array  # (materials, 3)
 
@@ -69,25 +69,31 @@ def barycentric_axes(v0: Any, v1: Any, v2: Any, origin: Any) -> Any:
 
 @kernel
 def describe(
-    surface: Surface, projection: Projection, m: int, count: int, painted: bool, records: Records
+    surface: Surface, normals: Array | None, projection: Projection, m: int, count: int, shaped: bool, painted: bool,
+    records: Records,
 ) -> None:
     """Fill the records of triangles that map `m` sees.
 
-    `count`: one past the last record. `painted`: whether material and albedo are read. `records`: `face` is read, all
-    else is written.
+    `normals`: those of `surface`; an argument of its own, so that kernels of flat scenes have no code for them.
+    `count`: one past the last record. `shaped`: whether geometry is read, `painted`: whether material and albedo are.
+    `records`: `face` is read, all else is written.
     """
     batch, fixed = records.batch, records.fixed
-    smooth = len(surface.normals) > 0
     for base in range(1, count, BATCH):
         size = min(BATCH, count - base)
-        _gather(surface, records.face, base, size, batch)
-        _orient(projection, m, batch)
-        _bound(projection, m, batch)
-        if smooth and projection.kind == ORTHOGRAPHIC:
-            _mix_parallel(projection, m, batch)
-        elif smooth:
-            _mix_central(projection, m, batch)
-        columns = COLUMNS if smooth else MIXED
+        columns = MIXED
+        if shaped:
+            _gather(surface, records.face, base, size, batch)
+            _orient(projection, m, batch)
+            _bound(projection, m, batch)
+        if normals is not None:
+            columns = COLUMNS
+            if shaped:
+                _gather_normals(surface.faces, normals, records.face, base, size, batch)
+                if projection.kind == ORTHOGRAPHIC:
+                    _mix_parallel(projection, m, batch)
+                else:
+                    _mix_central(projection, m, batch)
         for b in range(size if painted else 0):
             face = records.face[base + b]
             material = surface.material_of_face[face]
@@ -101,21 +107,25 @@ def describe(
 
 @kernel
 def _gather(surface: Surface, face_of: Array, base: int, size: int, batch: Array) -> None:
-    """Write corners and their normals: loads that wait for memory, many under way at once."""
-    vertices, faces, normals = surface.vertices, surface.faces, surface.normals
+    """Write corners: loads that wait for memory, many under way at once."""
+    vertices, faces = surface.vertices, surface.faces
     for b in range(size):
         face = face_of[base + b]
         for corner in range(3):
             vertex = faces[face, corner]
             for axis in range(3):
                 batch[(3 * corner + axis) * BATCH + b] = vertices[vertex, axis]
-    if len(normals) > 0:
-        for b in range(size):
-            face = face_of[base + b]
-            for corner in range(3):
-                vertex = faces[face, corner]
-                for axis in range(3):
-                    batch[(9 + 3 * corner + axis) * BATCH + b] = normals[vertex, axis]
+
+
+@kernel
+def _gather_normals(faces: Array, normals: Array, face_of: Array, base: int, size: int, batch: Array) -> None:
+    """Write normals of corners."""
+    for b in range(size):
+        face = face_of[base + b]
+        for corner in range(3):
+            vertex = faces[face, corner]
+            for axis in range(3):
+                batch[(9 + 3 * corner + axis) * BATCH + b] = normals[vertex, axis]
 
 
 @kernel

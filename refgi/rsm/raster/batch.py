@@ -18,8 +18,8 @@ import numpy as np
 
 from refgi.jit import kernel
 from refgi.rsm.raster.triangle import LANES, SMALLEST, SPAN_CUT
-from refgi.scene.cutouts import CutFaces
 from refgi.scene.texture.lookup import is_opaque, lent
+from refgi.scene.triangles import CutFaces
 from refgi.types import Array
 
 IN_PLANE = 1e-7  # share of a triangle's size: a corner not farther from the plane through the eye is taken to lie in it

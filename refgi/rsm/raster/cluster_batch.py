@@ -29,7 +29,7 @@ from refgi.rsm.raster.batch import (
 from refgi.rsm.raster.placed_clusters import Placed, is_hidden, is_sound
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, view_coordinates
 from refgi.rsm.raster.triangle import BOX_PAD, LANES, SMALLEST_W, crossing_box
-from refgi.scene.clusters import CLUSTER, Clusters
+from refgi.scene.triangles import CLUSTER, Clusters
 from refgi.types import Array
 
 SMALL = 2  # columns and rows of a box whose triangle is drawn in a lane

@@ -19,13 +19,12 @@ from refgi.errors import expect
 from refgi.jit import kernel, prange, thread_count
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.batch import EMPTY, unpack
-from refgi.rsm.raster.paraboloid_batch import gather, orient, transform
-from refgi.rsm.raster.paraboloid_chunks import ANY, KINDS, next_batch
+from refgi.rsm.raster.paraboloid_batch import ANY, KINDS, gather, next_batch, orient, transform
 from refgi.rsm.raster.paraboloid_texels import Scratch, draw_rows, draw_texels, scratch
 from refgi.rsm.raster.projection import Projection, paraboloid_projection
 from refgi.rsm.raster.triangle import CHUNK, LANES, Chunks, chunks
-from refgi.scene.cutouts import CutFaces
 from refgi.scene.model import Geometry
+from refgi.scene.triangles import CutFaces
 from refgi.stages import stage
 from refgi.types import Array
 
@@ -136,10 +135,7 @@ def clear_outside_disc(projection: Projection, nearness: Array, ids: Array) -> N
 
 @kernel
 def to_distance(projection: Projection, keys: Array, distance: Array) -> float:
-    """Write distances of a map from its keys, inf where there is no surface and outside the disc.
-
-    Result: the smallest.
-    """
+    """Write distances of a map from its keys, inf where there is no surface and outside the disc."""
     n, half, least = projection.width, projection.half[0], np.inf
     step, real, nearness = 2.0 * half / n, distance.dtype.type, keys.view(np.float64)
     for row in range(n):

@@ -17,6 +17,7 @@ from refgi.rsm.raster.paraboloid_batch import (
     BEHIND,
     BETWEEN_TEXELS,
     BOX,
+    KINDS,
     LIMIT,
     NEAR,
     NEARNESS,
@@ -25,10 +26,9 @@ from refgi.rsm.raster.paraboloid_batch import (
     STATE,
     bound_across,
 )
-from refgi.rsm.raster.paraboloid_chunks import KINDS
 from refgi.rsm.raster.triangle import CHUNK, LANES, SPAN_CUT
-from refgi.scene.cutouts import CutFaces
 from refgi.scene.texture.lookup import is_opaque, lent
+from refgi.scene.triangles import CutFaces
 from refgi.types import Array
 
 

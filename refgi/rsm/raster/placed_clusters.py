@@ -21,7 +21,7 @@ import numpy as np
 from refgi.jit import kernel, prange
 from refgi.rsm.raster.batch import EMPTY, key_of
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, view_coordinates
-from refgi.scene.clusters import Clusters
+from refgi.scene.triangles import Clusters
 from refgi.types import Array
 
 SLACK = 1e-3  # share by which a sound triangle's nearness may exceed its nearest corner's
@@ -141,23 +141,13 @@ def is_sound(plane: Array, first: int, last: int, placed: Placed, c: int) -> boo
     return unsound == 0
 
 
-@kernel
-def list_clusters(rect: Array, order: Array, rows: int, starts: Array) -> Array:
-    """Return the clusters of band 0, of band 1, ...; `starts` (bands + 1,) receives where each begins.
+def list_clusters(rect: Array, order: Array, rows: int, bands: int) -> tuple[Array, Array]:
+    """List the clusters of each band of `rows` rows, in the order given: where each band's begin, and all of them.
 
-    `rect` (c, 4): texels that each cluster may cover. `order` (c,): all clusters, as each band's are to follow one
-    another. `rows`: height of a band.
+    `rect` (c, 4): texels that each cluster may cover. `order` (c,): all clusters. Result: (bands + 1,) and (...) int32.
     """
-    for c in range(len(rect)):
-        if rect[c, 0] <= rect[c, 1] and rect[c, 2] <= rect[c, 3]:
-            for band in range(rect[c, 2] // rows, rect[c, 3] // rows + 1):
-                starts[band + 1] += 1
-    for band in range(1, len(starts)):
-        starts[band] += starts[band - 1]
-    cursors, members = starts[:-1].copy(), np.empty(starts[-1], np.int32)
-    for c in order:
-        if rect[c, 0] <= rect[c, 1] and rect[c, 2] <= rect[c, 3]:
-            for band in range(rect[c, 2] // rows, rect[c, 3] // rows + 1):
-                members[cursors[band]] = c
-                cursors[band] += 1
-    return members
+    seen = order[(rect[order, 0] <= rect[order, 1]) & (rect[order, 2] <= rect[order, 3])]
+    first, count = rect[seen, 2] // rows, rect[seen, 3] // rows - rect[seen, 2] // rows + 1
+    band = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+    members = np.repeat(seen, count)[np.argsort(band.astype(np.uint16), kind="stable")]
+    return np.append(0, np.cumsum(np.bincount(band, minlength=bands))), members.astype(np.int32)

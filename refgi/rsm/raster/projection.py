@@ -78,10 +78,7 @@ def camera_projection(camera: Camera, width: int | None = None, height: int | No
 
 
 def spot_projection(light: SpotLight, n: int) -> Projection:
-    """Return the square perspective map whose inscribed circle is the spot's outer cone.
-
-    `n`: texels along a side.
-    """
+    """Return the square perspective map whose inscribed circle is the spot's outer cone; `n`: texels along a side."""
     half = math.tan(light.outer_half_angle)
     return _maps(PERSPECTIVE, n, n, [light.position], [view_frame(light.direction)], (half, half))
 

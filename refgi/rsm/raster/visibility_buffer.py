@@ -19,9 +19,8 @@ from refgi.rsm.raster.paraboloid import cut_chunks, draw_paraboloids
 from refgi.rsm.raster.placed_clusters import Placed, list_clusters, place
 from refgi.rsm.raster.projection import PARABOLOID, Projection
 from refgi.rsm.raster.triangle import LANES, bound_triangles, project_vertices
-from refgi.scene.clusters import Clusters
-from refgi.scene.cutouts import CutFaces
 from refgi.scene.model import Geometry
+from refgi.scene.triangles import Clusters, CutFaces
 from refgi.skips import left_out
 from refgi.stages import stage
 from refgi.types import Array
@@ -191,8 +190,8 @@ def _draw_clusters(
 ) -> None:
     """Draw one map in bands of rows, each from the clusters that reach it, the nearest first."""
     clusters, (height, width) = geometry.clusters, projection.shape
-    placed, starts = place(projection, clusters), np.zeros(-(-height // rows) + 1, np.int64)
-    members = list_clusters(placed.rect, np.argsort(-placed.nearest, kind="stable"), rows, starts)
+    placed = place(projection, clusters)
+    starts, members = list_clusters(placed.rect, np.argsort(-placed.nearest, kind="stable"), rows, -(-height // rows))
     lists, passed = ClusterLists(starts, members, rows), np.zeros(len(starts) - 1, np.int64)
     keys = plane((thread_count(), rows * (width + LANES)), np.int64)
 

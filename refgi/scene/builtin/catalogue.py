@@ -9,8 +9,8 @@ from functools import cached_property
 from refgi.errors import InputError, expect
 from refgi.scene.builtin.atrium import atrium, textured_atrium
 from refgi.scene.builtin.cornell import cornell_box, cornell_sphere, integrating_sphere, parallel_plates, wedge
-from refgi.scene.builtin.metaballs import metaballs
 from refgi.scene.builtin.stage import glass_ball, leaf_grid, ring, stage
+from refgi.scene.builtin.surfaces import metaballs
 from refgi.scene.files import did_you_mean
 from refgi.scene.model import Scene
 

@@ -44,10 +44,7 @@ LIGHT = SpotLight((0.278, 0.5475, 0.2), (0.216263, -0.970525, 0.106359), math.ra
 
 
 def cornell_box() -> Scene:
-    """Build the box with its two blocks.
-
-    Result: 30 faces, 3 materials.
-    """
+    """Build the box with its two blocks; 30 faces, 3 materials."""
     blocks = [_quads(SHORT_BLOCK, WHITE, "short_block"), _quads(TALL_BLOCK, WHITE, "tall_block")]
     geometry, materials = merge([*shell(), *blocks])
     return Scene("cornell_box", geometry, materials, CAMERA, (LIGHT,),
@@ -70,10 +67,7 @@ def cornell_sphere(faces: int = 16_990) -> Scene:
 
 
 def shell() -> list[Mesh]:
-    """Return the five walls of the box.
-
-    Result: ten faces in all, open towards -z.
-    """
+    """Return the five walls of the box; ten faces in all, open towards -z."""
     return [_quads(FLOOR, WHITE, "floor"), _quads(CEILING, WHITE, "ceiling"), _quads(BACK_WALL, WHITE, "back_wall"),
             _quads(RIGHT_WALL, GREEN, "right_wall"), _quads(LEFT_WALL, RED, "left_wall")]
 

@@ -10,17 +10,13 @@ import math
 import numpy as np
 
 from refgi.errors import expect
-from refgi.scene.builtin.surfaces import lathe, rectangle, ring_surface, sphere
+from refgi.scene.builtin.surfaces import lathe, rectangle, ring_surface, sphere, walls
 from refgi.scene.model import Camera, Material, Mesh, Scene, SpotLight, merge
 from refgi.scene.repair import mean_face_normals
 from refgi.scene.texture import Image, Texture
 from refgi.types import Array
 
 MOST_FACES = 50_000_000
-FLOOR = Material("stage_floor", (0.75, 0.73, 0.7))
-BACK = Material("stage_back", (0.7, 0.66, 0.58))
-LEFT = Material("stage_left", (0.62, 0.12, 0.08))
-RIGHT = Material("stage_right", (0.1, 0.25, 0.6))
 GLAZE = Material("glaze", (0.65, 0.62, 0.58), (0.2, 0.2, 0.2), 40.0)
 GLASS = Material("glass", (0.0, 0.0, 0.0), ior=1.5)
 WOOD = Material("wood", (0.5, 0.32, 0.17))
@@ -31,17 +27,6 @@ VASE = np.array([(0.0, 0.0), (0.055, 0.0), (0.058, 0.012), (0.045, 0.022), (0.07
                  (0.102, 0.15), (0.086, 0.2), (0.052, 0.24), (0.04, 0.265), (0.044, 0.29), (0.062, 0.31),
                  (0.066, 0.316), (0.06, 0.318), (0.038, 0.29), (0.034, 0.265), (0.046, 0.24), (0.08, 0.2),
                  (0.095, 0.15), (0.09, 0.11), (0.066, 0.06), (0.03, 0.03), (0.0, 0.028)])
-
-
-def walls() -> list[Mesh]:
-    """Return the stage's floor and walls.
-
-    Result: eight faces, 1.2 x 0.7 x 1.0 m, open in front and above; normals point inside.
-    """
-    return [rectangle((-0.6, 0.0, 0.6), (1.2, 0.0, 0.0), (0.0, 0.0, -1.0), FLOOR, "floor"),
-            rectangle((-0.6, 0.0, -0.4), (1.2, 0.0, 0.0), (0.0, 0.7, 0.0), BACK, "back"),
-            rectangle((-0.6, 0.0, 0.6), (0.0, 0.0, -1.0), (0.0, 0.7, 0.0), LEFT, "left"),
-            rectangle((0.6, 0.0, -0.4), (0.0, 0.0, 1.0), (0.0, 0.7, 0.0), RIGHT, "right")]
 
 
 def stage(faces: int = 6_328) -> Scene:
@@ -59,10 +44,7 @@ def stage(faces: int = 6_328) -> Scene:
 
 
 def vase(faces: int) -> Mesh:
-    """Return a thin-walled vase standing on y = 0.
-
-    Result: watertight, with smooth outward normals.
-    """
+    """Return a thin-walled vase standing on y = 0; watertight, with smooth outward normals."""
     rows = max(8, round(math.sqrt(faces / 2)))
     columns = max(3, round(faces / (2 * (rows - 1))))
     turned = lathe(_smoothed(VASE, rows + 1), columns, GLAZE, "vase")

@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from refgi.errors import expect
-from refgi.scene.gltf.accessors import accessor
-from refgi.scene.gltf.container import Document
+from refgi.scene.gltf.container import Document, accessor
 from refgi.scene.gltf.nodes import Nodes, all_nodes
 from refgi.scene.mesh import as_float64
 from refgi.types import Array
@@ -28,10 +27,7 @@ class Pose(NamedTuple):
 
 
 def pose_of(document: Document, node: dict[str, Any], where: str) -> Pose:
-    """Return the pose of a node's mesh.
-
-    Raises `InputError` if a key is not usable.
-    """
+    """Return the pose of a node's mesh; raises `InputError` if a key is not usable."""
     mesh = document.item("meshes", node["mesh"], f"{where}.mesh")
     owner, place = (node, where) if "weights" in node else (mesh, f"meshes[{node['mesh']}]")
     weights = document.all_numbers(owner, "weights", place)

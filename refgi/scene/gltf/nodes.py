@@ -13,8 +13,7 @@ import numpy as np
 
 from refgi.errors import InputError, expect
 from refgi.scene.files import per_watt
-from refgi.scene.gltf.accessors import accessor
-from refgi.scene.gltf.container import Document
+from refgi.scene.gltf.container import Document, accessor
 from refgi.scene.mesh import as_float64
 from refgi.scene.model import Camera, DirectionalLight, Light, PointLight, SpotLight
 from refgi.scene.motion import expect_affine, invertible

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect
-from refgi.scene.gltf.accessors import accessor
-from refgi.scene.gltf.container import DRACO, Document, packed, unread
+from refgi.scene.gltf.container import DRACO, Document, accessor, packed, unread
 from refgi.scene.gltf.deform import Deformer, Pose, pose_of
 from refgi.scene.gltf.materials import UNPAINTED, Look, base_colour, emissive, read_material, transformed
 from refgi.scene.gltf.nodes import EXTENSION as LIGHTS

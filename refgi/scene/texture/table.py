@@ -106,10 +106,7 @@ _in_use: "weakref.WeakValueDictionary[tuple[Texture | None, ...], Textures]" = w
 
 
 def textures_of(textures: "Sequence[Texture | None]") -> Textures | None:
-    """Return the textures of some materials, None where no material has one.
-
-    `textures`: that of each material.
-    """
+    """Return the textures of some materials, None where no material has one; `textures`: that of each material."""
     key = tuple(textures)
     if not any(one is not None for one in key):
         return None

@@ -60,7 +60,7 @@ def of_light(arguments: Arguments, stage: Run, reads: Names, writes: Names) -> t
 
 def of_settings(arguments: Arguments, _: Run, reads: Names, writes: Names) -> tuple[Bug, ...]:
     """Return bugs of how many bounces there are, and of what emits and blocks."""
-    from refgi.truth.path_steps import path_traced as traced
+    from refgi.truth.steps import path_traced as traced
     from refgi.vectors.recorded import run_of
 
     settings = arguments["settings"]

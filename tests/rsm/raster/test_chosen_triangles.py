@@ -5,8 +5,7 @@ import pytest
 
 from refgi.rsm.raster import paraboloid
 from refgi.rsm.raster.paraboloid import Ignored, draw_distances, draw_paraboloids
-from refgi.rsm.raster.paraboloid_batch import AHEAD, BEHIND, BOX, STATE, gather, transform
-from refgi.rsm.raster.paraboloid_chunks import ANY, KINDS, MOST, sort_chunk
+from refgi.rsm.raster.paraboloid_batch import AHEAD, ANY, BEHIND, BOX, KINDS, MOST, STATE, gather, sort_chunk, transform
 from refgi.rsm.raster.paraboloid_texels import scratch
 from refgi.rsm.raster.projection import paraboloid_projection
 from refgi.rsm.raster.triangle import CHUNK, chunks

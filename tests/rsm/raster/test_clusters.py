@@ -12,7 +12,7 @@ from refgi.rsm.raster.placed_clusters import SLACK, place
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, Projection, camera_projection, directional_projection, view_frame
 from refgi.rsm.raster.visibility_buffer import Visibility, rasterize, scratch
 from refgi.scene import Camera, DirectionalLight
-from refgi.scene.clusters import CLUSTER
+from refgi.scene.triangles import CLUSTER
 from refgi.skips import count_skips, without_skip
 from tests.rsm.shapes import geometry, height_field, rotation, sheet, soup, sphere
 
@@ -77,8 +77,10 @@ def test_clusters_hold_each_triangle_once_with_its_own_corners():
             np.testing.assert_allclose(found.plane[3, of_place == c], offset, atol=1e-6 * longest)
 
 
-def test_a_cluster_of_a_mesh_without_order_is_small_and_shares_its_vertices():
-    shape = shuffled(height_field(20_000), np.random.default_rng(2))
+@pytest.mark.parametrize("away", [0.0, 100.0])
+def test_a_cluster_of_a_mesh_without_order_is_small_and_shares_its_vertices(away):
+    field = height_field(20_000)
+    shape = shuffled(geometry(field.vertices + away, field.faces), np.random.default_rng(2))
     side = (shape.clusters.box[:, 3:] - shape.clusters.box[:, :3]).max(axis=1)
     assert np.median(side) < 0.3  # of a square of 2, of which 64 of 20,000 triangles take 0.11 x 0.11
     assert np.diff(shape.clusters.start).mean() < CLUSTER

@@ -13,7 +13,7 @@ from refgi.rsm import camera_projection, paraboloid_depth_maps
 from refgi.rsm.raster.projection import cube_projection, paraboloid_projection
 from refgi.rsm.raster.visibility_buffer import rasterize
 from refgi.scene import Camera, Geometry, Image, Material, PointLight, Scene, Texture, load_scene
-from refgi.scene.cutouts import cut_outs
+from refgi.scene.triangles import cut_outs
 from tests.cutouts import heap, holed_quad, opaque
 from tests.naive import cutouts as naive
 from tests.rsm.raster.test_against_embree import edge_distance, pixel_rays

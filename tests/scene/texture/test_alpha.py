@@ -16,9 +16,9 @@ from refgi.cli.view import needed_bytes
 from refgi.errors import InputError, RefgiWarning
 from refgi.provenance.record import materials_digest
 from refgi.scene import Image, Material, Mesh, Scene, Texture, load_scene, merge
-from refgi.scene.cutouts import cut_outs
 from refgi.scene.texture.image import decoded
 from refgi.scene.texture.lookup import is_opaque
+from refgi.scene.triangles import cut_outs
 from tests.cutouts import heap, opaque, spots
 from tests.naive import cutouts as naive
 from tests.scene.samples import write_scene

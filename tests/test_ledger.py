@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
-from refgi.ledger import pixel_areas
-from refgi.ledger.light_terms import light_terms
+from refgi.ledger import light_terms, pixel_areas
 from refgi.lights.selection import choose_lights
 from refgi.rsm import texel_shares
 from refgi.rsm.raster.projection import CUBE_FORWARD, CUBE_UP

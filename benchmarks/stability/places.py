@@ -17,7 +17,7 @@ from refgi.rsm.raster.projection import PERSPECTIVE, Projection
 from refgi.scene import Camera, Geometry, Material, Mesh, PointLight, Scene, SpotLight
 from refgi.scene.motion import near_origin
 from refgi.scene.repair import repaired
-from refgi.splat.sii.reach.bounds import TANGENT_POINT, tangent_ellipsoid
+from refgi.splat.sii.bounds import TANGENT_POINT, tangent_ellipsoid
 from refgi.sssil.reprojection import SourceView, reproject
 from refgi.types import Array
 

@@ -7,7 +7,7 @@ out: lights stand for equal shares of the maps, and `lights.count` draws fewer t
 
 from collections.abc import Callable
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pydantic
@@ -63,7 +63,7 @@ def dim_lights(
     kept = brightest(parts, share)
     if not len(kept):
         return None
-    some = (receivers, selected(lights, kept), pairs, None if footprint is None else footprint[kept])
+    some = (receivers, lights.selected(kept), pairs, None if footprint is None else footprint[kept])
     every = (receivers, lights, pairs, footprint)
     times: tuple[list[float], list[float]] = ([], [])
     right, without = irradiance(*every), irradiance(*some)
@@ -87,15 +87,8 @@ def parts_of_lights(
     Without visibility; `footprint`: surface area that each light stands for, m^2.
     """
     sample = sample_for(receivers, lights)
-    return np.array([light_at(sample, selected(lights, [k]), pairs, None if footprint is None else footprint[[k]])
+    return np.array([light_at(sample, lights.selected([k]), pairs, None if footprint is None else footprint[[k]])
                      for k in range(lights.flux.shape[1])])
-
-
-def selected(lights: PixelLights, index: Any) -> PixelLights:
-    """Return some of the lights, in the order of `index` (n,)."""
-    parts: dict[str, Any] = {name: values[..., index] for name, values in lights._asdict().items()
-                             if isinstance(values, np.ndarray)}
-    return lights._replace(**parts)
 
 
 def brightest(parts: Array, share: float) -> Array:

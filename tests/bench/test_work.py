@@ -15,7 +15,7 @@ from refgi.methods import METHODS
 from refgi.rays import Tracer
 from refgi.scene import load_scene
 from refgi.settings import from_text
-from refgi.splat.sii.reach.fragments import fragments
+from refgi.splat.sii.fragments import fragments
 
 SIZE = {"width": 40, "height": 36, "rsm_resolution": 64, "shadows": "exact"}
 LIGHTS = 32
@@ -126,7 +126,7 @@ def test_subsplats_take_each_light(box, frame):
 
 def test_pairs_of_an_error_target_are_those_it_states(box, frame):
     one = choice("multires", f"lights={LIGHTS}", "clamp=none", "subsplats=error", "subsplats.target=0.05")
-    assert taken(box, "multires", *one.changes).pairs == recorded(frame, one, "multires.error_driven").output.pairs
+    assert taken(box, "multires", *one.changes).pairs == recorded(frame, one, "error_target.error_driven").output.pairs
 
 
 def test_each_pass_more_takes_as_many_rays(box):

@@ -20,7 +20,7 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import checked
 from refgi.scene import load_scene
 from refgi.splat import Receivers, irradiance
-from refgi.splat.multires.refinement.refine import refine
+from refgi.splat.multires.refine import refine
 from refgi.stages import observe
 from tests.splat.multires.choices import by_error, unclamped
 
@@ -96,7 +96,7 @@ def test_pairs_are_saved_and_all_counted(monkeypatch):
     monkeypatch.setattr(sum_module, "near_light", lambda *how: near.append(near_light(*how)) or near[-1])
     with observe() as log:
         found = driven(frame.gbuffer, lights, settings, area)
-    said = next(run.reason for run in log.runs if run.name == "multires.full_sum")
+    said = next(run.reason for run in log.runs if run.name == "error_target.full_sum")
     assert said.startswith(f"{found.pairs / found.full_pairs:.1%} of its pairs")
     points = np.concatenate(evaluated)
     assert len(np.unique(points, axis=0)) == len(points)  # no pixel twice

@@ -5,12 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from refgi.pairs.packing import HEADROOM, pack
-from refgi.pairs.pixel_lights import PixelLights
+from refgi.pairs.pixel_lights import HEADROOM, PixelLights, pack
 from refgi.pairs.settings import PairSettings
 from refgi.settings import of
-from refgi.splat.sii.reach.threshold import all_peaks, light_range, low_irradiance
 from refgi.splat.sii.settings import SiiSettings
+from refgi.splat.sii.threshold import all_peaks, light_range, low_irradiance
 
 UP = np.array([[0.0], [1.0], [0.0]], np.float32)
 NORMS = ("none", "full_lobe", "clamped")

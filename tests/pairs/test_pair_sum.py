@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from refgi.errors import InputError
 from refgi.jit import threads
-from refgi.pairs.packing import pack_diffuse
 from refgi.pairs.pair_sum import GROUP, TILE, geometry_term, sum_pairs
+from refgi.pairs.pixel_lights import pack_diffuse
 from refgi.pairs.tiles import bound_tile, lights_in_reach
 from refgi.settings import of
 from refgi.splat import PairSettings, Receivers, irradiance

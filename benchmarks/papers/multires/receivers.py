@@ -12,7 +12,7 @@ from benchmarks.papers.records import Cell, Figure, Picture, Table
 from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, seen_by
 from refgi.scene import Scene
 from refgi.splat.multires import ByError, ByGeometry, ByIrradiance, Criteria
-from refgi.splat.multires.lobes import multires_lobes
+from refgi.splat.multires.multires import multires_lobes
 
 LIGHTS = 256
 SHINE = (0.3, 0.35, 0.6)  # the paper tints what the Buddha reflects blue

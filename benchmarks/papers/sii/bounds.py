@@ -5,7 +5,7 @@ import numpy as np
 from benchmarks.papers.records import Figure, Plot, Table
 from benchmarks.papers.workbench import Workbench
 from refgi.compare.plot import Axes, Curve, curves_plot
-from refgi.splat.sii.reach.bounds import appendix_ellipsoid
+from refgi.splat.sii.bounds import appendix_ellipsoid
 
 ANGLES = np.linspace(0.0, np.pi / 2, 721)
 

@@ -16,10 +16,10 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import with_clamp
 from refgi.settings import of
 from refgi.splat import Receivers, SiiSettings, sii
-from refgi.splat.sii.reach.fragments import Fragments, fragments
-from refgi.splat.sii.reach.threshold import PAPER_CUT, PAPER_LIGHTS
-from refgi.splat.sii.reach.threshold import reference_length as reference_length_of
+from refgi.splat.sii.fragments import Fragments, fragments
 from refgi.splat.sii.settings import RelativeCut
+from refgi.splat.sii.threshold import PAPER_CUT, PAPER_LIGHTS
+from refgi.splat.sii.threshold import reference_length as reference_length_of
 from refgi.types import Array
 
 BOX = "cornell_sphere:faces=17000"  # as many faces as the scenes of a game in 2006

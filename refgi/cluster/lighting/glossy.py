@@ -12,8 +12,7 @@ from refgi.cluster.clustering.rectangle import AreaLights, VisibilityFunction
 from refgi.cluster.lighting.clustered import asks_shading, places_with_light, visibility_by
 from refgi.cluster.lighting.interleave import member_lights, some_lights
 from refgi.errors import expect
-from refgi.pairs.glossy import as_receivers, block_order, glossy_summed
-from refgi.pairs.irradiance import checked
+from refgi.pairs.irradiance import as_receivers, block_order, checked, glossy_summed
 from refgi.rsm.buffers.leaving import GlossyPoints
 from refgi.stages import report_progress, stage
 from refgi.types import Array

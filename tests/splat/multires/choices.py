@@ -1,9 +1,35 @@
 """Settings of `multires` in the words of its tests."""
 
+import dataclasses
 from functools import partial
+
+import numpy as np
 
 from refgi.settings import of
 from refgi.splat.multires.settings import MultiresSettings
+
+
+@dataclasses.dataclass
+class FakeBuffer:
+    """A picture with the channels of a G-buffer, without a camera."""
+
+    depth: np.ndarray
+    normal: np.ndarray
+    covered: np.ndarray
+    position: np.ndarray | None = None
+
+    @property
+    def dtype(self):
+        return self.depth.dtype
+
+    def resolve(self, *names):
+        return tuple(getattr(self, name) for name in names)
+
+
+def ids(buffer):
+    """Return triangles of a picture: one, where there is any."""
+    return np.where(buffer.covered, 0, -1)
+
 
 FORMS = {"depth": "range", "derivative": "slope", "normal": "range", "curvature": "chord"}
 

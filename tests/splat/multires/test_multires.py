@@ -66,19 +66,6 @@ def test_fewer_subsplats_come_near_the_full_sum(box, mode):
     assert off < FLOORS[mode]
 
 
-def test_a_supersampled_picture_is_the_mean_of_four(box):
-    """Oracle: the method at twice the size, averaged over what shows a surface; uncovered pixels stay black."""
-    settings = of(MultiresSettings, lights=64, **DEMO_CLAMP)
-    large = frame(width=122, height=90)
-    light, covered = multires(large, settings).astype(float), large.gbuffer.covered
-    four = covered.reshape(45, 2, 61, 2).sum(axis=(1, 3))
-    mean = light.reshape(3, 45, 2, 61, 2).sum(axis=(2, 4)) / np.maximum(four, 1)
-    got = multires(box, replaced(settings, {"supersampled": True}))
-    inside = box.gbuffer.covered & (four > 0)
-    np.testing.assert_allclose(got[:, inside], mean[:, inside], rtol=3e-7)  # one rounding of a mean of four
-    assert not got[:, ~box.gbuffer.covered].any()
-
-
 @pytest.mark.feature("REF-20")
 def test_albedo_within_the_splat_is_albedo_twice_filtered(box, evidence):
     """Oracle: where the albedo does not change within the cells around, printed and default agree."""

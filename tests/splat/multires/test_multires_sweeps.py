@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
-from refgi.lights.footprints import with_equal_solid_angles
 from refgi.lights.selection import choose_lights
+from refgi.lights.shares import with_equal_solid_angles
 from refgi.rsm.buffers.solid_angle import texel_solid_angles
 from refgi.rsm.raster.projection import PERSPECTIVE, Projection, spot_projection
 from refgi.scene import PointLight, SpotLight, load_scene

@@ -150,8 +150,6 @@ def error_driven(
 
     Raises `InputError` as `irradiance`.
 
-    Notes
-    -----
     The promise is that of a sample of one pixel in 64 (`estimate_error`). Depths are not used: without visibility,
     irradiance changes across them by position and normal alone. Edges of shadows are found as other changes of light
     are, by cells whose irradiance is not what the coarser level says.

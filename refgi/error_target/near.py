@@ -47,8 +47,6 @@ def near_light(receivers: Receivers, packed: Packed, most: float) -> NearLight:
     most: The bound, W/m^2.
     -> NearLight: 0 where every light keeps below the bound and none is glossy.
 
-    Notes
-    -----
     Virtual spherical lights have another term, which is bounded by itself: their excess counts as 0.
     """
     position, normal, covered = receivers

@@ -56,8 +56,6 @@ def flux_importance(
 
     Raises `InputError` if a name is unknown, a number out of range, or openness is missing or of another shape.
 
-    Notes
-    -----
     p = Phi (1 - O) P is zero where O = 1: the estimate then lacks that flux, hence the floor.
 
     With method A a texel's density is at least beta of the uniform one on every level, so for any f the mean of

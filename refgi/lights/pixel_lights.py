@@ -82,10 +82,8 @@ def draw_texels(
 
     Raises `InputError` if the pattern is unknown, the count does not suit it, or there is nothing for the warp to move.
 
-    Notes
-    -----
     Filtered lights of a warped pattern stand at warped places and carry the flux of the texels nearest to them, without
-    weight: the cells already are small where the lights are dense. Of several on one texel the first has it all.
+    weight, as the cells already are small where the lights are dense. Of several on one texel the first has it all.
     """
     expect(len(rsms) > 0, "rsms", "at least one map", "none")
     expect(pattern in get_args(Pattern), "pattern", " or ".join(get_args(Pattern)), pattern)
@@ -119,8 +117,6 @@ def lights_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> PixelLights:
 
     -> PixelLights: Those with flux.
 
-    Notes
-    -----
     A filtered light whose own texel has no flux moves to the nearest texel of its cell that has. Where its texel has no
     lobe, what the cell's lobes reflect leaves it diffusely: flux alone is filtered, in the paper as here.
     """

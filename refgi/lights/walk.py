@@ -67,8 +67,6 @@ def walk_lights(
 
     Raises `InputError` if there are no paths, or too many bounces.
 
-    Notes
-    -----
     Paths are not ended at random: each carries on with its power times the diffuse reflectance, so the walk adds no
     noise beyond its directions. Glossy materials leave a lobe, but paths go on by diffuse reflection alone.
     """

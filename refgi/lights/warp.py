@@ -45,8 +45,6 @@ def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tup
     -> warped (point, uv) float64: Warped points in [0, 1) over the stacked maps.
     -> density_weight (point,) float64: Weight w of each point, 1 / density over the unit square.
 
-    Notes
-    -----
     SII Sec. 3.6 mentions such a "pre-warping step". v chooses the map in proportion to its importance and, stretched
     over the map's share, becomes the coordinate on it: strata of the points remain strata of each map.
     """

@@ -58,8 +58,6 @@ def irradiance(
     Raises `InputError` if shapes do not fit, a light is not finite, the clamp lacks its footprints, or a light is
     glossy and the clamp is "sphere".
 
-    Notes
-    -----
     E = sum (Phi / pi) <n_l . w> <n_x . -w> / r^2 (Eq. 1 prints no 1/pi: `sii_no_pi`), plus the lobes of Eq. 3. A
     light that coincides with a receiver adds 0. Results do not depend on the number of threads, on how receivers
     are split into calls or on where a pixel stands in the picture, to the bit. With `lightcuts` they depend on which
@@ -181,8 +179,6 @@ def glossy_radiance(
 
     Raises `InputError` as `pairs.irradiance.irradiance`.
 
-    Notes
-    -----
     L_s = sum f_s(w_i, w_o) I_i cos / r^2 with f_s = specular (P + 2) / (2 pi) <m . w>^P. The paper's rho_s is any BRDF;
     its pi is part of the lights here. Lights are summed one by one, never by clusters. Results do not depend on the
     number of threads or on which receivers follow each other, to the bit.

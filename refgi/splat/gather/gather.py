@@ -161,8 +161,6 @@ def gather_irradiance(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSet
     rsms: Reflective shadow maps, one a light; of glossy materials only the diffuse part is gathered.
     -> (3, h, w): Irradiance, W/m^2, linear RGB; 0 where there is no surface. Excludes the receiver's albedo/pi.
 
-    Notes
-    -----
     E = (2 pi r_max^2 T / S) sum xi_1 E_t with T the texels of one map and E_t the light of one texel (Eq. 2), which
     has the mean of the full sum over the disc. The papers scale by hand. A receiver outside the map gathers
     where the straight way to the map's middle meets its border. Maps of several faces are one sheet: a disc runs on

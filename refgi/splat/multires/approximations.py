@@ -77,8 +77,6 @@ def multires_ledger(frame: "Frame", settings: MultiresSettings) -> Ledger:
 
     -> Ledger: Its lines sum to `emitted` but for the rounding of the frame's dtype.
 
-    Notes
-    -----
     Lights are summed in full, without lightcuts.
     `interpolated` is every pixel's sum less the picture before Eq. 3, and so holds twice the size and the printed
     forms of subsplats as well. It sums all lights at every pixel three times or more: on the Cornell box at 512 x 512

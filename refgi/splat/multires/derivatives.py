@@ -27,8 +27,6 @@ def depth_slopes(depth: Array, covered: Array, top: int, relative: bool = True) 
     relative: Divide by z; the paper does not.
     -> high tuple of (h_l, w_l): The larger of both differences along each axis, 1/pixel, or m/pixel if not relative.
 
-    Notes
-    -----
     The paper leaves the difference open: here dz/dx is the larger of those to both neighbours. A slope relative to the
     depth has one threshold for scenes of any size.
     """
@@ -44,8 +42,6 @@ def curvatures(normal: Array, position: Array, covered: Array, top: int, rate: b
     rate: Divide by the distance between the two points, which makes it a curvature: 1/R on a sphere of radius R.
     -> high tuple of (h_l, w_l): Largest length of N1 - N2, 0 to 2; for a rate over that of x1 - x2, 1/m.
 
-    Notes
-    -----
     Eq. 1, 2 sin(arccos(N1 . N2) / 2), is the length of N1 - N2 and computed as that: the arc cosine has no digits near
     0 and no value where rounding makes the product exceed 1.
     """

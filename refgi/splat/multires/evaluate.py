@@ -74,8 +74,6 @@ def evaluate(
 
     Raises `InputError` as `irradiance`.
 
-    Notes
-    -----
     Eq. 2 prints the vector to the light from the wrong end, both BRDFs and a pi. Here a light holds the flux it
     reflects, and the receiver's albedo/pi is multiplied in after upsampling, pixel by pixel.
     """
@@ -133,8 +131,6 @@ def evaluate_visible(
     -> (3, n): Irradiance, W/m^2, linear RGB, in the buffer's dtype: that of `vpl` for the same lights, to the bit.
         Excludes the receiver's albedo/pi.
 
-    Notes
-    -----
     Pairs are calibrated and not clamped, summed in float64: the code of `vpl`. Settings that change a pair (clamps,
     offsets, lobes' norms and widening, published forms) and means over a cell, which lie on no triangle, have no
     counterpart here.
@@ -172,8 +168,6 @@ def evaluate_shadowed(
     -> (3, n): Irradiance, W/m^2, linear RGB: that of `val` at the same pixels, to the bit. Excludes the receiver's
         albedo/pi.
 
-    Notes
-    -----
     Adaptive clusters are as many as the pixels of `frame` ask for, and shadow maps hold what can block between its
     lights and the surfaces in its view (Dong et al. 2009, Sec. 4 to 6).
     """

@@ -135,8 +135,6 @@ def per_light(
 
     Raises `InputError` as `irradiance`.
 
-    Notes
-    -----
     A cell is split where max - min of any channel over its quadrants, evaluated at their representatives (the paper
     does not say where), exceeds T: `threshold` itself, that share of the largest irradiance of this light at its
     samples of the quadrants' level and above, or that share of the largest sum of all lights at the coarsest cells,
@@ -144,7 +142,7 @@ def per_light(
     every cell. Samples may miss a narrow highlight, or an edge: with `start`, the authors' plan for later (Sec. 6),
     what the geometry calls for is refined in any case, and light only adds to it.
 
-    A Phong receiver weighs each light by its direction to the eye, which no irradiance holds: `per_light_lobes` refines
+    A Phong receiver weighs each light by its direction to the eye, which no irradiance holds; `per_light_lobes` refines
     lists for what its lobe reflects.
 
     Lights that need no split beyond the list they started from share its leaves; they are summed before they are
@@ -171,8 +169,6 @@ def per_light_lobes(
 
     Raises `InputError` as `irradiance`.
 
-    Notes
-    -----
     A cell is split where max - min of that radiance over its quadrants exceeds T. The quadrants are sampled at one
     point each: a highlight narrower than a coarsest cell may lie between them, and is lost (Sec. 3.3.1 says so).
     """

@@ -88,8 +88,6 @@ def upsample(
 
     Raises `InputError` if the mode is unknown or shapes do not belong together.
 
-    Notes
-    -----
     The paper gives no weights; those of "tent" interpolate bilinearly where all texels hold irradiance. It filters
     every texel, even those of the finest level, which blurs pixels that were evaluated one by one; `filter_all` and no
     `corner_rule` are the paper to the letter. A constant stays that constant to the bit, but for "naive_bilinear".
@@ -236,10 +234,8 @@ def surface_detail(
 
     Raises `InputError` if `a` is no share.
 
-    Notes
-    -----
-    Cosmetic: the factor lies in [1 - a, 1] and so only takes energy away. The paper's c is a colour; the albedo of c is
-    a factor here and there, so that the order does not matter. A point at the eye itself keeps its light.
+    It is cosmetic; the factor lies in [1 - a, 1] and so only takes energy away. The paper's c is a colour; the albedo
+    of c is a factor here and there, so that the order does not matter. A point at the eye itself keeps its light.
     """
     expect(0 <= a <= 1, "a", "a share from 0 to 1", a)
     result = np.empty_like(irradiance, order="C")

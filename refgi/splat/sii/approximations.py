@@ -68,8 +68,6 @@ def sii_ledger(frame: "Frame", settings: SiiSettings) -> Ledger:
 
     -> Ledger: Its lines sum to `emitted` but for the rounding of the frame's dtype.
 
-    Notes
-    -----
     Lights are summed in full, without lightcuts.
     On the Cornell box at 512 x 512 it takes six times as long as the picture.
     """

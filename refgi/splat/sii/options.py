@@ -42,8 +42,6 @@ def half_resolution(
     joint: Weight blocks by position and normal; else by place on the screen only.
     -> (3, h, w): Irradiance, W/m^2; 0 where there is no surface.
 
-    Notes
-    -----
     A block is evaluated at its first covered pixel, row by row. That pixel keeps its value, a constant stays that
     constant to the bit, and pixels without surface count nowhere.
     """

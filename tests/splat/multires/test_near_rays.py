@@ -13,12 +13,12 @@ from refgi.lights.selection import choose_lights
 from refgi.methods import find_method
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.shadow_rays import receivers, shadowed_sum
-from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.splat.multires import MultiresSettings, multires
 from refgi.splat.multires.evaluate import shadowed_by_rays
 from refgi.stages import observe
 from refgi.truth import VplSettings, vpl
+from tests.splat.multires.choices import frame_of, relative_error
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
 
@@ -29,10 +29,6 @@ CLUSTERS = {"lights": 256, "pattern": "halton"}
 SHADOW = {"clusters": 8, "maps": 64}
 
 
-def frame_of(name, width=120, height=90):
-    return Frame(load_scene(name), width=width, height=height, rsm_resolution=64)
-
-
 def by_rays(target, **values):
     return of(MultiresSettings, **{"subsplats": "error", "subsplats.target": target, "visibility": "rays"} | LIGHTS,
               **values)
@@ -41,11 +37,6 @@ def by_rays(target, **values):
 def by_clusters(target, shadow="csm"):
     return of(MultiresSettings, **{"subsplats": "error", "subsplats.target": target, "visibility": "val"} | CLUSTERS,
               **SHADOW, shadow=shadow)
-
-
-def relative_error(picture, full, covered):
-    difference = (picture - full.astype(float))[:, covered]
-    return np.sqrt((difference**2).mean()) / full[:, covered].mean(dtype=float)
 
 
 @pytest.fixture(scope="module")

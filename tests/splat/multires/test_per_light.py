@@ -11,7 +11,7 @@ from refgi.jit import threads
 from refgi.lights import choose_pixel_lights
 from refgi.scene import load_scene
 from refgi.settings import replaced
-from refgi.splat import Receivers, irradiance
+from refgi.splat import irradiance
 from refgi.splat.multires import per_light as module
 from refgi.splat.multires.criteria import discontinuities
 from refgi.splat.multires.evaluate import evaluate, representative_points
@@ -23,7 +23,7 @@ from tests.literal.whole.multires import upsampled
 from tests.naive import eq2
 from tests.naive import per_light as naive
 from tests.pairs import sets
-from tests.splat.multires.choices import FakeBuffer, by_irradiance, unclamped
+from tests.splat.multires.choices import FakeBuffer, by_irradiance, full_sum, relative_error, unclamped
 
 TWIN = 1e-12  # float64 against unit vectors and printed terms; a lobe of exponent 20 takes 20 roundings to its power
 ROUNDING = 2.0**-24  # float32; a compensated sum of terms >= 0 is off by 2 of these, lobes are added to it at last
@@ -58,11 +58,6 @@ def alone(lights, k):
     return lights._replace(**{key: getattr(lights, key)[..., k : k + 1] for key in lights._fields[:6]})
 
 
-def full_sum(buffer, lights, settings, footprint=None):
-    receivers = Receivers(*buffer.resolve("position", "normal", "covered"))
-    return irradiance(receivers, lights, settings.effective_pairs, footprint)
-
-
 def shared_list(buffer, settings):
     criteria = settings.subsplats.criteria or Criteria()
     top = top_level(*buffer.covered.shape, settings.subsplats.coarsest)
@@ -79,10 +74,6 @@ def counted(buffer, lights, settings, *how):
 
 def leaf_lists(buffer, lights, settings, *how):
     return module._leaf_lists(buffer, lights, settings.subsplats, settings.effective_pairs, *how)
-
-
-def relative_rmse(picture, full, covered):
-    return float(np.sqrt(((picture - full)[:, covered] ** 2).mean()) / full[:, covered].mean())
 
 
 def by_hand(buffer, lights, settings, threshold, shared=None):
@@ -303,10 +294,10 @@ def test_highlights_of_phong_emitters_are_found(buddha, evidence):
     shared = upsample(evaluate(*representative_points(buffer, start), lights, settings.pairs), start, buffer.covered)
     tight = replaced(settings, {"subsplats.threshold": 0.003})
     count, error = {"shared": lights.position.shape[1] * len(start.level)}, {}
-    error["shared"] = relative_rmse(shared, full, buffer.covered)
+    error["shared"] = relative_error(shared, full, buffer.covered)
     for name, how, first in (("light", settings, None), ("light, tight", tight, None), ("both", settings, start)):
         count[name] = int(counted(buffer, lights, how, None, first).sum())
-        error[name] = relative_rmse(summed(buffer, lights, how, None, first), full, buffer.covered)
+        error[name] = relative_error(summed(buffer, lights, how, None, first), full, buffer.covered)
     assert error["light"] < 0.6 * error["shared"]
     assert error["both"] < 0.5 * min(error["light"], error["light, tight"])
     assert count["both"] < 0.4 * count["light, tight"]
@@ -324,7 +315,7 @@ def test_a_highlight_on_a_flat_wall(evidence):
     assert len(start.level) == 64
     shared = upsample(evaluate(*representative_points(buffer, start), lights, settings.pairs), start, buffer.covered)
     found = summed(buffer, lights, settings)
-    errors = relative_rmse(shared, full, buffer.covered), relative_rmse(found, full, buffer.covered)
+    errors = relative_error(shared, full, buffer.covered), relative_error(found, full, buffer.covered)
     assert errors[1] < 0.1 * errors[0]
     evidence(f"RMSE {100 * errors[0]:.0f} % of the shared list, {100 * errors[1]:.1f} % refined by each light with "
              f"{int(counted(buffer, lights, settings).sum())} of {6 * buffer.covered.size} pairs")

@@ -249,8 +249,8 @@ def test_criteria_add_up_and_the_finest_level_is_never_refined():
 @pytest.mark.parametrize("rim", [0, 1])
 def test_needs_are_those_of_the_printed_tests(rim):
     buffer = scattered((19, 23), np.float32, 0.6)
-    buffer.depth[:, 12:] = np.where(buffer.covered[:, 12:], 2, np.inf)  # flat parts: some cells need nothing
-    buffer.normal[:, :, 12:] = facing((19, 11)) * buffer.covered[:, 12:]
+    buffer.depth[:, 12:] = np.where(buffer.covered[:, 12:], 2, np.inf)  # flat, each elsewhere: some cells need nothing
+    buffer.normal[:, 10:] = facing((9, 23)) * buffer.covered[10:]
     settings = of(MultiresSettings, rim=rim, normal_threshold=0.7, depth_threshold=0.4)
 
     least, largest = ranges_of(literal.depth_ranges(buffer.depth, ids(buffer), 4, rim))

@@ -10,13 +10,13 @@ and c_x cosines of light and receiver, not divided by the length of d, V visibil
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from refgi.jit import kernel, prange
 from refgi.pairs.pair_sum import pair_cosines
-from refgi.pairs.pixel_lights import with_dark_lobes
+from refgi.pairs.pixel_lights import PixelLights, with_dark_lobes
 from refgi.radiometry import lobe_gap, lobe_norm, lobe_power, receiver_lobe
 from refgi.rays import STEPS, Tracer, far_offset, ray_offset
 from refgi.rsm.buffers.leaving import GlossyPoints
@@ -24,10 +24,6 @@ from refgi.scene import Geometry
 from refgi.skips import left_out
 from refgi.stages import report_progress, stage, tally
 from refgi.types import Array
-
-if TYPE_CHECKING:
-    from refgi.pairs.pixel_lights import PixelLights
-    from refgi.rays import Tracer
 
 ROUNDED = 2.0**-14  # of a point's coordinates: it is off its face by that at most, or not meant to lie on it
 LIGHTS_AT_A_TIME = 1024
@@ -75,12 +71,13 @@ class Senders(NamedTuple):
     lobe_norm: Array  # (n or 0,) 1/sr
 
 
-Hidden = Weigh = Callable[[RayReceivers, tuple[int, int], Senders, tuple[int, int], Array, Array], None]
+Hidden = Callable[[RayReceivers, tuple[int, int], Senders, tuple[int, int], Array, Array], None]
+Weigh = Hidden
 
 
 @stage("pairs.shadowed_sum")
 def shadowed_sum(
-    tracer: Tracer, to: RayReceivers, lights: "PixelLights", *, visibility: bool = True, batch: int = BATCH,
+    tracer: Tracer, to: RayReceivers, lights: PixelLights, *, visibility: bool = True, batch: int = BATCH,
     hidden: Hidden | None = None,
 ) -> Array:
     """Sum the irradiance of every pixel light at every receiver, each pair with its visibility.
@@ -94,7 +91,7 @@ def shadowed_sum(
     return summed(tracer, to, lights, visibility, batch, hidden, None)
 
 
-def summed(tracer: Tracer, to: RayReceivers, lights: "PixelLights", visibility: bool, batch: int,
+def summed(tracer: Tracer, to: RayReceivers, lights: PixelLights, visibility: bool, batch: int,
            hidden: Hidden | None, weigh: Weigh | None) -> Array:
     """Sum what every pair gives that nothing blocks, (3, r) float64; arguments as for `shadowed_sum`.
 
@@ -188,7 +185,7 @@ def _lobe(to: RayReceivers, r: int, senders: Senders, j: int) -> Any:
     return senders.lobe_norm[j] * lobe_power(gap, senders.lobe_exponent[j])
 
 
-def senders_of(lights: "PixelLights") -> Senders:
+def senders_of(lights: PixelLights) -> Senders:
     """Return pixel lights as the kernels read them."""
     arrays = (lights.position, lights.normal, lights.flux)
     position, normal, flux = (np.ascontiguousarray(array, np.float64) for array in arrays)
@@ -229,7 +226,7 @@ def add_unoccluded(
 
 @stage("pairs.glossy_rays")
 def shadowed_radiance(
-    tracer: "Tracer", to: RayReceivers, points: GlossyPoints, lights: "PixelLights", *, visibility: bool = True,
+    tracer: Tracer, to: RayReceivers, points: GlossyPoints, lights: PixelLights, *, visibility: bool = True,
     batch: int = BATCH, hidden: Hidden | None = None,
 ) -> Array:
     """Sum the radiance that every receiver's lobe reflects towards the eye of the light that reaches it.

@@ -16,8 +16,8 @@ from benchmarks.harness import Row, in_turn, real_scene, relative_rmse
 from refgi import Frame, load_scene
 from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import add_lights
-from refgi.pairs.packing import Packed, pack, with_tree
 from refgi.pairs.pair_sum import TILE
+from refgi.pairs.pixel_lights import Packed, pack, with_tree
 from refgi.pairs.settings import Lightcuts
 from refgi.pairs.tiles import block_by_block, taken
 from refgi.settings import of

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from refgi.splat.multires.subsplats.detail import surface_detail
+from refgi.splat.multires.upsample import surface_detail
 from tests.compare.browser import clicked
 
 pytest.importorskip("sphinx", reason="the docs extra is not installed")
@@ -23,7 +23,7 @@ WIDTHS = (1300, 400)
 COLUMNS = 88
 TEN = ("index", "port", "compare_methods", "equations", "vectors", "cli", "methods/sii", "methods/val_visibility",
        "stages", "api")
-STAGE = "refgi.splat.multires.subsplats.detail.surface_detail"
+STAGE = "refgi.splat.multires.upsample.surface_detail"
 FETCHED = {"script": "src", "img": "src", "source": "src", "iframe": "src", "link": "href", "image": "href"}
 OUTSIDE = re.compile(r"(?:https?:)?//")
 FROM_OUTSIDE = re.compile(rf"(?:url\(|@import)\s*[\"']?{OUTSIDE.pattern}")

@@ -21,7 +21,7 @@ from refgi.methods import METHODS, render
 from refgi.rays import Tracer
 from refgi.settings import from_text, of, replaced
 from refgi.skips import without_skip
-from refgi.splat.multires.lobes import glossy_subsplats
+from refgi.splat.multires.multires import glossy_subsplats
 from refgi.splat.sii import SiiSettings
 from refgi.sssil import HssilSettings
 from refgi.sssil.glossy import warped

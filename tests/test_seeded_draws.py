@@ -19,8 +19,8 @@ from refgi.sampling import halton, sobol_owen
 from refgi.scene import PointLight, load_scene
 from refgi.settings import of
 from refgi.splat.gather.gather_sum import disc_pattern
-from refgi.splat.sii.reach.threshold import light_range
 from refgi.splat.sii.settings import SiiSettings
+from refgi.splat.sii.threshold import light_range
 from refgi.sssil import HssilSettings
 from refgi.sssil.pattern import samples_at
 from refgi.sssil.slices import slice_counts, slice_offsets

@@ -137,7 +137,7 @@ WORK = {
     "pairs.lobes": {"pairs.irradiance.add_lobes": None,
                     "pairs.shadow_rays.fill_shadow_rays": lambda *arguments: len(arguments[2].lobe_exponent)},
     "pairs.lobe_tiles": {"pairs.irradiance.add_lobes": lambda *arguments: arguments[6] is not None},
-    "pairs.receiver_lobes": {"pairs.glossy.add_diffuse_lights": lambda *arguments: not arguments[8].off_lobes},
+    "pairs.receiver_lobes": {"pairs.irradiance.add_diffuse_lights": lambda *arguments: not arguments[8].off_lobes},
     "pairs.shadow_rays": {"rays.Tracer.fill_occluded": lambda *arguments: np.count_nonzero(arguments[3])},
     "sii.bounds": {"splat.sii.sii.sum_pairs_in_range": lambda *arguments: np.count_nonzero(arguments[5])},
     "cluster.distances": {"cluster.kmeans.iterate": lambda _, metric, *__: metric.slack},

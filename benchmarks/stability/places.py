@@ -21,7 +21,7 @@ from refgi.rsm.raster.projection import PERSPECTIVE, Projection
 from refgi.scene import Camera, Geometry, Material, Mesh, PointLight, Scene, SpotLight, light_table, material_table
 from refgi.scene.motion import near_origin
 from refgi.scene.repair import repaired
-from refgi.splat.sii.reach.bounds import TANGENT_POINT, tangent_ellipsoid
+from refgi.splat.sii.bounds import TANGENT_POINT, tangent_ellipsoid
 from refgi.sssil.reprojection import SourceView, reproject
 from refgi.truth.hemisphere import cosine_direction
 from refgi.truth.light_grid import light_rays

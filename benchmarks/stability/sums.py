@@ -209,7 +209,7 @@ def discs(rng: np.random.Generator) -> Case:
                       np.array([[height], [width]]) + rng.uniform(-1.5, 1.5, (2, RECEIVERS)))
     pattern = disc_pattern(int(rng.integers(1, 40)), 0) * np.array([rng.uniform(0.1, 4), rng.uniform(0.1, 4), 1])
     scale, got = real(1 / (math.pi * len(pattern))), np.zeros((3, RECEIVERS), real)
-    gather_discs(place, up, centre, source, pattern, scale, got)
+    gather_discs(place, up, centre, source, pattern, scale, None, got)
     at, out, flux = (np.asarray(one, np.longdouble) for one in source)
     exact, bound = np.zeros((2, 3, RECEIVERS), np.longdouble)
     for i in range(RECEIVERS):

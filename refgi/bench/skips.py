@@ -64,7 +64,7 @@ def dim_lights(
     kept = brightest(parts, share)
     if not len(kept):
         return None
-    some = (receivers, selected(lights, kept), pairs, None if footprint is None else footprint[kept])
+    some = (receivers, lights.selected(kept), pairs, None if footprint is None else footprint[kept])
     every = (receivers, lights, pairs, footprint)
     right, without = irradiance(*every), irradiance(*some)
     ((times, times_carrying),) = in_turn(lambda: irradiance(*every), [lambda: irradiance(*some)], rounds, clock)
@@ -80,15 +80,8 @@ def parts_of_lights(
 ) -> Array:
     """Return the irradiance, W/m^2, that each of N lights adds to the mean over sampled pixels, unoccluded, (N,)."""
     sample = sample_for(receivers, lights)
-    return np.array([light_at(sample, selected(lights, [k]), pairs, None if footprint is None else footprint[[k]])
+    return np.array([light_at(sample, lights.selected([k]), pairs, None if footprint is None else footprint[[k]])
                      for k in range(lights.flux.shape[1])])
-
-
-def selected(lights: PixelLights, index: Any) -> PixelLights:
-    """Return some of the lights, in the order of `index` (n,)."""
-    parts: dict[str, Any] = {name: values[..., index] for name, values in lights._asdict().items()
-                             if isinstance(values, np.ndarray)}
-    return lights._replace(**parts)
 
 
 def brightest(parts: Array, share: float) -> Array:

@@ -27,8 +27,7 @@ from refgi.cluster.rectangle import AreaLights, VisibilityFunction
 from refgi.cluster.settings import BY_MAPS, Csm
 from refgi.cluster.visibility.shadow import Shadows, filter_channels, shadows_of, visibility
 from refgi.errors import expect
-from refgi.pairs.glossy import as_receivers, block_order, glossy_summed
-from refgi.pairs.irradiance import Receivers, checked
+from refgi.pairs.irradiance import Receivers, as_receivers, block_order, checked, glossy_summed
 from refgi.pairs.tiles import clear, receiving
 from refgi.rsm.buffers.leaving import GlossyPoints
 from refgi.skips import left_out

@@ -12,9 +12,8 @@ from refgi.cluster.settings import MOST_BLOCK
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import add_lights
-from refgi.pairs.packing import Packed, PackedLobes
 from refgi.pairs.pair_sum import TILE, Clamp
-from refgi.pairs.pixel_lights import Widening
+from refgi.pairs.pixel_lights import Packed, PackedLobes, Widening
 from refgi.pairs.tiles import BLOCK
 from refgi.types import Array
 

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import ClassVar, Literal
 
-from refgi.error_target.settings import ErrorTarget
+from refgi.error_target.grid import ErrorTarget
 from refgi.errors import expect
 from refgi.lights.settings import MOST_LIGHTS, LightSettings, clamped_pairs, expect_footprints
 from refgi.pairs.settings import PairSettings

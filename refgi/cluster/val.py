@@ -180,9 +180,9 @@ def block_side(pixels: int, settings: ValSettings) -> int | None:
         return settings.interleaving.block
     by_maps = settings.visibility is None or isinstance(settings.visibility, BY_MAPS)
     if settings.pairs.clamp is None:
-        skip("multires.error_driven", "without a clamp every pixel sums all lights")
+        skip("error_target.error_driven", "without a clamp every pixel sums all lights")
     elif by_maps and counted_pixels(pixels) <= FEW_PIXELS:
-        skip("multires.error_driven", f"up to {FEW_PIXELS:,} pixels each sums all lights")
+        skip("error_target.error_driven", f"up to {FEW_PIXELS:,} pixels each sums all lights")
     else:
         return None
     return 1

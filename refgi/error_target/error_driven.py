@@ -1,15 +1,9 @@
 """Refinement until the picture is as near to the full sum as asked for: beyond Nichols and Wyman.
 
-Ranges of depth and normal cannot promise an error: irradiance may vary where geometry does not and the reverse. Here a
-cell is split where stopping would cost most (`trial`). The threshold sinks from trial to trial until pixels evaluated
-in full (`estimate_error`) say that the error, at its upper bound, is below the target.
-
-A trial stops short of the pixels: what would be evaluated there is exact in any case, and most of the cost. They are
-evaluated, and the picture assembled, once the threshold is found. No pixel is evaluated twice; a picture that is
-evaluated in full, the last resort, has no error.
-
-What single lights give near points beyond half the mean is summed at every pixel (`near`): its peaks, hundreds of times
-the mean, would be found by no sample. So are lobes. Subsplats carry the rest.
+A cell is split where stopping would cost most (`trial`). The threshold sinks from trial to trial until pixels evaluated
+in full (`estimate_error`) say that the error, at its upper bound, is below the target. Pixels of the last split cells
+are evaluated once the threshold is found, none twice. What single lights give near points beyond half the mean is
+summed at every pixel (`near`), and so are lobes: such peaks would be found by no sample.
 """
 
 import math
@@ -29,7 +23,7 @@ from refgi.stages import skip, stage, tally
 from refgi.types import Array
 
 if TYPE_CHECKING:
-    from refgi.error_target.settings import ErrorTarget
+    from refgi.error_target.grid import ErrorTarget
     from refgi.lights import PixelLights
     from refgi.pairs.settings import PairSettings
     from refgi.rsm import GBuffer
@@ -91,9 +85,8 @@ def estimate_mean(samples: ErrorSamples, exact: Array) -> tuple[float, float]:
 def estimate_error(samples: ErrorSamples, residual: Array, mean: tuple[float, float]) -> Estimate:
     """Return the relative RMSE of a picture, with bounds of three standard errors; 0 where no sample differs.
 
-    residual: (3, n), the picture's difference to the full sum at the samples, W/m^2; mean: of `estimate_mean`. Strata
-    are treated as independent draws, which overestimates the standard error. Errors are rare and large along edges, so
-    the upper bound adds three more of the worst sample (the rule of three) for what was not drawn.
+    residual (3, n), W/m^2; mean: of `estimate_mean`. Strata count as independent draws, which overestimates the
+    standard error. Errors are rare and large along edges: the upper bound adds three more of the worst sample.
     """
     square = samples.share * (residual.astype(np.float64) ** 2).mean(axis=0)
     mse = float(square.sum())
@@ -141,7 +134,7 @@ class ErrorDriven(NamedTuple):
     full_pairs: int  # of the full sum
 
 
-@stage("multires.error_driven")
+@stage("error_target.error_driven")
 def error_driven(
     buffer: "GBuffer", lights: "PixelLights", settings: "ErrorTarget", pairs: "PairSettings",
     footprint: Array | None = None, seed: int = 0, lightcuts: AutoLightcuts | Lightcuts | None = None,
@@ -155,13 +148,8 @@ def error_driven(
     shadowed: The same lights under their visibility, which are then never clustered.
     -> ErrorDriven: The picture, its subsplats, error and cost.
 
-    Raises
-    ------
-    InputError
-        As `irradiance`.
+    Raises `InputError` as `irradiance`.
 
-    Notes
-    -----
     The promise is that of a sample of one pixel in 64 (`estimate_error`). Depths are not used: without visibility,
     irradiance changes across them by position and normal alone. Edges of shadows are found as other changes of light
     are, by cells whose irradiance is not what the coarser level says.
@@ -185,7 +173,7 @@ def error_driven(
     number = lights.flux.shape[1]
     evaluated = np.count_nonzero(exact.is_known) * number + near.pairs
     full_pairs = np.count_nonzero(receivers.covered) * number
-    skip("multires.full_sum", f"{evaluated / max(1, full_pairs):.1%} of its pairs, {count} trials: the error is at "
+    skip("error_target.full_sum", f"{evaluated / max(1, full_pairs):.1%} of its pairs, {count} trials: the error is at "
                               f"most {found.high:.2%} of the mean")
     return ErrorDriven(picture, tuple(trials.split), receivers.covered, *found, threshold, count, evaluated, full_pairs)
 
@@ -222,9 +210,8 @@ def _evaluated(receivers: Receivers, summed: PixelSum, samples: ErrorSamples) ->
 def _largest_ratio(samples: ErrorSamples, sampled: Array) -> float:
     """Return what the RMSE over the mean is at most of an error that each receiver's sum of channels bounds.
 
-    The squares of three channels' errors add up to at most the square of their sum, so the RMSE is at most sqrt(3)
-    times the error times the root mean square of light over its mean, at its upper bound from samples; infinite
-    in the dark.
+    The squares of three channels' errors add up to at most the square of their sum: sqrt(3) times the root mean square
+    of light over its mean, at its upper bound from samples; infinite in the dark.
     """
     light = sampled.mean(axis=0, dtype=np.float64)
     average, uncertainty = estimate_mean(samples, sampled)

@@ -1,18 +1,16 @@
-"""Cells of a picture's levels, their pixels and subsplats, and min-max mipmaps over them (Nichols and Wyman 2009).
+"""Cells of a picture's levels, their pixels and subsplats, min-max mipmaps (Nichols and Wyman 2009), the error target.
 
-Level l has cells of 2^l x 2^l pixels, level 0 is the picture itself. Pictures of any size have such levels: cells at
-the right and lower border are cut. A cell without any surface is never refined and never evaluated.
-
-A mipmap's levels lie one after another, each row by row, so that what holds for every cell of every level is one loop.
-A row of cells of the coarsest level belongs to one thread, which fills all finer levels inside it while they are in its
-cache.
+Level l has cells of 2^l x 2^l pixels; those at the right and lower border are cut. A mipmap's levels lie one after
+another, each row by row. A row of cells of the coarsest level belongs to one thread, which fills all finer levels.
 """
 
+import dataclasses
 from typing import NamedTuple
 
 import numpy as np
 
 from refgi.jit import kernel, prange
+from refgi.settings import Settings, setting
 from refgi.stages import stage
 from refgi.types import Array
 
@@ -70,9 +68,7 @@ def top_level(height: int, width: int, coarsest: int) -> int:
 def representative(covered: Array, level: int, i: int, j: int) -> int:
     """Return a cell's representative pixel: the one right and below of its centre, or the nearest that shows a surface.
 
-    covered: (h, w) bool; level, i, j: the cell. Returns a flat index, -1 where the cell shows no surface.
-
-    The paper does not say where a coarse subsplat is evaluated; a cell of an even side has no pixel in its centre.
+    A flat index, -1 where the cell shows no surface. The paper does not say where a coarse subsplat is evaluated.
     """
     height, width = covered.shape
     side, half = 1 << level, (1 << level) >> 1
@@ -204,6 +200,19 @@ def coarsen(strip: int, finest: int, sizes: Array, lows: Array, highs: Array) ->
 
 
 @kernel
+def any_of_four(finer: Array, cells: Array) -> None:
+    """Store whether any of the finer cells (0 or not) within each cell shows a surface."""
+    columns = finer.shape[1]
+    pairs = columns // 2
+    for i in range(cells.shape[0]):
+        upper, lower, out = finer[2 * i], finer[min(2 * i + 1, finer.shape[0] - 1)], cells[i]
+        for j in range(pairs):
+            out[j] = upper[2 * j] | upper[2 * j + 1] | lower[2 * j] | lower[2 * j + 1]
+        if columns % 2:
+            out[pairs] = upper[columns - 1] | lower[columns - 1]
+
+
+@kernel
 def _least_of_four(upper: Array, lower: Array, out: Array) -> None:
     """Store the smallest value of each 2 x 2 cells of two rows, of which the lower may be the upper again."""
     pairs = len(upper) // 2
@@ -225,3 +234,17 @@ def _most_of_four(upper: Array, lower: Array, out: Array) -> None:
         out[j] = above if above > below else below
     if len(out) > pairs:
         out[pairs] = max(upper[2 * pairs], lower[2 * pairs])
+
+
+LEAST_TARGET = 1e-6  # about what rounding to float32 leaves of the full sum
+MOST_CELLS = 65536  # along the longer side
+
+
+@dataclasses.dataclass(frozen=True)
+class ErrorTarget(Settings):
+    """Subsplats refined until the picture is as near to the full sum as asked for."""
+
+    PRINCIPAL = "target"
+
+    target: float = setting(0.05, "RMSE to the full sum over its mean", least=LEAST_TARGET)
+    coarsest: int = setting(16, "cells of the coarsest level along the longer side", least=1, most=MOST_CELLS)

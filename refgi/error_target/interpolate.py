@@ -1,21 +1,10 @@
 """Blend weights between levels by the similarity of their surfaces: an interpolation that edges do not need to stop.
 
-The tent filter mixes what lies next to each other on the screen. Here each of its four neighbours k of the coarser
-level is weighted by the similarity of its surface to that of the finer cell's pixel as well (and pixels by where the
-representatives of level 1 are: half a pixel off these cells' centres)::
-
-    a = <n . n_k>^128 (1 - |n . (x_k - x)| / |x_k - x|)^4,
-
-a bilateral weight as at half resolution, but sharper: facets a few degrees apart must not mix at an error of 1 %. A
-cell that is similar to no neighbour has the plain tent.
-
-How well the normal itself is interpolated predicts, before any light is evaluated, where irradiance cannot be: without
-visibility, E is a smooth function of position and normal. The squared errors are summed over all pixels of each cell.
-
-Coarser cells are the SIMD lanes. The four finer cells of each, its *children*, are processed one after the other: child
-2 v + u lies below (v = 1) and to the right (u = 1), so that its neighbours lie to that side.
-
-Symbols: x, n position and normal of the finer cell's pixel, x_k, n_k those of a coarser neighbour.
+Each of the tent's four neighbours k of the coarser level is weighted by a = <n . n_k>^128 (1 - |n . (x_k - x)| /
+|x_k - x|)^4 as well, x, n and x_k, n_k surfaces of the finer cell and of the neighbour; a cell that is similar to none
+has the plain tent. How well the normal itself is interpolated predicts where irradiance cannot be: its squared errors
+are summed over all pixels of each cell. Coarser cells are the SIMD lanes. Of the four finer cells of each, its
+*children*, 2 v + u lies below (v = 1) and to the right (u = 1), so that its neighbours lie to that side.
 """
 
 import itertools
@@ -92,7 +81,7 @@ class BlendWeights(NamedTuple):
     normal_error: Array  # (h_l+1, w_l+1), sum of squares over each coarser cell's pixels: interpolated normal - normal
 
 
-@stage("multires.blends")
+@stage("error_target.blends")
 def blend_weights(levels: tuple[SurfaceLevel, ...]) -> tuple[BlendWeights, ...]:
     """Return the weights of the coarser neighbours of every cell.
 

@@ -1,17 +1,12 @@
 """What is summed at a pixel: near pairs without bound, glossy lobes, all lights as they are or under visibility.
 
-E = sum (Phi / pi) min(g, b) + sum (Phi / pi) max(0, g - b), with g the geometry term and b its bound: the first sum is
-bounded and smooth, fit for subsplats; the second, summed here, is not 0 only where r^2 < 1 / b, since g <= 1 / r^2.
-(Bias compensation splits the clamped sum in the same way: Kollig and Keller 2006.) Tiles without near lights cost one
-box test a light. Lobes can be as narrow as a pixel at any distance, so they are summed here as a whole.
-
-Interpolation carries no peak of a near pair, so each sum also says what single pairs give beyond a bound (`near`): the
-part that is added at every pixel. Under the soft shadows of clusters no pair has a visibility of its own; there the
-clamp bounds what is near.
+E = sum (Phi / pi) min(g, b) + sum (Phi / pi) max(0, g - b), g the geometry term, b its bound: the first sum is smooth,
+fit for subsplats; the second, summed here, is not 0 only where r^2 < 1 / b, since g <= 1 / r^2 (as bias compensation
+splits the clamped sum: Kollig and Keller 2006). Lobes can be as narrow as a pixel: they are summed here as a whole.
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,15 +14,12 @@ from refgi.error_target.grid import level_shape
 from refgi.jit import kernel, prange
 from refgi.pairs.irradiance import Receivers, add_lights
 from refgi.pairs.lobe_sum import add_lobes
-from refgi.pairs.packing import Packed
 from refgi.pairs.pair_sum import NX, SUM, Clamp, X, limits_of, pair_term
+from refgi.pairs.pixel_lights import Packed
 from refgi.pairs.tiles import block_by_block, put, taken
 from refgi.rsm.pool import plane, zeros
 from refgi.stages import stage
 from refgi.types import Array
-
-if TYPE_CHECKING:
-    pass
 
 SIDE = 16  # pixels along a square that is tested as a whole
 ROWS = 9  # of its tile: position, normal and sums
@@ -47,7 +39,7 @@ def near_irradiance_at(irradiance: Array, has_near: Array, c: int, row: int, col
     return irradiance[c, row, column] if has_near[row // SIDE, column // SIDE] else irradiance.dtype.type(0.0)
 
 
-@stage("multires.near")
+@stage("error_target.near")
 def near_light(receivers: Receivers, packed: Packed, most: float) -> NearLight:
     """Sum what single lights give each receiver beyond a bound, and by their lobes, at full resolution.
 
@@ -55,8 +47,6 @@ def near_light(receivers: Receivers, packed: Packed, most: float) -> NearLight:
     most: The bound, W/m^2.
     -> NearLight: 0 where every light keeps below the bound and none is glossy.
 
-    Notes
-    -----
     Virtual spherical lights have another term, which is bounded by itself: their excess counts as 0.
     """
     position, normal, covered = receivers
@@ -104,7 +94,7 @@ def _load_positions(position: Array, covered: Array, top: int, left: int, tile: 
     for y in range(top, min(top + SIDE, covered.shape[0])):
         row_covered, first = covered[y, left : left + SIDE], (y - top) * SIDE
         for c in range(3):
-            _copy(position[c, y, left:], tile[X + c, first : first + len(row_covered)])
+            tile[X + c, first : first + len(row_covered)] = position[c, y, left : left + SIDE]
         for x in range(len(row_covered)):
             if row_covered[x]:
                 count, last_covered = count + 1, first + x
@@ -137,12 +127,6 @@ def _bounding_box(tile: Array, low: Array, high: Array) -> None:
                 least[k] = value if value < least[k] else least[k]
                 most[k] = value if value > most[k] else most[k]
         low[axis], high[axis] = least.min(), most.max()
-
-
-@kernel
-def _copy(pixels: Array, row: Array) -> None:
-    for k in range(len(row)):
-        row[k] = pixels[k]
 
 
 @kernel
@@ -219,11 +203,7 @@ def unshadowed(receivers: Receivers, packed: Packed) -> PixelSum:
 
 def shadowed_by_clusters(at: Callable[[Array], Array]) -> PixelSum:
     """Return a sum whose lights share the visibility of their clusters; `at` finds it."""
-
-    def near(receivers: Receivers, _: float) -> NearLight:
-        return nothing_near(receivers)
-
-    return PixelSum(at, near)
+    return PixelSum(at, lambda receivers, _: nothing_near(receivers))
 
 
 def nothing_near(receivers: Receivers) -> NearLight:

@@ -1,12 +1,8 @@
 """One trial of a threshold: cells that it splits, irradiance carried from level to level, the residual.
 
-Blend weights are those of `interpolate`. All arrays of irradiance are in W/m^2.
-
 A cell is split where stopping would cost more than the threshold, as a sum over its pixels of two squares: the error of
 its interpolated normals (`interpolate`) times the irradiance around, and the surplus of known irradiance over the
-coarser level's interpolation, at its own pixel or half of that at its neighbours'.
-
-Levels, and irradiance once it is known, stay from trial to trial in the same memory.
+coarser level's interpolation, at its own pixel or half of that at its neighbours'. Irradiance is in W/m^2.
 """
 
 from collections.abc import Callable
@@ -41,11 +37,9 @@ def fill_level(
 ) -> None:
     """Fill a level other than the picture itself with irradiance, (3, h_l, w_l), without the near part; 0 where empty.
 
-    coarse: (3, h_l+1, w_l+1), the coarser level; weight, across: of the level's `BlendWeights`; split: (h_l+1, w_l+1)
-    bool, coarser cells whose children are known; representative: (h_l, w_l) flat indices, -1 where empty; exact: (3, h,
-    w), irradiance of pixels where known; near, has_near: of `NearLight`. Fills known, (h_l, w_l) bool, and surplus,
-    (h_l, w_l): the squared difference of known cells to their interpolation over all channels (the hierarchical
-    surplus); 0 elsewhere.
+    weight, across: of the level's `BlendWeights`; split: coarser cells whose children are known; exact (3, h, w): where
+    known; near, has_near: of `NearLight`. Fills known and surplus, (h_l, w_l): the squared difference of known cells to
+    their interpolation over all channels (the hierarchical surplus); 0 elsewhere.
     """
     for i in prange(split.shape[0]):
         _blend_row(coarse, weight, across, i, fine)
@@ -159,11 +153,7 @@ SQUARE = 32  # cells along a square within which listed pixels keep together
 
 
 class ExactIrradiance:
-    """Irradiance of pixels in full, each evaluated at most once.
-
-    `sum_at` takes covered pixels, n flat indices, and returns their irradiance, (3, n), W/m^2, in the type of the
-    points.
-    """
+    """Irradiance of pixels in full, each evaluated at most once; `sum_at` is that of `PixelSum`."""
 
     def __init__(self, receivers: Receivers, sum_at: Callable[[Array], Array]) -> None:
         self._sum_at = sum_at
@@ -204,7 +194,7 @@ class Trials:
         exact.evaluate(pixel[~exact.is_known[pixel]])
         fill_coarsest(top.representative_pixel, *self._values, self._irradiance[-1])
 
-    @stage("multires.trial")
+    @stage("error_target.trial")
     def run(self, threshold: float) -> None:
         """Refine from the coarsest level down wherever stopping would cost more than a threshold.
 
@@ -239,7 +229,7 @@ class Trials:
         for split in self.split[1:]:
             split[:] = True
 
-    @stage("multires.assemble")
+    @stage("error_target.assemble")
     def picture(self) -> Array:
         """Evaluate the pixels of the last split cells and join all levels.
 

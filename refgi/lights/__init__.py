@@ -1,7 +1,7 @@
 """Pixel lights (VPLs): from maps or light paths, warped, fewer in the open (SII Sec. 3.5 to 3.7).
 
 `pixel_lights` takes texels of reflective shadow maps as point lights, with T/N on each, which the papers do not state;
-`warp` draws them after their `importance`, `footprints` says what part of the map and of the surface each stands for,
+`warp` draws them after their `importance`, `shares` says what part of the map and of the surface each stands for,
 `refraction` adds those behind glass and `walk` those of light paths. `selection` is what methods call.
 """
 

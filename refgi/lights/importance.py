@@ -1,13 +1,8 @@
 """Importance of texels for warping: flux, flux times lobe peak, and both times (1 - openness) (SII Sec. 3.5).
 
-A texel's importance is the largest channel of Phi_diffuse + g(P) Phi_lobe. The largest channel is zero only where all
-of the flux is, so no flux is out of reach. g(P) = (P + 1) / 2 is the peak of a normalised Phong lobe over that of a
-diffuse light, 1 for P = 1; the paper takes P.
-
-`importance_pyramid` sums the map over ever larger cells, a mipmap for any size of map: level l has 2^l x 2^l cells with
-borders at rows floor(i H / 2^l) and columns floor(j W / 2^l), so every border of a level is one of the next, and for
-powers of two the cells are squares. On the last level, L = ceil(log2(max(H, W))), a cell holds one texel or none, and
-the map itself takes the place of the sums.
+The largest channel of Phi_diffuse + g(P) Phi_lobe, 0 only where all flux is; g(P) = (P + 1) / 2 is the peak of a
+normalised Phong lobe over that of a diffuse light (the paper takes P). `importance_pyramid` sums it over 2^l x 2^l
+cells with borders at rows floor(i H / 2^l) and columns floor(j W / 2^l), for any size of map, down to texels.
 """
 
 import math
@@ -59,13 +54,8 @@ def flux_importance(
     as_printed: Take g(P) = P, so that sharp lobes count up to twice as much; with it a lobe of P = 0 is never chosen.
     -> (H, W): Importance of each texel, W, in the dtype of the flux.
 
-    Raises
-    ------
-    InputError
-        If a name is unknown, a number out of range, or openness is missing or of another shape.
+    Raises `InputError` if a name is unknown, a number out of range, or openness is missing or of another shape.
 
-    Notes
-    -----
     p = Phi (1 - O) P is zero where O = 1: the estimate then lacks that flux, hence the floor.
 
     With method A a texel's density is at least beta of the uniform one on every level, so for any f the mean of

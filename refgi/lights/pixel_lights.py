@@ -1,13 +1,8 @@
 """Pixel lights (VPLs) chosen from the texels of reflective shadow maps (SII Sec. 3.1; docs/radiometry).
 
 N texels of a map of T are chosen with equal chance, so each stands for T/N texels: Phi_i = Phi_t T / N. Texels
-without flux count in N but are dropped from the list. With a `warp` texels are drawn after their importance, and each
-light's flux is T/N w Phi_t with the weight w of `refgi.lights.warp`. `filtered` replaces T/N times one texel's flux by
-the sum over the texel's cell (SII's filtered flux look-up); the cells partition the map, so the flux sum is the map's.
-
-With several maps `shares` says how many of the count each gets. Under the grid pattern a map draws the k n^2 texels
-nearest to its share, n x n on each of its k maps (6 for a cube); its lights carry T over that number, so rounding moves
-no light from one map to another.
+without flux count in N but are dropped from the list. With a `warp` each light's flux is T/N w Phi_t with the weight w
+of `refgi.lights.warp`; `filtered` replaces T/N Phi_t by the flux of the texel's cell (SII's filtered look-up).
 """
 
 import math
@@ -17,9 +12,16 @@ from typing import Any, NamedTuple, get_args
 import numpy as np
 
 from refgi.errors import expect
-from refgi.lights.footprints import cell_sums, cells_of_grid, cells_of_nearest, texel_areas, texels_with_flux
 from refgi.lights.importance import importance as importance_of
-from refgi.lights.shares import Pattern, map_shares
+from refgi.lights.shares import (
+    Pattern,
+    cell_sums,
+    cells_of_grid,
+    cells_of_nearest,
+    map_shares,
+    texel_areas,
+    texels_with_flux,
+)
 from refgi.lights.warp import Warp, texel_of, warp_stacked
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.rsm.buffers.gbuffer import values_at
@@ -78,15 +80,10 @@ def draw_texels(
     renormalise: Scale each map's weights w to a sum of N. Biased, and noisier where the warp goes down to texels.
     -> list of Drawn: One a map.
 
-    Raises
-    ------
-    InputError
-        If the pattern is unknown, the count does not suit it, or there is nothing for the warp to move.
+    Raises `InputError` if the pattern is unknown, the count does not suit it, or there is nothing for the warp to move.
 
-    Notes
-    -----
     Filtered lights of a warped pattern stand at warped places and carry the flux of the texels nearest to them, without
-    weight: the cells already are small where the lights are dense. Of several on one texel the first has it all.
+    weight, as the cells already are small where the lights are dense. Of several on one texel the first has it all.
     """
     expect(len(rsms) > 0, "rsms", "at least one map", "none")
     expect(pattern in get_args(Pattern), "pattern", " or ".join(get_args(Pattern)), pattern)
@@ -120,8 +117,6 @@ def lights_of(rsms: Sequence[Rsm], drawn: Sequence[Drawn]) -> PixelLights:
 
     -> PixelLights: Those with flux.
 
-    Notes
-    -----
     A filtered light whose own texel has no flux moves to the nearest texel of its cell that has. Where its texel has no
     lobe, what the cell's lobes reflect leaves it diffusely: flux alone is filtered, in the paper as here.
     """

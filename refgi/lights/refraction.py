@@ -1,19 +1,10 @@
 """Refraction through glass: glass texels of a reflective shadow map become pixel lights with lobes (SII Fig. 4).
 
-The 2006 paper draws a glass figure with "refraction only at the back-facing surface" and says no more (SII Fig. 4).
-Here, in mode "back_face", light crosses the front face unbent and is refracted where it leaves the body, at the
-nearest glass face along the same ray that looks away from the light. A parallel ray at height h leaves a ball of
-radius R at the angle of incidence asin(h / R) and, for small h, meets the axis R / (n - 1) behind the back; beyond
-h = R / n it is totally reflected and lost. Mode "two_interface" refracts at the front as well and traces the ray to
-the exit: the ball's back focal distance is then R (2 - n) / (2 (n - 1)).
-
-Either way the texel becomes a pixel light at the exit point: normal outwards, lobe axis along the refracted ray, flux
-Phi = I(w) O T with Fresnel's unpolarised transmittance T of both faces.
-
-Symbols: d direction of light, n normal on the side that light goes to, eta index of refraction over that of the far
-side, T share that is not reflected.
-
-`refract` bends rays at smooth interfaces by Snell's law, with Fresnel's transmittance for unpolarised light.
+The paper says "refraction only at the back-facing surface". In mode "back_face" light crosses the front face unbent and
+is refracted at the nearest glass face along the same ray that looks away from the light; "two_interface" refracts at
+the front as well and traces the ray to the exit. Either way the texel becomes a light at the exit: normal outwards,
+lobe axis along the refracted ray, flux Phi = I(w) O T. Symbols: d direction of light, n normal on the side that light
+goes to, eta index of refraction over that of the far side, T share that is not reflected (Fresnel, unpolarised).
 """
 
 from typing import Any, Literal, NamedTuple, Protocol, get_args
@@ -35,12 +26,10 @@ Mode = Literal["back_face", "two_interface"]
 
 
 def refract(direction: Array, normal: Array, eta: Array) -> tuple[Array, Array]:
-    """Bend rays at smooth interfaces (Snell) and return what passes (Fresnel, unpolarised).
+    """Bend rays (3, n) at smooth interfaces (Snell) and return what passes, (n,) (Fresnel, unpolarised).
 
-    Unit vectors of the incoming light and unit normals on the side that light goes to are (3, n), `eta` (n,) is the
-    index of refraction on the near side over that on the far side. Returns unit vectors behind the interface (3, n),
-    the incoming ones where nothing passes, and the share of the flux that passes (n,); 0 at total reflection and for
-    light that comes from the normal's side.
+    `eta` (n,) is the index of refraction on the near side over that on the far side. Where nothing passes, by total
+    reflection or for light from the normal's side, directions stay.
     """
     cos_in = (direction * normal).sum(axis=0)
     sin2 = eta**2 * (1 - cos_in**2)

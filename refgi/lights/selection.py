@@ -1,9 +1,9 @@
-"""Which pixel lights a splatting method uses: texels of the maps, or quasi-random paths (SII Sec. 3.1, 3.5 to 3.7).
+"""Which pixel lights a splatting method uses (SII Sec. 3.1, 3.5 to 3.7), and openness in place of visibility (Sec. 7).
 
 The paper scales the flux "by the ambient occlusion term" on an unwarped pattern. With O the share of free directions
-the intended factor is 1 - O: `scale_flux` darkens lights in the open and so loses energy, the sum of Phi O. `roulette`
-instead removes them at random and lets the survivors make up for it, so the mean stays the same. By the paper's own O
-(Sec. 3.5) the printed factor is O, which darkens the lights near other surfaces, against its aim: `as_printed`.
+the intended factor is 1 - O: `scale_flux` darkens lights in the open and loses the sum of Phi O; `roulette` removes
+them at random and lets the survivors make up for it. By the paper's own O (Sec. 3.5) the printed factor is O, which
+darkens the lights near other surfaces, against its aim: `as_printed`.
 """
 
 from collections.abc import Sequence
@@ -13,20 +13,54 @@ import numpy as np
 
 from refgi.diagnostics import is_due
 from refgi.errors import expect
-from refgi.lights.ambient_occlusion import openness_of
-from refgi.lights.footprints import with_equal_solid_angles
-from refgi.lights.settings import LightSettings, MapLights, PathLights
+from refgi.lights.importance import importance as importance_of
+from refgi.lights.pixel_lights import Drawn, draw_texels, footprints_of, lights_of
+from refgi.lights.refraction import refracted
+from refgi.lights.settings import LightSettings, MapLights, Openness, PathLights
+from refgi.lights.shares import MapShare, map_shares, with_equal_solid_angles
+from refgi.lights.walk import walk_lights
+from refgi.lights.warp import Warp
+from refgi.pairs.estimates import lost_share, warn_of_loss
 from refgi.sampling import ROULETTE, draws
+from refgi.scene import light_table, material_table
+from refgi.scene.material import as_senders
 from refgi.stages import skip, stage
 from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.frame import Frame
-    from refgi.lights.pixel_lights import Drawn
-    from refgi.lights.shares import MapShare
     from refgi.pairs.pixel_lights import PixelLights
     from refgi.pairs.settings import PairSettings
     from refgi.rsm import Rsm
+
+
+def occluded(frame: "Frame", irradiance: Array, settings: Openness | None, seed: int) -> Array:
+    """Return a picture's irradiance (3, h, w), W/m^2, times the openness of its receivers, if the settings have it."""
+    if settings is None:
+        return irradiance
+    return occlude(irradiance, openness_of(frame, *frame.gbuffer.resolve("position", "normal", "covered"),
+                                           settings=settings, seed=seed))
+
+
+@stage("lights.occlude")
+def occlude(irradiance: Array, openness: Array) -> Array:
+    """Scale what each receiver gets by its openness, E O, in place of visibility (SII Sec. 7, AMS Sec. 5).
+
+    irradiance (3, h, w): Indirect irradiance, W/m^2, without visibility.
+    openness (h, w): Share O of unoccluded directions of each pixel, 0 to 1.
+    -> (3, h, w): Indirect irradiance, W/m^2, without albedo/pi.
+    """
+    return irradiance * openness
+
+
+def openness_of(
+    frame: "Frame", position: Array, normal: Array, covered: Array | None = None, *, settings: Openness, seed: int
+) -> Array:
+    """Return how open points (3, ...) are, (...), 0 to 1; a radius of 0 is a tenth of what is lit."""
+    from refgi.rays import openness
+
+    radius = settings.radius or frame.illuminated_extent.diagonal / 10
+    return openness(frame.tracer, position, normal, covered, radius=radius, rays=settings.rays, seed=seed)
 
 
 @stage("lights.scale_flux")
@@ -40,10 +74,7 @@ def scale_flux(
     -> lights PixelLights: All of them, in the same order; those with O = 1, as printed O = 0, are dark.
     -> lost (3,) float64: Flux removed, W, diffuse and lobe together.
 
-    Raises
-    ------
-    InputError
-        If openness does not fit.
+    Raises `InputError` if openness does not fit.
     """
     _check(lights, openness)
     factor = (openness if as_printed else 1 - openness).astype(lights.flux.dtype)
@@ -62,19 +93,14 @@ def roulette(lights: "PixelLights", openness: Array, floor: float, seed: int) ->
     seed: Which random choice: one number a light, in their order.
     -> PixelLights: The survivors, in order. Sums over them have the mean of sums over `lights`.
 
-    Raises
-    ------
-    InputError
-        If openness does not fit or a number is out of range.
+    Raises `InputError` if openness does not fit or a number is out of range.
     """
     _check(lights, openness)
     expect(0 < floor <= 1, "floor", "above 0, up to 1", floor)
     chance = np.maximum(1 - np.asarray(openness, np.float64), floor)
     survives = draws(seed, ROULETTE, len(chance)) < chance
     gain = (1 / chance[survives]).astype(lights.flux.dtype)
-    parts: dict[str, Any] = {name: part[..., survives] for name, part in lights._asdict().items()
-                             if isinstance(part, np.ndarray)}
-    survivors = lights._replace(**parts)
+    survivors = lights.selected(survives)
     survivors = survivors._replace(flux=survivors.flux * gain)
     if survivors.lobe_flux is not None:
         survivors = survivors._replace(lobe_flux=survivors.lobe_flux * gain)
@@ -97,7 +123,9 @@ def choose_lights(frame: "Frame", settings: LightSettings) -> "PixelLights":
     """Return the pixel lights of a frame, with their share of the flux."""
     source = settings.source
     if isinstance(source, PathLights):
-        lights = _walked(frame, settings.count, source.bounces, settings.seed)
+        scene = frame.scene
+        lights = walk_lights(frame.tracer, scene.geometry, material_table(as_senders(scene.materials)),
+                             light_table(scene.lights), settings.count, source.bounces, settings.seed)
     else:
         rsms = light_maps(frame, source)
         lights = pixel_lights(rsms, settings, importance_maps(frame, rsms, settings))
@@ -108,8 +136,6 @@ def choose_lights(frame: "Frame", settings: LightSettings) -> "PixelLights":
 
 def light_maps(frame: "Frame", settings: MapLights) -> "tuple[Rsm, ...]":
     """Return the maps that lights are taken from, one a lamp: those of the frame, with what glass lets through."""
-    from refgi.lights.refraction import refracted
-
     rsms = frame.rsms
     if settings.refraction is not None:
         mode: Any = settings.refraction.name()
@@ -126,8 +152,6 @@ def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: LightSettin
 
     The frame's triangles block what is not open.
     """
-    from refgi.lights.importance import importance
-
     warp = _map_lights(settings).warp
     if warp is None:
         skip("lights.warp", "lights follow their pattern alone")
@@ -138,15 +162,13 @@ def importance_maps(frame: "Frame", rsms: "Sequence[Rsm]", settings: LightSettin
         if warp.importance == "openness":
             free = openness_of(frame, rsm.position, rsm.normal, _has_flux(rsm), settings=settings.openness,
                                seed=settings.seed)
-        maps.append(importance(rsm, warp.importance, free, settings.openness.floor, warp.defensive,
-                               as_printed="sii_peak" in _map_lights(settings).as_published))
+        maps.append(importance_of(rsm, warp.importance, free, settings.openness.floor, warp.defensive,
+                                  as_printed="sii_peak" in _map_lights(settings).as_published))
     return maps
 
 
 def with_openness(frame: "Frame", lights: "PixelLights", settings: LightSettings) -> "PixelLights":
     """Return lights scaled by 1 - openness or thinned by roulette with it, if the settings ask for it (Sec. 3.6)."""
-    from refgi.pairs.estimates import lost_share, warn_of_loss
-
     if settings.openness.flux == "none":
         return lights
     free = openness_of(frame, lights.position, lights.normal, settings=settings.openness, seed=settings.seed)
@@ -158,16 +180,6 @@ def with_openness(frame: "Frame", lights: "PixelLights", settings: LightSettings
     return roulette(lights, free, settings.openness.floor, settings.seed)
 
 
-def _walked(frame: "Frame", count: int, bounces: int, seed: int) -> "PixelLights":
-    from refgi.lights.walk import walk_lights
-    from refgi.scene import light_table, material_table
-    from refgi.scene.material import as_senders
-
-    scene = frame.scene
-    return walk_lights(frame.tracer, scene.geometry, material_table(as_senders(scene.materials)),
-                       light_table(scene.lights), count, bounces, seed)
-
-
 def pixel_lights(
     rsms: "Sequence[Rsm]", settings: LightSettings, importance: "Sequence[Array] | None" = None
 ) -> "PixelLights":
@@ -175,15 +187,10 @@ def pixel_lights(
 
     `importance`, (H, W) a map, steers the warp.
     """
-    from refgi.lights.pixel_lights import lights_of
-
     return lights_of(rsms, _drawn(rsms, settings, importance))
 
 
-def _drawn(rsms: "Sequence[Rsm]", settings: LightSettings, importance: "Sequence[Array] | None") -> "list[Drawn]":
-    from refgi.lights.pixel_lights import draw_texels
-    from refgi.lights.warp import Warp
-
+def _drawn(rsms: "Sequence[Rsm]", settings: LightSettings, importance: "Sequence[Array] | None") -> list[Drawn]:
     source = _map_lights(settings)
     count = None if source.pattern == "all" else settings.count
     method: Any = source.warp and source.warp.name()
@@ -198,10 +205,8 @@ def _map_lights(settings: LightSettings) -> MapLights:
     return settings.source if isinstance(settings.source, MapLights) else MapLights()
 
 
-def drawn_from_maps(rsms: "Sequence[Rsm]", settings: LightSettings) -> "list[MapShare]":
+def drawn_from_maps(rsms: "Sequence[Rsm]", settings: LightSettings) -> list[MapShare]:
     """Return how many texels the settings draw from each map."""
-    from refgi.lights.shares import map_shares
-
     pattern = _map_lights(settings).pattern
     return map_shares(rsms, None if pattern == "all" else settings.count, pattern, settings.seed)
 
@@ -225,8 +230,6 @@ def footprints(frame: "Frame", settings: LightSettings, pairs: "PairSettings") -
 
 def light_areas(frame: "Frame", settings: LightSettings) -> Array:
     """Return the surface that each light of `choose_lights` from maps stands for, (N,), m^2."""
-    from refgi.lights.pixel_lights import footprints_of
-
     rsms = light_maps(frame, _map_lights(settings))
     return footprints_of(rsms, _drawn(rsms, settings, importance_maps(frame, rsms, settings)))
 

@@ -1,7 +1,7 @@
 """Settings of pixel lights, and what every method that uses pixel lights approximates by them."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Literal, TypeVar
 
 from refgi.errors import expect
@@ -193,9 +193,9 @@ def every_light(lights: LightSettings) -> LightSettings:
     return dataclasses.replace(lights, count=1, seed=0, source=source)
 
 
-def without_ambient_occlusion(settings: Any, _: Mapping[str, Any]) -> Any:
-    """Return settings of a method whose receivers get light as if nothing blocked it."""
-    return dataclasses.replace(settings, ambient_occlusion=None)
+def changed(**values: Any) -> Callable[[Any, Mapping[str, Any]], Any]:
+    """Return what switches an approximation off by other values of some settings."""
+    return lambda settings, _: dataclasses.replace(settings, **values)
 
 
 def without_clamp(settings: Any, _: Mapping[str, Any]) -> Any:
@@ -203,24 +203,16 @@ def without_clamp(settings: Any, _: Mapping[str, Any]) -> Any:
     return dataclasses.replace(settings, pairs=dataclasses.replace(settings.pairs, clamp=None))
 
 
-def _finer_map(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    return {**options, "rsm_resolution": FINER * options["rsm_resolution"]}
-
-
-def _unscaled(settings: Any, _: Mapping[str, Any]) -> Any:
-    return dataclasses.replace(settings, lights=dataclasses.replace(settings.lights, openness=OpennessSettings()))
-
-
-def _sampled(settings: Any, _: Mapping[str, Any]) -> Any:
-    return dataclasses.replace(settings, lights=every_light(settings.lights))
-
-
 VISIBILITY = Approximation("visibility", "nothing blocks indirect light", limit=lambda _: {"visibility": False})
 RSM_RESOLUTION = Approximation(
-    "RSM resolution", f"texels of the reflective shadow map; off: {FINER} along a side for each", frame=_finer_map)
+    "RSM resolution", f"texels of the reflective shadow map; off: {FINER} along a side for each",
+    frame=lambda options: {**options, "rsm_resolution": FINER * options["rsm_resolution"]})
 LIGHT_SAMPLING = Approximation(
-    "light sampling", "N pixel lights for all texels of the reflective shadow map", _sampled)
-OPENNESS = Approximation("openness", "flux of lights in the open is scaled down or left to chance", _unscaled)
+    "light sampling", "N pixel lights for all texels of the reflective shadow map",
+    lambda settings, _: dataclasses.replace(settings, lights=every_light(settings.lights)))
+OPENNESS = Approximation("openness", "flux of lights in the open is scaled down or left to chance", lambda settings, _:
+                         dataclasses.replace(settings, lights=dataclasses.replace(
+                             settings.lights, openness=OpennessSettings())))
 AMBIENT_OCCLUSION = Approximation(
-    "ambient occlusion", "openness of receivers stands for visibility", without_ambient_occlusion)
+    "ambient occlusion", "openness of receivers stands for visibility", changed(ambient_occlusion=None))
 CLAMP = Approximation("clamp", "what bounds the light of near pairs", without_clamp)

@@ -1,11 +1,10 @@
-"""How many pixel lights each lamp gets: in proportion to the flux that its map's surfaces reflect, none where it is 0.
+"""How many lights each lamp gets, by the flux its map reflects, and the cells and areas that lights of a map stand for.
 
-The count is a total over all lamps. Where it suffices each lamp with flux has at least one light, and its lights carry
-T/N of their texels' flux. Where lamps outnumber lights the count is drawn from the lamps by systematic sampling, n_i
-lights of lamp i with the mean q_i = count Phi_i / Phi, and its lights carry n_i / q_i more: the mean over seeds is the
-flux of all lamps. The grid pattern draws the k m^2 texels nearest to a share, m x m on each of a map's k faces.
-
-Symbols: Phi_i flux of lamp i (W, all channels), q_i its quota of the count.
+Lights of a lamp carry T/N of their texels' flux. Where lamps outnumber lights the count is drawn by systematic
+sampling, n_i lights of lamp i with the mean q_i = count Phi_i / Phi, and its lights carry n_i / q_i more. Cells
+partition a map's texels, one per chosen texel, for filtered flux (SII Sec. 4); the surface behind a texel is
+A = O d^2 / cos (m^2), O its solid angle (sr). `with_equal_solid_angles` is the map as the papers print it, too dim
+inside and too bright outside (Nichols and Wyman 2009, Fig. 13).
 """
 
 import math
@@ -15,14 +14,19 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from refgi.errors import expect
+from refgi.jit import kernel, prange
 from refgi.rsm.buffers.extent import texel_grid
 from refgi.rsm.buffers.gbuffer import values_at
+from refgi.rsm.raster.projection import Projection
 from refgi.sampling import PARTS, PIXEL_LIGHTS, draws
 from refgi.stages import skip, stage
 from refgi.types import Array
 
 if TYPE_CHECKING:
+    from refgi.pairs.pixel_lights import PixelLights
     from refgi.rsm import Rsm
+    from refgi.scene.model import Light
+
 Pattern = Literal["grid", "halton", "all", "random"]
 
 SIDE = 128  # texels along a side of a map of which the flux is summed: a share need not be exact to be unbiased
@@ -65,10 +69,7 @@ def map_shares(rsms: "Sequence[Rsm]", count: int | None, pattern: Pattern, seed:
     -> list of MapShare: One a map. The numbers sum to the count, but for the grid, whose m x m cells on each of a map's
         faces come as near to the map's share as they can.
 
-    Raises
-    ------
-    InputError
-        If the count does not suit the pattern.
+    Raises `InputError` if the count does not suit the pattern.
     """
     if pattern == "all":
         total = sum(rsm.texels for rsm in rsms)
@@ -129,3 +130,137 @@ def _nearest_grid(share: int, maps: int) -> int:
     """Return the number of cells nearest to a share that puts n x n on each of some maps; of two the smaller."""
     below = max(1, math.isqrt(share // maps))
     return min((maps * n * n for n in (below, below + 1)), key=lambda cells: abs(cells - share))
+
+
+EQUALLY_NEAR = 8  # chosen texels tested for ties
+LEAST_COSINE = 1e-3  # at grazing angles areas would grow without limit
+DEMO_CONSTANT = 1.5  # pi over the 2 pi / 3 sr of a square 90 degree frustum
+
+
+def cells_of_grid(maps: Projection, count: int) -> Array:
+    """Return the cell (H * W,) of each texel's centre, of `count` = k n^2: n x n on each of k maps, row by row."""
+    n = math.isqrt(count // maps.maps)
+    shorter = min(maps.height, maps.width)
+    expect(n <= shorter, "count", f"at most {maps.maps * shorter**2} with filtering", count)
+    row = (2 * np.arange(maps.height) + 1) * n // (2 * maps.height)
+    column = (2 * np.arange(maps.width) + 1) * n // (2 * maps.width)
+    one = row[:, None] * n + column
+    return np.ravel(np.add.outer(np.arange(maps.maps) * (n * n), one))
+
+
+def cells_of_nearest(maps: Projection, texel: Array) -> Array:
+    """Return the index into `texel` (N,) of the chosen texel nearest to each texel, (H * W,).
+
+    On its own map as long as that has one; of equal or equally near ones the first gets the texel.
+    """
+    from scipy.spatial import cKDTree
+
+    apart = 4 * (maps.height + maps.width)  # keeps stacked maps from being neighbours
+
+    def place(index: Array) -> Array:
+        row, column = index // maps.width, index % maps.width
+        return np.stack([row + row // maps.height * apart, column], axis=1).astype(np.float64)
+
+    unique, first = np.unique(texel, return_index=True)
+    candidates = np.arange(1, min(EQUALLY_NEAR, len(unique)) + 1)
+    distance, nearest = cKDTree(place(unique)).query(place(np.arange(math.prod(maps.shape))), k=candidates)
+    tied = np.rint(distance**2) == np.rint(distance[:, :1] ** 2)  # squares of integer steps
+    return np.asarray(np.where(tied, first[nearest], len(texel)).min(axis=1))
+
+
+def cell_sums(flux: Array, cell: Array, count: int) -> Array:
+    """Return the flux of each cell, (3, count) W, summed in float64: flux (3, H, W), cell of each texel (H * W,)."""
+    sums = [np.bincount(cell, channel.reshape(-1), minlength=count) for channel in flux]
+    return np.stack(sums).astype(flux.dtype)
+
+
+def texels_with_flux(texel: Array, cell: Array, has_flux: Array) -> Array:
+    """Return the texel that stands for each cell: the chosen one (N,), or if that is dark the nearest with flux.
+
+    As `texel` where the whole cell is dark; of equally near texels the first.
+    """
+    width = has_flux.shape[1]
+    emits = has_flux.reshape(-1)
+    candidates = np.flatnonzero(emits & ~emits[texel][cell])
+    own = texel[cell[candidates]]
+    square = (candidates // width - own // width) ** 2 + (candidates % width - own % width) ** 2
+    order = np.lexsort((candidates, square, cell[candidates]))
+    cells, first = np.unique(cell[candidates][order], return_index=True)
+    moved = texel.copy()
+    moved[cells] = candidates[order][first]
+    return moved
+
+
+def texel_areas(rsm: "Rsm", texel: Array) -> Array:
+    """Return the surface behind each of some texels (n,) that reflects anything, m^2 in the map's dtype; else 0.
+
+    A directional light's texels have an area in place of a solid angle, and d is 1.
+    """
+    from refgi.scene import DirectionalLight
+
+    light = rsm.light
+    far = isinstance(light, DirectionalLight)
+    source = np.asarray(light.direction if isinstance(light, DirectionalLight) else light.position, np.float64)
+    position, normal, solid_angle, flux = rsm.at(texel, "position", "normal", "solid_angle", "flux")
+    lobe = None if rsm.lobe_flux is None else values_at(rsm.lobe_flux, texel)
+    return areas_of(position, normal, solid_angle, flux, lobe, source, far)
+
+
+def areas_of(
+    position: Array, normal: Array, solid_angle: Array, flux: Array, lobe: Array | None, source: Array, far: bool
+) -> Array:
+    """Return the surface behind texels (n,), m^2, of those that reflect; `far`: `source` (3,) is a direction."""
+    areas = np.zeros_like(solid_angle)
+    _fill_areas(position, normal, solid_angle, flux, lobe, source, far, areas)
+    return areas
+
+
+@kernel(parallel=True)
+def _fill_areas(
+    position: Array, normal: Array, solid_angle: Array, flux: Array, lobe: Array | None, source: Array, far: bool,
+    areas: Array,
+) -> None:
+    for i in prange(len(areas)):
+        reflected = flux[0, i] != 0 or flux[1, i] != 0 or flux[2, i] != 0
+        if lobe is not None:
+            reflected = reflected or lobe[0, i] != 0 or lobe[1, i] != 0 or lobe[2, i] != 0
+        if reflected:
+            square, along = 0.0, 0.0
+            for axis in range(3):
+                d = source[axis] - (0.0 if far else float(position[axis, i]))
+                square += d * d
+                along += d * normal[axis, i]
+            cosine = abs(along) / np.sqrt(square) if square > 0.0 else 0.0
+            areas[i] = solid_angle[i] * (1.0 if far else square) / max(cosine, LEAST_COSINE)
+
+
+def with_equal_solid_angles(rsm: "Rsm") -> "Rsm":
+    """Return a map with the flux its texels would have if all that the light reaches subtended the same solid angle.
+
+    Diffuse flux, lobes and the areas behind texels follow that angle; that of the whole map is unchanged.
+    """
+    from refgi.rsm.buffers.light_projection import incident_flux
+
+    exact = rsm.solid_angle
+    inside = incident_flux(rsm.light, rsm.projection, exact, exact.dtype).any(axis=0)
+    mean = exact[inside].sum(dtype=np.float64) / max(1, np.count_nonzero(inside))
+    equal = np.where(inside, mean, exact).astype(exact.dtype)
+    factor = np.divide(equal, exact, out=np.zeros_like(exact), where=inside)
+    lobe = None if rsm.lobe_flux is None else rsm.lobe_flux * factor
+    return rsm._replace(solid_angle=equal, flux=rsm.flux * factor, lobe_flux=lobe)
+
+
+def demo_footprints(lights: "PixelLights", sources: "Sequence[Light]", shares: "Sequence[int]") -> Array:
+    """Return the disc that each light of maps stands for in the authors' demo: pi L^2 / (1.5 N), (N',), m^2.
+
+    That is the area of equal shares of a square 90 degree frustum, at normal incidence. `sources` are the light of each
+    map, `shares` N: how many texels were drawn from each. `InputError` if a light is directional: it has no distance L.
+    """
+    area = np.zeros(lights.position.shape[1])
+    for index, (source, count) in enumerate(zip(sources, shares, strict=True)):
+        place = getattr(source, "position", None)
+        expect(place is not None, "as_published", "no 'ams_disc' under a directional light", "ams_disc")
+        mine = lights.map_index == index
+        away = lights.position[:, mine] - np.asarray(place, np.float64)[:, None]
+        area[mine] = np.pi / (DEMO_CONSTANT * max(1, count)) * (away**2).sum(axis=0)
+    return area

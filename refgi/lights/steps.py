@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from refgi.lights.footprints import areas_of, cell_sums, cells_of_grid, cells_of_nearest
 from refgi.lights.importance import importance as importance_of
 from refgi.lights.pixel_lights import Drawn, MapPlanes, gathered_lights
-from refgi.lights.shares import Pattern, map_shares
+from refgi.lights.shares import Pattern, areas_of, cell_sums, cells_of_grid, cells_of_nearest, map_shares
 from refgi.lights.warp import Warp, _clamped_to_texel, texel_of, warp_stacked
 from refgi.rsm.buffers.gbuffer import values_at
 from refgi.rsm.buffers.reflective import Rsm

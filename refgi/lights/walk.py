@@ -1,8 +1,7 @@
 """Pixel lights without a map: quasi-random light paths, as in instant radiosity (SII Sec. 3.7, Keller 1997).
 
-Every place where a path meets a surface becomes a pixel light with what the surface reflects there. The first
-bounce has the mean of the lights of a reflective shadow map; more bounces follow the diffuse reflection on. In an
-integrating sphere of albedo rho all bounces together give rho / (1 - rho) of the light's flux.
+Every place where a path meets a surface becomes a pixel light with what the surface reflects there. The first bounce
+has the mean of the lights of a reflective shadow map; more bounces follow the diffuse reflection on.
 """
 
 import math
@@ -12,6 +11,8 @@ import numpy as np
 
 from refgi.errors import expect
 from refgi.jit import kernel
+from refgi.lights.shares import lamp_shares
+from refgi.pairs.pixel_lights import PixelLights
 from refgi.radiometry import DIRECTIONAL, POINT, orthonormal_basis, radiant_intensity
 from refgi.sampling import LIGHT_PATHS, cosine_hemisphere, draws, halton
 from refgi.scene.light import CAP
@@ -19,7 +20,6 @@ from refgi.stages import stage
 from refgi.types import Array
 
 if TYPE_CHECKING:
-    from refgi.pairs.pixel_lights import PixelLights
     from refgi.rays import Tracer
     from refgi.scene import Geometry, LightTable, MaterialTable
 
@@ -54,7 +54,7 @@ class PathVertices(NamedTuple):
 def walk_lights(
     tracer: "Tracer", geometry: "Geometry", materials: "MaterialTable", lights: "LightTable", paths: int,
     bounces: int = 1, seed: int = 0,
-) -> "PixelLights":
+) -> PixelLights:
     """Trace light paths and leave a pixel light at every bounce.
 
     materials: Float64.
@@ -65,13 +65,8 @@ def walk_lights(
     seed: Shifts the quasi-random set modulo 1, 0 leaves it as it is; draws the lamps where there are fewer paths.
     -> PixelLights: At most paths x bounces of them, float64; those without flux are dropped.
 
-    Raises
-    ------
-    InputError
-        If there are no paths, or too many bounces.
+    Raises `InputError` if there are no paths, or too many bounces.
 
-    Notes
-    -----
     Paths are not ended at random: each carries on with its power times the diffuse reflectance, so the walk adds no
     noise beyond its directions. Glossy materials leave a lobe, but paths go on by diffuse reflection alone.
     """
@@ -90,8 +85,6 @@ def _shares(
     tracer: "Tracer", geometry: "Geometry", materials: "MaterialTable", lights: "LightTable", paths: int, seed: int
 ) -> list[tuple[int, int, float]]:
     """Return number, paths and gain of each lamp that has any, by the flux that a trial brings to surfaces."""
-    from refgi.lights.shares import lamp_shares
-
     count = len(lights.kind)
     if count == 1:
         return [(0, paths, 1.0)]
@@ -220,9 +213,7 @@ def _diffuse(geometry: "Geometry", materials: "MaterialTable", triangle: Array, 
     return diffuse
 
 
-def _pixel_lights(vertices: list[PathVertices], drawn: int) -> "PixelLights":
-    from refgi.pairs.pixel_lights import PixelLights
-
+def _pixel_lights(vertices: list[PathVertices], drawn: int) -> PixelLights:
     joined = (np.concatenate(parts).T for parts in zip(*vertices, strict=True))
     position, normal, flux, lobe_flux, axis, exponent, half = joined
     glossy: Array = (lobe_flux != 0).any(axis=0)

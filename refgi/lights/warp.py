@@ -1,12 +1,9 @@
 """Hierarchical warping of sample points after an importance map (SII Sec. 3.5, after Clarberg et al. 2005; P2).
 
-The map is halved in rows and columns again and again. On each level a sample goes to one half of its cell in
-proportion to the half's importance and its local coordinate is stretched over that half, first in y, then in x:
-method A by the columns of the half it has chosen, method B by the columns of the whole cell. Its weight w is what
-uniform samples would count there, 1 / density, so that (T/N) sum w_i Phi(s_i) is unbiased for every level.
-
-Sides need not be powers of two. Halves may then differ by a texel (or one be empty), and the halves' shares a and
-1 - a of the cell's texels take the place of the 1/2 in Eq. (5) and (6). No sample is lost to padding.
+On each level a sample goes to one half of its cell in proportion to the half's importance and its local coordinate is
+stretched over that half, first in y, then in x: method A by the columns of the half it has chosen, B by those of the
+whole cell. Its weight w is 1 / density, so that (T/N) sum w_i Phi(s_i) is unbiased for every level. Where sides are no
+powers of two the halves' shares a and 1 - a of the cell's texels take the place of the 1/2 in Eq. (5) and (6).
 """
 
 import dataclasses
@@ -48,8 +45,6 @@ def warp_stacked(points: Array, importance: Array, maps: int, warp: Warp) -> tup
     -> warped (point, uv) float64: Warped points in [0, 1) over the stacked maps.
     -> density_weight (point,) float64: Weight w of each point, 1 / density over the unit square.
 
-    Notes
-    -----
     SII Sec. 3.6 mentions such a "pre-warping step". v chooses the map in proportion to its importance and, stretched
     over the map's share, becomes the coordinate on it: strata of the points remain strata of each map.
     """

@@ -1,30 +1,22 @@
 """What a sum of pixel lights is off by, estimated at some pixels: light that a setting removes, error of sampling.
 
-A clamp or a cut is a bias that no picture shows. The share it removes is that of two sums over the same lights, with
-the setting and without, at pixels that are the same in every run. Without a clamp a few near pairs hold much of the
-sum, so the share is as good as the sample: within 3 of 100 in the tests.
-
-The error of sampling is seen by halves of the lights. Each half, doubled, is an estimate of the picture of its own, so
-half of their difference is one of the error of both together: of independent draws its mean square is the variance. A
-light so near that it decides the error of a picture without a clamp is seen only where a sampled pixel is near it: the
-estimate is then too low.
-
-Where all lights are far from what is seen halves agree on too little. What lit pixels send to each other is part of
-the light, so that a sum of lights below it is off by the difference at least.
+The share that a clamp or cut removes is that of two sums over the same lights at the same pixels. The error of sampling
+is seen by halves of the lights: each, doubled, is an estimate of the picture, so half of their difference is one of the
+error of both together; a light so near that it decides the error is seen only where a sampled pixel is near it. Where
+all lights are far from what is seen halves agree on too little: what lit pixels send to each other bounds the light.
 """
 
 import dataclasses
 import math
 import warnings
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from refgi.diagnostics import SamplingError, asked, is_due
 from refgi.errors import RefgiWarning
 from refgi.pairs.irradiance import Receivers, add_lights
-from refgi.pairs.packing import pack
-from refgi.pairs.pixel_lights import warn_of_mirrors
+from refgi.pairs.pixel_lights import pack
 from refgi.pairs.settings import STRONGEST_CLAMP, DiscClamp, GeometryClamp, PairSettings
 from refgi.pairs.tiles import block_by_block, taken
 from refgi.stages import stage
@@ -34,6 +26,40 @@ if TYPE_CHECKING:
     from refgi.frame import Frame
     from refgi.pairs.pixel_lights import PixelLights
     from refgi.scene import Camera
+
+SHARP = 1e5  # exponent from which on lobes may vanish; wider ones that are missed show as sampling error
+LEAST_REACHING = 0.01  # lobes that reach a receiver, in the mean
+
+
+def vanishing(lights: "PixelLights") -> Array:
+    """Return which lights have lobes that reach fewer than `LEAST_REACHING` of the receivers, (N,) bool."""
+    if lights.lobe_flux is None or lights.lobe_exponent is None:
+        return np.zeros(lights.flux.shape[1], np.bool_)
+    sharp: Array = lights.lobe_flux.any(axis=0) & (lights.lobe_exponent >= SHARP)
+    for exponent in np.unique(lights.lobe_exponent[sharp]):
+        same = sharp & (lights.lobe_exponent == exponent)
+        if 2.0 * np.count_nonzero(same) >= LEAST_REACHING * (float(exponent) + 1.0):
+            sharp &= ~same
+    return sharp
+
+
+def warn_of_mirrors(frame: "Frame", lights: "PixelLights", method: str) -> None:
+    """Warn whoever collects diagnostics of lights whose lobes vanish, with the materials that they lie on."""
+    if lights.lobe_flux is None or lights.lobe_exponent is None or asked("pairs.mirrors") is None:
+        return
+    gone = vanishing(lights)
+    if gone.any():
+        real, exponents = lights.lobe_exponent.dtype.type, set(lights.lobe_exponent[gone].tolist())
+        names = [material.name for material in frame.scene.materials
+                 if material.is_glossy and not material.is_dielectric and float(real(material.exponent)) in exponents]
+        flux = lights.lobe_flux[:, gone].sum(dtype=np.float64)
+        share = flux / (lights.flux.sum(dtype=np.float64) + lights.lobe_flux.sum(dtype=np.float64))
+        warnings.warn(RefgiWarning(
+            f"{method}: the lobes of {len(names)} material(s), {', '.join(map(repr, names))}, are too sharp (exponent "
+            f"{min(exponents):g} or more) for {np.count_nonzero(gone)} pixel lights, which reach fewer than 1 receiver "
+            f"in {1 / LEAST_REACHING:.0f}: {100 * share:.0f} % of the flux of {len(gone)} lights vanishes or lights "
+            "single pixels"), stacklevel=3)
+
 
 PAIRS = 1 << 20  # about as many are summed: a millisecond's work
 LEAST_SAMPLED = 2048  # pixels, however many lights there are
@@ -79,10 +105,8 @@ def sample_for(receivers: Receivers, lights: "PixelLights", *, least: int = LEAS
 
 def thinned(lights: "PixelLights", footprint: Array | None) -> tuple["PixelLights", Array | None]:
     """Return one of every few lights, THINNED or more, and their areas: enough for the share of a loss."""
-    step = max(1, lights.flux.shape[1] // THINNED)
-    every = {name: value for name, value in lights._asdict().items() if name != "drawn" and value is not None}
-    some: dict[str, Any] = {name: value[..., ::step] for name, value in every.items()}
-    return lights._replace(**some), None if footprint is None else footprint[::step]
+    some = slice(None, None, max(1, lights.flux.shape[1] // THINNED))
+    return lights.selected(some), None if footprint is None else footprint[some]
 
 
 def light_at(
@@ -139,9 +163,7 @@ def half_of(lights: "PixelLights", second: bool) -> tuple["PixelLights", Array]:
     """Return the lights of one half of the draw, and which they are, (N,) bool."""
     assert lights.half is not None
     chosen = lights.half == second
-    parts: dict[str, Any] = {name: values[..., chosen] for name, values in lights._asdict().items()
-                             if isinstance(values, np.ndarray)}
-    return lights._replace(**parts), chosen
+    return lights.selected(chosen), chosen
 
 
 @stage("pairs.sampling_error")

@@ -1,13 +1,9 @@
 """The sum over all pairs of pixel light and glossy receiver: radiance towards the eye (AMS Eq. 2 with its rho_s).
 
-L_s = specular (P + 2) / (2 pi) sum over lights of <m . w>^P I(w) c_x / r^2, where I c_x / r^2 is the term of the
-diffuse sum, clamped alike. Receivers are the SIMD lanes; norm and reflectance are theirs and are multiplied in last.
-The power is taken as 2^(P log2(1 - h)), h = |m - w|^2 / 2, as for senders' lobes (`lobe_sum`). Tiles are of 64
-receivers, each with lights of its own: those that planes, ranges and the receivers' lobes leave (`lobe_culling`). A
-light's terms are found in a few passes over the tile; one that lies in no lobe is passed over after the first, one that
-lights none of the receivers before the power is taken.
-
-Symbols as in `pair_sum`; m the direction to the eye mirrored at the receiver, w unit vector from it to the light.
+L_s = specular (P + 2) / (2 pi) sum over lights of <m . w>^P I(w) c_x / r^2, I c_x / r^2 the term of the diffuse sum,
+clamped alike; m is the direction to the eye mirrored at the receiver, w the unit vector from it to the light. The power
+is 2^(P log2(1 - h)), h = |m - w|^2 / 2, as for senders' lobes (`lobe_sum`). Tiles are of 64 receivers, each with the
+lights that planes, ranges and its lobes leave (`lobe_culling`). Symbols as in `pair_sum`.
 """
 
 from typing import Any, NamedTuple
@@ -29,9 +25,22 @@ from refgi.pairs.lobe_culling import (
     lobes_in_reach,
 )
 from refgi.pairs.lobe_sum import AT_ONCE, TERM, lobe_terms, whole_from
-from refgi.pairs.pair_sum import GROUP, NX, ROWS, SUM, TOTAL, Clamp, X, close_group, limits_of, load_tile, pair_term
+from refgi.pairs.pair_sum import (
+    GROUP,
+    NX,
+    ROWS,
+    SUM,
+    TOTAL,
+    Clamp,
+    X,
+    close_group,
+    limits_of,
+    load_light,
+    load_tile,
+    pair_term,
+)
 from refgi.pairs.pixel_lights import Range, Widening
-from refgi.pairs.ranged_sum import LANES, list_chosen, range_factor
+from refgi.pairs.ranged_sum import LANES, list_chosen, weigh_by_range
 from refgi.pairs.sphere_sum import TERM as SPHERE_TERM
 from refgi.pairs.sphere_sum import cut_cones, whole_cones
 from refgi.pairs.tiles import lights_in_reach, list_all
@@ -56,7 +65,7 @@ def add_diffuse_listed(
                 close_group(tile)
             group = k // GROUP
             if reach is not None:
-                _weight_by_range(tile, lights, k, reach.square[k], reach.scale[k], reach.outside)
+                weigh_by_range(tile, TERM, load_light(lights, k), reach.square[k], reach.scale[k], reach.outside)
             _add_weighted(tile, lights[6, k], lights[7, k], lights[8, k])
     if group >= 0:
         close_group(tile)
@@ -134,15 +143,6 @@ def _clear_off_lobes(tile: Array) -> bool:
 
 
 @kernel
-def _weight_by_range(tile: Array, lights: Array, k: int, square_range: Any, scale: Any, outside: bool) -> None:
-    """Multiply row TERM by what the range of a diffuse light makes of each pair."""
-    x, y, z, lx, ly, lz = lights[0, k], lights[1, k], lights[2, k], lights[3, k], lights[4, k], lights[5, k]
-    for i in range(LANES):
-        dx, dy, dz = x - tile[X, i], y - tile[X + 1, i], z - tile[X + 2, i]
-        tile[TERM, i] *= range_factor(dx, dy, dz, lx, ly, lz, square_range, scale, outside)
-
-
-@kernel
 def _add_weighted(tile: Array, red: Any, green: Any, blue: Any) -> None:
     """Add TERM <m . w>^P times a colour to rows SUM."""
     for i in range(LANES):
@@ -185,11 +185,8 @@ def add_diffuse_lights(
 ) -> None:
     """Add norm sum (Phi / pi) g <m . w>^P over diffuse lights to every receiver: radiance over its reflectance.
 
-    Position (m) and normal are (3, n), world space, `radiance` (3, n), W/m^2/sr; `lights` (9, N + 1) are packed, the
-    last one black. `spheres` (N,): squared radii of virtual spherical lights, m^2; their lobe is that of the centre,
-    and planes cull none. `reach`: which pairs count, and how much (procedure P3); None: all. `listed` (ceil(n / LANES),
-    N) bool: lights that may count for each tile (the others must not count for any of its receivers), None: all; planes
-    cull where there are no lists.
+    `lights` (9, N + 1) are packed, the last one black; `spheres` (N,): squared radii of virtual spherical lights, m^2,
+    whose lobe is that of the centre, and planes cull none; `reach`, `listed` as for `lobe_sum.add_lobes`.
     In float32, with U = 2^-24, p = <m . w>^P and L = -P log2(1 - h), a term t = (Phi / pi) g p is off by at most U (t
     (20 + 5 L + 6.5 P (sqrt(2 h) + h) / (1 - h)) + 4 (Phi / pi) p (c_l + c_x) / r^2), with unit cosines: roundings of w
     reach h, those of the cosines are absolute. A sum is off by at most 70 U of L_s more. Less than 2^-126 of the peak

@@ -1,17 +1,11 @@
 """Culling of glossy lights, and of lights of glossy receivers, tile by tile: what adds exactly 0 is not summed.
 
-A tile and each of its PARTS, 64 receivers, have bounding spheres. A lobe is culled when the sphere lies behind the
-light's surface, or so far off the lobe's axis that (1 - h)^P is below the smallest normal number, which `exp2` makes 0,
-or where B < xi I_low everywhere in the sphere (procedure P3). Each by more than rounding, so that the kernel itself
-would add 0 and the sum is the same to the bit.
-
-A tile's mirrored directions and positions are bounded by boxes. For receivers' lobes a light is passed over when no
-direction and no position out of them come as near to each other as the farthest of the tile's lobes reaches, by more
-than rounding: the sum is the same to the bit.
-
-Symbols, lights' lobes: d vector from the sphere's centre to the light, r its length, rho the sphere's radius, h = 1 -
-cos of the angle to the lobe's axis. Receivers' lobes: d vector from receiver to light, m the direction to the eye
-mirrored, h = 1 - m . d / |d| as in `glossy_sum`.
+A lobe is culled when the bounding sphere of a tile, or of one of its PARTS, lies behind the light's surface, or so far
+off the lobe's axis that (1 - h)^P is below the smallest normal number, which `exp2` makes 0, or where B < xi I_low
+everywhere in it (procedure P3); for receivers' lobes a light when no direction and no position out of the tile's boxes
+come as near to each other as its farthest lobe reaches. Each by more than rounding: the sum is the same to the bit.
+Symbols: d vector from the sphere's centre (receivers' lobes: receiver) to the light, r its length, rho the sphere's
+radius, h = 1 - cos of the angle to the lobe's axis; m the direction to the eye mirrored, h = 1 - m . d / |d|.
 """
 
 import math

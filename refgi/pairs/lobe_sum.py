@@ -1,12 +1,9 @@
 """The sum over all pairs of glossy pixel light and receiver (SII Eq. 3 in Eq. 2), Phong lobes clamped to the surface.
 
 The lobe of light p is I(w) = Phi c(P) <r . w>^P where n . w > 0, with c(P) by `lobe_norm`. The power is taken as
-2^(P log2(1 - h)), h = |r - w|^2 / 2 = 1 - r . w: near the axis, where a lobe of exponent 10^6 lives, h keeps its
-digits and r . w does not. A light's terms are found in a few short passes over a tile of receivers, each of which
-runs in lanes; a light that lights none of the tile is passed over before (`lobe_culling`) or after the first pass.
-
-Symbols as in `pair_sum`; w unit vector from light to receiver, th angle between lobe axis and normal, a the distance
-from which on the exponent is whole (0: not widened), P' the exponent after widening, s = (1 - h)^P' c(P') / c(P).
+2^(P log2(1 - h)), h = |r - w|^2 / 2 = 1 - r . w: near the axis of a lobe of exponent 10^6 h keeps its digits and r . w
+does not. Symbols as in `pair_sum`; w unit vector from light to receiver, th angle between lobe axis and normal, a the
+distance from which on the exponent is whole (0: not widened), P' that after widening, s = (1 - h)^P' c(P') / c(P).
 """
 
 import math
@@ -28,7 +25,6 @@ from refgi.pairs.lobe_culling import (
     parts_in_reach,
 )
 from refgi.pairs.pair_sum import (
-    COMPENSATION,
     GROUP,
     LEAST_SQUARE,
     NX,
@@ -38,6 +34,7 @@ from refgi.pairs.pair_sum import (
     TOTAL,
     Clamp,
     X,
+    close_lanes,
     load_light,
     load_tile,
     pair_cosines,
@@ -123,7 +120,7 @@ def _add_lights(
                 lanes = np.uint64(first * (TILE // PARTS)), np.uint64(last * (TILE // PARTS))
                 add_lobe(tile, lanes, lights, k, bounds[LIMIT, k], clamp, widening, reach)
         if low < high:
-            _close_group(tile, (np.uint64(low * (TILE // PARTS)), np.uint64(high * (TILE // PARTS))))
+            close_lanes(tile, np.uint64(low * (TILE // PARTS)), np.uint64(high * (TILE // PARTS)))
 
 
 @kernel
@@ -144,11 +141,11 @@ def _add_listed(
         for i in range(found):
             k = chosen[i]
             if k // GROUP != group and group >= 0:
-                _close_group(tile, lanes)
+                close_lanes(tile, lanes[0], lanes[1])
             group = k // GROUP
             add_lobe(tile, lanes, lights, k, scratch[LIMIT, i], clamp, widening, reach)
         if group >= 0:
-            _close_group(tile, lanes)
+            close_lanes(tile, lanes[0], lanes[1])
 
 
 @kernel
@@ -272,20 +269,3 @@ def _sum_up(tile: Array, lanes: Any, red: Any, green: Any, blue: Any) -> None:
         tile[SUM, i] += tile[TERM, i] * red
         tile[SUM + 1, i] += tile[TERM, i] * green
         tile[SUM + 2, i] += tile[TERM, i] * blue
-
-
-@kernel
-def _close_group(tile: Array, lanes: Any) -> None:
-    """Add the group's sum to the total as `pair_sum.close_group`, but leave a receiver that it does not light as it is.
-
-    So the bits do not depend on whether a group that lights nothing was passed over.
-    """
-    zero = tile.dtype.type(0.0)
-    for c in range(3):
-        for i in range(lanes[0], lanes[1]):
-            part = tile[SUM + c, i] - tile[COMPENSATION + c, i]
-            total = tile[TOTAL + c, i] + part
-            lost = (total - tile[TOTAL + c, i]) - part
-            tile[COMPENSATION + c, i] = lost if tile[SUM + c, i] != zero else tile[COMPENSATION + c, i]
-            tile[TOTAL + c, i] = total if tile[SUM + c, i] != zero else tile[TOTAL + c, i]
-            tile[SUM + c, i] = zero

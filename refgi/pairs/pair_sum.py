@@ -1,13 +1,9 @@
 """The sum over all pairs of pixel light and receiver (SII Eq. 2), for diffuse lights.
 
-Receivers are the SIMD lanes: a thread takes 256 of them into a tile and runs the lights past it, two at a time, so
-that each receiver adds its lights in their order whatever the tile, the thread or the picture around it; lights that
-cannot reach the tile are passed over. Lights come
-in groups of 64 whose sums are added up with compensation, so that a float32 sum over a quarter of a million lights
-rounds like one over 64.
-
-Symbols: d vector from receiver to light (m), n_l, n_x normals of light and receiver, c_l = <n_l . -d>,
-c_x = <n_x . d> (not divided by |d|), g = c_l c_x / r^4 the geometry term (1/m^2).
+Receivers are the SIMD lanes: each of a tile of 256 adds its lights in their order, whatever the tile, the thread or the
+picture around it. Lights come in groups of 64 whose sums are added with compensation. Symbols: d vector from receiver
+to light (m), n_l, n_x normals of light and receiver, c_l = <n_l . -d>, c_x = <n_x . d> (not divided by |d|),
+g = c_l c_x / r^4 the geometry term (1/m^2).
 """
 
 from typing import Any, NamedTuple
@@ -170,13 +166,19 @@ def load_tile(tile: Array, position: Array, normal: Array, first: int, size: int
 
 @kernel
 def close_group(tile: Array) -> None:
-    """Add rows SUM to rows TOTAL by Kahan's compensated summation (1965) and clear them.
+    """Close the group of all lanes of a tile."""
+    close_lanes(tile, np.uint64(0), np.uint64(tile.shape[1]))
+
+
+@kernel
+def close_lanes(tile: Array, start: Any, stop: Any) -> None:
+    """Add rows SUM of lanes start to stop - 1 to rows TOTAL by Kahan's compensated summation (1965) and clear them.
 
     A sum of 0 changes nothing, so that a group which reaches no receiver of a tile may as well be left out.
     """
     zero = tile.dtype.type(0.0)
     for c in range(3):
-        for i in range(tile.shape[1]):
+        for i in range(start, stop):
             added, old, lost = tile[SUM + c, i], tile[TOTAL + c, i], tile[COMPENSATION + c, i]
             part = added - lost
             total = old + part

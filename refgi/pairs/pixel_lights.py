@@ -1,31 +1,32 @@
-"""Pixel lights (VPLs) as arrays, their ranges, and the shape of their lobes (SII Eq. 3, Sec. 3.3).
+"""Pixel lights (VPLs) as arrays, and packed as kernels read them; ranges and the shape of lobes (SII Eq. 3, Sec. 3.3).
 
-The range says which pairs of light and receiver the threshold I_low keeps (SII Sec. 3.4, appendix). A pair counts where
-B >= xi I_low. B = I(w) / r^2 is the irradiance that the light causes at most (the receiver's cosine taken as 1), I_low
-one absolute irradiance, and xi is 1, or drawn for each light by the stochastic range.
-
-Symbols: P exponent, P' the widened one, th angle between lobe axis and surface normal, a the distance from which on the
-exponent is whole.
-
-A Phong lobe of the exponent P is as wide as 2 / (P + 1) of the hemisphere, so that of n lights with such lobes
-2 n / (P + 1) reach a receiver.
+A pair counts where B >= xi I_low (SII Sec. 3.4, appendix): B = I(w) / r^2 is the irradiance that the light causes at
+most, I_low one irradiance, xi is 1, or drawn for each light by the stochastic range. Packing reverses normals and folds
+constants into flux, in float64, rounded once to the dtype of the receivers. Symbols: P exponent, P' the widened one, th
+angle between lobe axis and surface normal, a the distance from which on the exponent is whole.
 """
 
+import dataclasses
+import functools
 import math
-import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from refgi.diagnostics import asked
-from refgi.errors import RefgiWarning
+from refgi.errors import expect
 from refgi.jit import kernel
+from refgi.pairs.lightcuts.tree import LightTree, light_tree
+from refgi.pairs.pair_sum import Clamp
+from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, PairSettings, SphereClamp
 from refgi.radiometry import lobe_norm
+from refgi.skips import left_out
+from refgi.stages import stage
 from refgi.types import Array
 
 if TYPE_CHECKING:
-    from refgi.frame import Frame
+    pass
 
 
 class PixelLights(NamedTuple):
@@ -45,6 +46,12 @@ class PixelLights(NamedTuple):
     def recorded(self) -> dict[str, Array | None]:
         """Return what sums read of a light, by name, as logs keep it."""
         return {name: getattr(self, name) for name in self._fields[:6]}
+
+    def selected(self, chosen: Array | slice | list[int]) -> "PixelLights":
+        """Return some of the lights, as many drawn."""
+        parts: dict[str, Any] = {name: values[..., chosen] for name, values in self._asdict().items()
+                                 if isinstance(values, np.ndarray)}
+        return self._replace(**parts)
 
     def with_channels(self, channels: Mapping[str, Any], _: np.dtype[Any]) -> "PixelLights":
         """Return lights with other arrays, by name."""
@@ -106,35 +113,168 @@ def widened(square: Any, exponent: Any, whole: Any, widening: Widening, k: int, 
     return fallen, one
 
 
-SHARP = 1e5  # exponent from which on lobes may vanish; wider ones that are missed show as sampling error
-LEAST_REACHING = 0.01  # lobes that reach a receiver, in the mean
+NORMS = {"none": NO_NORM, "full_lobe": FULL_LOBE, "clamped": CLAMPED}
+HEADROOM = 1e8  # of the largest number to the largest that is packed: what kernels multiply it by comes on top
 
 
-def vanishing(lights: "PixelLights") -> Array:
-    """Return which lights have lobes that reach fewer than `LEAST_REACHING` of the receivers, (N,) bool."""
-    if lights.lobe_flux is None or lights.lobe_exponent is None:
-        return np.zeros(lights.flux.shape[1], np.bool_)
-    sharp: Array = lights.lobe_flux.any(axis=0) & (lights.lobe_exponent >= SHARP)
-    for exponent in np.unique(lights.lobe_exponent[sharp]):
-        same = sharp & (lights.lobe_exponent == exponent)
-        if 2.0 * np.count_nonzero(same) >= LEAST_REACHING * (float(exponent) + 1.0):
-            sharp &= ~same
-    return sharp
+class PackedLobes(NamedTuple):
+    """What `add_lobes` reads of the lights."""
+
+    lights: Array  # (13, K), of `pack_lobes`
+    clamp: Clamp
+    widening: Widening | None
 
 
-def warn_of_mirrors(frame: "Frame", lights: "PixelLights", method: str) -> None:
-    """Warn whoever collects diagnostics of lights whose lobes vanish, with the materials that they lie on."""
-    if lights.lobe_flux is None or lights.lobe_exponent is None or asked("pairs.mirrors") is None:
-        return
-    gone = vanishing(lights)
-    if gone.any():
-        real, exponents = lights.lobe_exponent.dtype.type, set(lights.lobe_exponent[gone].tolist())
-        names = [material.name for material in frame.scene.materials
-                 if material.is_glossy and not material.is_dielectric and float(real(material.exponent)) in exponents]
-        flux = lights.lobe_flux[:, gone].sum(dtype=np.float64)
-        share = flux / (lights.flux.sum(dtype=np.float64) + lights.lobe_flux.sum(dtype=np.float64))
-        warnings.warn(RefgiWarning(
-            f"{method}: the lobes of {len(names)} material(s), {', '.join(map(repr, names))}, are too sharp (exponent "
-            f"{min(exponents):g} or more) for {np.count_nonzero(gone)} pixel lights, which reach fewer than 1 receiver "
-            f"in {1 / LEAST_REACHING:.0f}: {100 * share:.0f} % of the flux of {len(gone)} lights vanishes or lights "
-            "single pixels"), stacklevel=3)
+class Packed(NamedTuple):
+    """Everything the kernels read of the lights."""
+
+    diffuse: Array  # (9, M + 1), of `pack_diffuse`
+    clamp: Clamp | None  # of the diffuse lights
+    spheres: Array | None  # (M,) r^2 of virtual spherical lights, m^2
+    lobes: PackedLobes | None  # None: no light is glossy
+    shines: Array  # (N,) bool: which lights are among the M
+    glossy: Array  # (N,) bool: which are among the K
+    tree: LightTree | None = None  # of the diffuse lights, where they may be summed by clusters
+
+    @property
+    def terms(self) -> int:
+        """What a receiver sums: diffuse lights and lobes."""
+        return int(np.count_nonzero(self.shines) + np.count_nonzero(self.glossy))
+
+
+def pack(lights: PixelLights, settings: PairSettings, footprint: Array | None, dtype: npt.DTypeLike) -> Packed:
+    """Pack the lights that have flux, each part for its kernel; `footprint` (N,) is the area each stands for, m^2."""
+    shines: Array = (lights.flux != 0).any(axis=0)
+    glossy = np.zeros_like(shines) if lights.lobe_flux is None else (lights.lobe_flux != 0).any(axis=0)
+    diffuse = pack_diffuse(lights, settings, dtype, shines)
+    clamp, spheres = None, None
+    if settings.clamps:
+        clamp = pack_clamp(settings, footprint, shines, diffuse.shape[1], dtype)
+    if isinstance(settings.clamp, SphereClamp) and footprint is not None:
+        # pi r^2 is the clamp's value times the footprint
+        spheres = _finite(footprint[shines] * (settings.clamp.value / math.pi), dtype).astype(dtype)
+    lobes = None
+    if not glossy.any() and not left_out("pairs.lobes", lambda: (len(glossy), len(glossy))):
+        lights, glossy = with_dark_lobes(lights), np.ones_like(glossy)
+    if glossy.any():
+        packed = pack_lobes(lights, settings, dtype, glossy)
+        lobe_clamp = pack_clamp(settings, footprint, glossy, packed.shape[1], dtype)
+        lobes = PackedLobes(packed, lobe_clamp, pack_widening(lights, settings, dtype, glossy))
+    return Packed(diffuse, clamp, spheres, lobes, shines, glossy)
+
+
+@dataclasses.dataclass(frozen=True)
+class Unpacked:
+    """Lights that are packed once, where anything asks for it."""
+
+    lights: PixelLights
+    settings: PairSettings
+    footprint: Array | None
+    dtype: npt.DTypeLike
+
+    @functools.cached_property
+    def packed(self) -> Packed:
+        """The packed lights."""
+        return pack(self.lights, self.settings, self.footprint, self.dtype)
+
+
+@stage("pairs.light_tree")
+def clustered(unpacked: Unpacked, error: float) -> Packed:
+    """Pack lights and build the light tree over the diffuse ones, if there are any.
+
+    unpacked: The lights, their pairs and areas.
+    error: Largest error of a receiver's sum over channels, as a share of it.
+    -> Packed: The lights and their tree, of as many levels as leave at most FAN nodes on the highest.
+
+    Raises `InputError` if a light has a flux below 0, or lights are spheres.
+    """
+    packed = unpacked.packed
+    expect(packed.spheres is None, "clamp", "another one with lightcuts, which bound no spheres", "sphere")
+    expect(bool((packed.diffuse[6:] >= 0).all()), "lights.flux", "numbers >= 0 with lightcuts",
+           packed.diffuse[6:].min(initial=0.0))
+    if packed.diffuse.shape[1] == 1:
+        return packed
+    return packed._replace(tree=light_tree(packed.diffuse, packed.clamp, error))
+
+
+def with_dark_lobes(lights: PixelLights) -> PixelLights:
+    """Return diffuse lights as glossy ones whose lobes have no flux: what a sum over lobes adds nothing for."""
+    return lights._replace(lobe_flux=np.zeros_like(lights.flux), lobe_axis=lights.normal,
+                           lobe_exponent=np.ones_like(lights.flux[0]))
+
+
+def pack_diffuse(lights: PixelLights, settings: PairSettings, dtype: npt.DTypeLike, chosen: Array) -> Array:
+    """Pack the M chosen lights for `sum_pairs`, (9, M + 1): offset position, reversed normal, flux / pi.
+
+    The last one is black. Computed in float64.
+    """
+    # Eq. (1), over pi unless as printed
+    scale = 1.0 if "sii_no_pi" in settings.as_published else 1.0 / math.pi
+    packed = np.concatenate([*_place(lights, settings, chosen), np.asarray(lights.flux[:, chosen], np.float64) * scale])
+    packed = np.concatenate([packed, np.zeros((9, 1))], axis=1)
+    return packed.astype(dtype, order="C")  # one layout: kernels are compiled once
+
+
+def _place(lights: PixelLights, settings: PairSettings, chosen: Array) -> tuple[Array, Array]:
+    normal = np.asarray(lights.normal[:, chosen], np.float64)
+    return lights.position[:, chosen] - settings.offset * normal, -normal
+
+
+def pack_lobes(lights: PixelLights, settings: PairSettings, dtype: npt.DTypeLike, chosen: Array) -> Array:
+    """Pack the K chosen lights for `add_lobes`, (13, K): offset position, reversed normal and axis, P, flux times norm.
+
+    Computed in float64.
+    """
+    flux, axis, exponent = _lobes(lights, chosen)
+    cos_theta = (np.asarray(lights.normal[:, chosen], np.float64) * axis).sum(axis=0)
+    norm = np.empty_like(exponent)
+    _fill_norms(cos_theta, exponent, NORMS[settings.lobe.norm], norm)
+    # Eq. (3), the norm in the flux
+    packed = np.concatenate([*_place(lights, settings, chosen), -axis, exponent[None], _finite(flux * norm, dtype)])
+    return packed.astype(dtype, order="C")
+
+
+@kernel
+def _fill_norms(cos_theta: Array, exponent: Array, norm: int, factor: Array) -> None:
+    for k in range(len(factor)):
+        factor[k] = lobe_norm_factor(cos_theta[k], exponent[k], norm)
+
+
+def _lobes(lights: PixelLights, chosen: Array) -> tuple[Array, Array, Array]:
+    parts = []
+    for key in ("lobe_flux", "lobe_axis", "lobe_exponent"):
+        values = getattr(lights, key)
+        expect(values is not None, f"lights.{key}", "flux, axis and exponent of every lobe", None)
+        parts.append(np.asarray(values[..., chosen], np.float64))
+    flux, axis, exponent = parts
+    expect(bool((np.isfinite(exponent) & (exponent >= 0)).all()), "lights.lobe_exponent", "finite numbers >= 0",
+           exponent.min(initial=0.0))
+    return flux, axis, exponent
+
+
+def pack_clamp(settings: PairSettings, footprint: Array | None, chosen: Array, count: int, dtype: Any) -> Clamp:
+    """Pack the clamp of `count` packed lights, with neutral values for the modes not in use."""
+    softness = np.zeros(count, dtype)
+    mode = settings.clamp
+    if isinstance(mode, DiscClamp) and footprint is not None:
+        softness[: np.count_nonzero(chosen)] = footprint[chosen] / math.pi
+    least = mode.value**2 if isinstance(mode, DistanceClamp) and mode.value is not None else 0.0
+    bound = mode.value if isinstance(mode, GeometryClamp) and mode.value is not None else math.inf
+    return Clamp(np.dtype(dtype).type(least), softness, np.dtype(dtype).type(bound))
+
+
+def _finite(values: Array, dtype: npt.DTypeLike) -> Array:
+    """Return values that stay finite in a dtype: a lobe's peak grows with its exponent beyond any flux."""
+    return np.minimum(values, float(np.finfo(dtype).max) / HEADROOM)
+
+
+def pack_widening(lights: PixelLights, settings: PairSettings, dtype: Any, chosen: Array) -> Widening | None:
+    """Pack the widening of exponents near the chosen lights (SII Sec. 3.3); None where exponents stay."""
+    if settings.lobe.widening == 0:
+        return None
+    _, axis, _ = _lobes(lights, chosen)
+    literal = "sii_widening" in settings.as_published
+    keeps_norm = literal or "sii_widening_unnorm" in settings.as_published
+    return Widening(np.dtype(dtype).type(settings.lobe.widening), LITERAL if literal else CORRECTED,
+                    -1 if keeps_norm else NORMS[settings.lobe.norm],
+                    (lights.normal[:, chosen] * axis).sum(axis=0).astype(dtype))

@@ -1,10 +1,8 @@
 """The sum over the pairs of diffuse light and receiver that the threshold I_low keeps (SII Sec. 3.4, procedure P3).
 
-A pair counts where B = I_0 cos / r^2 >= xi I_low, cos being the light's. With R_0^2 = I_0 / I_low and the cosine not
-divided by r, c_l = r cos, that is s >= xi r for s = R_0^2 c_l / r^2: no root, and nothing leaves the range of float32
-between 1e-6 and 1e6 m. The test is part of the pair's arithmetic, so the picture does not depend on which bound found
-the pairs. Tiles are a quarter of `pair_sum`'s, 8 x 8 pixels, each with lights of its own; groups and order of the
-lights are the same.
+A pair counts where B = I_0 cos / r^2 >= xi I_low, cos being the light's. With R_0^2 = I_0 / I_low and c_l = r cos that
+is s >= xi r for s = R_0^2 c_l / r^2: no root. The test is part of the pair's arithmetic, so the picture does not depend
+on which bound found the pairs. Tiles are of 8 x 8 pixels, each with lights of its own; groups are those of `pair_sum`.
 """
 
 from typing import Any
@@ -68,15 +66,23 @@ def range_factor(
     return one - factor if outside else factor
 
 
+@kernel
+def weigh_by_range(tile: Array, row: int, light: Any, square_range: Any, scale: Any, outside: bool) -> None:
+    """Multiply a row of terms by what the range of a packed light makes of each pair."""
+    px, py, pz, lx, ly, lz = light[0], light[1], light[2], light[3], light[4], light[5]
+    for i in range(tile.shape[1]):
+        dx, dy, dz = px - tile[X, i], py - tile[X + 1, i], pz - tile[X + 2, i]
+        tile[row, i] *= range_factor(dx, dy, dz, lx, ly, lz, square_range, scale, outside)
+
+
 @kernel(parallel=True)
 def sum_pairs_in_range(
     position: Array, normal: Array, lights: Array, clamp: Clamp | None, reach: Range, listed: Array, irradiance: Array
 ) -> None:
     """Add up E = sum over lights of (Phi / pi) g over the pairs with B >= I_low, for every receiver.
 
-    As `pair_sum.sum_pairs`, with lights (9, N + 1), the last one black. `reach` is of all packed lights; xi counts as
-    1. `listed` (ceil(n / LANES), N) bool: lights that may count for each tile; the others must not count for any of its
-    receivers.
+    As `pair_sum.sum_pairs`; xi counts as 1. `listed` (ceil(n / LANES), N) bool: lights that may count for each tile;
+    the others must not count for any of its receivers.
     """
     count = position.shape[1]
     for block in prange((count + LANES - 1) // LANES):

@@ -1,34 +1,29 @@
-"""Irradiance of pixel lights with ray-traced visibility: one shadow ray for each pair (SII Eq. 2 and 3, calibrated).
+"""Pixel lights with ray-traced visibility: one shadow ray for each pair (SII Eq. 2 and 3, calibrated).
 
     E(x) = sum_i Phi_i / pi <n_i . w> <n_x . -w> / r^2 V(x, x_i),
 
-and the same with a lobe. A ray is traced for each pair whose unshadowed term is not zero. Pairs are made in batches and
-never all held. That a light lies below the receiver's face is part of V: without visibility cosines alone bound a pair.
-
-`RayReceivers` are the points to light: position, shading normal, face normal and the origin of their shadow rays.
-
-Symbols: d vector from receiver to light, c_l and c_x cosines of light and receiver, not divided by the length of d,
-V visibility.
+the same with a lobe, and the radiance of receivers' lobes. A ray is traced for each pair whose unshadowed term is not
+0, in batches. That a light lies below the receiver's face is part of V. Symbols: d vector from receiver to light, c_l
+and c_x cosines of light and receiver, not divided by the length of d, V visibility.
 """
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from refgi.jit import kernel, prange
-from refgi.pairs.packing import with_dark_lobes
 from refgi.pairs.pair_sum import pair_cosines
-from refgi.radiometry import lobe_gap, lobe_norm, lobe_power
+from refgi.pairs.pixel_lights import PixelLights, with_dark_lobes
+from refgi.radiometry import lobe_gap, lobe_norm, lobe_power, receiver_lobe
 from refgi.rays import STEPS, Tracer, far_offset, ray_offset
+from refgi.rsm.buffers.leaving import GlossyPoints
 from refgi.scene import Geometry
 from refgi.skips import left_out
 from refgi.stages import report_progress, stage, tally
 from refgi.types import Array
-
-if TYPE_CHECKING:
-    from refgi.pairs.pixel_lights import PixelLights
 
 ROUNDED = 2.0**-14  # of a point's coordinates: it is off its face by that at most, or not meant to lie on it
 LIGHTS_AT_A_TIME = 1024
@@ -48,9 +43,8 @@ class RayReceivers(NamedTuple):
 def receivers(geometry: Geometry, position: Array, normal: Array, triangle_id: Array, grain: float) -> RayReceivers:
     """Return the covered pixels of a G-buffer, or any choice of them, as receivers of shadow rays.
 
-    Position (m) and normal are (3, h, w) or (3, n), world space, `triangle_id` (h, w) or (n,), -1 for none. Rays start
-    above the face by `ray_offset` with the tracer's `grain`, m. In picture order; `pixel` counts through the given
-    points.
+    In picture order, of (3, h, w) or (3, n); `pixel` counts through the given points. Rays start above the face by
+    `ray_offset` with the tracer's `grain`, m.
     """
     pixel = np.flatnonzero(triangle_id.reshape(-1) >= 0)
     at = np.ascontiguousarray(position.reshape(3, -1)[:, pixel], np.float64)
@@ -78,12 +72,12 @@ class Senders(NamedTuple):
 
 
 Hidden = Callable[[RayReceivers, tuple[int, int], Senders, tuple[int, int], Array, Array], None]
-Weigh = Callable[[RayReceivers, tuple[int, int], Senders, tuple[int, int], Array, Array], None]
+Weigh = Hidden
 
 
 @stage("pairs.shadowed_sum")
 def shadowed_sum(
-    tracer: Tracer, to: RayReceivers, lights: "PixelLights", *, visibility: bool = True, batch: int = BATCH,
+    tracer: Tracer, to: RayReceivers, lights: PixelLights, *, visibility: bool = True, batch: int = BATCH,
     hidden: Hidden | None = None,
 ) -> Array:
     """Sum the irradiance of every pixel light at every receiver, each pair with its visibility.
@@ -97,13 +91,11 @@ def shadowed_sum(
     return summed(tracer, to, lights, visibility, batch, hidden, None)
 
 
-def summed(tracer: Tracer, to: RayReceivers, lights: "PixelLights", visibility: bool, batch: int,
+def summed(tracer: Tracer, to: RayReceivers, lights: PixelLights, visibility: bool, batch: int,
            hidden: Hidden | None, weigh: Weigh | None) -> Array:
     """Sum what every pair gives that nothing blocks, (3, r) float64; arguments as for `shadowed_sum`.
 
-    `weigh` changes contributions, W/m^2, and clears the reach of pairs that are left without any: called with the
-    receivers, first and one past the last of them, the senders, first and one past the last of those, reach and
-    contributions. None leaves them as they are.
+    `weigh`, called as `hidden`, changes contributions, W/m^2, and clears the reach of pairs that are left without any.
     """
     senders, total = senders_of(lights), np.zeros((3, len(to.pixel)))
     to = to if visibility else to._replace(facing=to.normal)  # no face hides anything
@@ -150,14 +142,8 @@ def fill_shadow_rays(to: RayReceivers, receivers: tuple[int, int], senders: Send
     """
     count = lights[1] - lights[0]
     for i in prange(receivers[1] - receivers[0]):
-        _fill_rays_of(to, receivers[0] + i, senders, lights, grain, rays, i * count)
-
-
-@kernel
-def _fill_rays_of(to: RayReceivers, r: int, senders: Senders, lights: tuple[int, int], grain: float,
-                  rays: tuple[Array, Array, Array, Array], ray: int) -> None:
-    for k in range(lights[0], lights[1]):
-        _fill_ray(to, r, senders, k, grain, rays, ray + k - lights[0])
+        for k in range(count):
+            _fill_ray(to, receivers[0] + i, senders, lights[0] + k, grain, rays, i * count + k)
 
 
 @kernel
@@ -199,7 +185,7 @@ def _lobe(to: RayReceivers, r: int, senders: Senders, j: int) -> Any:
     return senders.lobe_norm[j] * lobe_power(gap, senders.lobe_exponent[j])
 
 
-def senders_of(lights: "PixelLights") -> Senders:
+def senders_of(lights: PixelLights) -> Senders:
     """Return pixel lights as the kernels read them."""
     arrays = (lights.position, lights.normal, lights.flux)
     position, normal, flux = (np.ascontiguousarray(array, np.float64) for array in arrays)
@@ -236,3 +222,54 @@ def add_unoccluded(
             if not occluded[ray]:
                 for c in range(3):
                     sums[c, first + r] += contribution[ray, c]
+
+
+@stage("pairs.glossy_rays")
+def shadowed_radiance(
+    tracer: Tracer, to: RayReceivers, points: GlossyPoints, lights: PixelLights, *, visibility: bool = True,
+    batch: int = BATCH, hidden: Hidden | None = None,
+) -> Array:
+    """Sum the radiance that every receiver's lobe reflects towards the eye of the light that reaches it.
+
+    points: The receivers with their lobes.
+    visibility: Whether to trace the rays, none for a light that lies off the lobe; without, every pair counts.
+    batch: Pairs held at a time; changes no bit of the result.
+    hidden: As for `shadowed_sum`.
+    -> (3, n) float64: W/m^2/sr.
+    """
+    return summed(tracer, to, lights, visibility, batch, hidden, partial(weigh_by_lobes, points))
+
+
+@kernel(parallel=True)
+def weigh_by_lobes(
+    points: GlossyPoints, to: RayReceivers, receivers: tuple[int, int], senders: Senders, lights: tuple[int, int],
+    reach: Array, contribution: Array,
+) -> None:
+    """Turn the irradiance of each pair, `contribution` (pairs, 3) of `fill_shadow_rays`, into radiance of the lobe.
+
+    Pairs off the lobe give 0, and their `reach` (pairs,) is 0.
+    """
+    count = lights[1] - lights[0]
+    for i in prange(receivers[1] - receivers[0]):
+        for k in range(count):
+            _weigh(points, to, receivers[0] + i, senders, lights[0] + k, reach, contribution, i * count + k)
+
+
+@kernel
+def _weigh(
+    points: GlossyPoints, to: RayReceivers, r: int, senders: Senders, j: int, reach: Array, contribution: Array,
+    ray: int,
+) -> None:
+    if reach[ray] <= 0:
+        return
+    mirror, position = points.mirrored, to.position
+    lobe = receiver_lobe(
+        np.float64(mirror[0, r]), np.float64(mirror[1, r]), np.float64(mirror[2, r]),
+        senders.position[0, j] - position[0, r], senders.position[1, j] - position[1, r],
+        senders.position[2, j] - position[2, r], np.float64(points.exponent[r]))
+    reach[ray] = 0
+    for c in range(3):
+        # f_s I cos / r^2
+        contribution[ray, c] = contribution[ray, c] * (points.specular[c, r] * lobe)
+        if contribution[ray, c] > 0:
+            reach[ray] = 1

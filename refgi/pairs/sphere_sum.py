@@ -1,22 +1,15 @@
 """Virtual spherical lights (Hasan, Krivanek, Walter and Bala 2009), the clamp "sphere" of Eq. 2: one pair, and the sum.
 
-A pixel light of flux Phi becomes a sphere of radius r. The receiver sees it in the cone sin a = min(1, r / |d|), over
-which both cosines are integrated instead of evaluated on its axis:
+The receiver sees a sphere of radius r in the cone sin a = min(1, r / |d|), over which both cosines are integrated:
 
     E = Phi / (pi^2 r^2) integral over the cone of <l . w> <n_x . w> dw,    l = -n_p.
 
-Cones wholly above both horizons have a closed form, the second moments of a cone. The others are cut into slices by
-half planes through the line where both horizons meet: there each horizon is a limit of the turn of the slice, the
-integral along a slice is a polynomial, and one smooth integral over the turn is left for a Gauss rule of 12 points a
-quadrant, right to 1e-4 of the pixel light on its axis at worst (|d| just over r) and to 1e-10 in most places. Products
-of cosines, roots and quotients are all it takes: no angle is computed.
-
-Tiles, groups and order of the lights are those of `pair_sum`. A first pass runs over the receivers as lanes and takes
-the closed form; it leaves a mark where a horizon cuts the cone, and a second pass sees to those receivers one by one.
-
-Symbols: w0 = d / |d| cone axis, b angle between l and n_x, e and f their bisectors, c = e x f the line of both
-horizons; chi turn of a slice from e, chi0 that of w0, v(chi) the slice's direction; rho, s lengths of w0 across and
-along c; m = rho sin(chi - chi0), t = rho cos(chi - chi0); sigma = <c . w>; g angle in a quadrant, y = tan(g / 2).
+Cones wholly above both horizons have a closed form; the others are cut into slices by half planes through the line
+where both horizons meet, and a Gauss rule adds up the turn (docs/methods/sii_sum). A first pass over the lanes takes
+the closed form and marks the others. Symbols: w0 = d / |d| cone axis, b angle between l and n_x, e and f their
+bisectors, c = e x f the line of both horizons; chi turn of a slice from e, chi0 that of w0, v(chi) the slice's
+direction; rho, s lengths of w0 across and along c; m = rho sin(chi - chi0), t = rho cos(chi - chi0); sigma = <c . w>; g
+angle in a quadrant, y = tan(g / 2).
 """
 
 import math
@@ -39,7 +32,7 @@ from refgi.pairs.pair_sum import (
     pair_cosines,
 )
 from refgi.pairs.pixel_lights import Range
-from refgi.pairs.ranged_sum import range_factor
+from refgi.pairs.ranged_sum import weigh_by_range
 from refgi.radiometry import orthonormal_basis
 from refgi.types import Array
 
@@ -58,9 +51,8 @@ WEIGHT = np.round(_w * (_x + 1.0) / 2.0, 14)
 def cone_term(cl: Any, cx: Any, facing: Any, ratio: Any) -> Any:
     """Return the mean of <l . w> <n_x . w> over a cone above both horizons, times solid angle / (pi sin^2 a).
 
-    `cl` and `cx` are the cosines of the cone's axis with l and n_x, `facing` is l . n_x, `ratio` sin^2 a. The moments
-    are B = 2 pi/3 (1 - cos^3 a) along the axis and A = pi (2/3 - cos a + cos^3 a / 3) across it, written without
-    cancellation by 1 - cos a = sin^2 a / (1 + cos a). A narrow cone gives cl cx.
+    `cl`, `cx`: cosines of the axis; `facing` l . n_x, `ratio` sin^2 a. The moments are B = 2 pi/3 (1 - cos^3 a) along
+    the axis, A = pi (2/3 - cos a + cos^3 a / 3) across it, without cancellation by 1 - cos a = sin^2 a / (1 + cos a).
     """
     real = type(cl)
     one = real(1.0)
@@ -227,7 +219,7 @@ def sum_spheres(
                 whole_cones(tile, light, square_radius[k])
                 cut_cones(tile, light, square_radius[k], size)
                 if reach is not None:
-                    _weight(tile, light, reach.square[k], reach.scale[k], reach.outside)
+                    weigh_by_range(tile, TERM, light, reach.square[k], reach.scale[k], reach.outside)
                 for i in range(TILE):
                     tile[SUM, i] += tile[TERM, i] * lights[6, k]
                     tile[SUM + 1, i] += tile[TERM, i] * lights[7, k]
@@ -277,12 +269,3 @@ def cut_cones(tile: Array, light: Any, square_radius: Any, size: int) -> None:
             axis = dx * inverse, dy * inverse, dz * inverse
             normal = tile[NX, i], tile[NX + 1, i], tile[NX + 2, i]
             tile[TERM, i] = cut_cone_term(axis, (lx, ly, lz), normal, ratio) / max(square, square_radius)
-
-
-@kernel
-def _weight(tile: Array, light: Any, square_range: Any, scale: Any, outside: bool) -> None:
-    """Multiply row TERM by what the range makes of each pair."""
-    px, py, pz, lx, ly, lz = light
-    for i in range(TILE):
-        dx, dy, dz = px - tile[X, i], py - tile[X + 1, i], pz - tile[X + 2, i]
-        tile[TERM, i] *= range_factor(dx, dy, dz, lx, ly, lz, square_range, scale, outside)

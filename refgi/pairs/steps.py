@@ -82,7 +82,7 @@ def shadowed_sum(
     at, up = (np.ascontiguousarray(plane.reshape(3, -1)[:, pixel], np.float32) for plane in (position, normal))
     to, count = RayReceivers(pixel, at, up, up, at), flux.shape[1]
     senders = senders_of(PixelLights(light_position, light_normal, flux, lobe_flux, lobe_axis, lobe_exponent, count))
-    _, _, reach, light = _filled(to, senders, 1.0)
+    _, _, reach, light = filled_rays(to, senders, 1.0)
     blocked = reach == 0 if seen is None else ~seen.reshape(count, triangle_id.size)[:, pixel].T
     total = np.zeros((3, len(pixel)))
     add_unoccluded(total, 0, len(pixel), count, np.ascontiguousarray(blocked).reshape(-1), light)
@@ -102,11 +102,11 @@ def shadow_rays(
     lights = PixelLights(light_position, light_normal, np.ones_like(light_normal), None, None, None,
                          light_normal.shape[1])
     senders = senders_of(lights)  # where lobes fade out is no question of visibility
-    origin, direction, reach, _ = _filled(to, senders, grain)
+    origin, direction, reach, _ = filled_rays(to, senders, grain)
     return to, senders, reach, (origin, direction)
 
 
-def _filled(to: RayReceivers, senders: Senders, grain: float) -> tuple[Array, Array, Array, Array]:
+def filled_rays(to: RayReceivers, senders: Senders, grain: float) -> tuple[Array, Array, Array, Array]:
     """Return origins, directions, reach and light of the rays of all pairs."""
     pairs = len(to.pixel) * senders.flux.shape[1]
     origin, direction, light = (np.zeros((pairs, 3), np.float32) for _ in range(3))

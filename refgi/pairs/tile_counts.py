@@ -22,7 +22,7 @@ from refgi.pairs.tiles import bound_tile, lights_in_reach, list_all
 from refgi.types import Array
 
 if TYPE_CHECKING:
-    from refgi.pairs.packing import Packed, PackedLobes
+    from refgi.pairs.pixel_lights import Packed, PackedLobes
 
 
 def tiles_behind(position: Array, normal: Array, lights: Array, lanes: int = TILE) -> tuple[int, int]:

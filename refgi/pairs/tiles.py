@@ -1,14 +1,8 @@
-"""The pixels of a picture in an order that keeps neighbours together, which is the order kernels see them in.
+"""The pixels of a picture in an order that keeps neighbours together, and which lights can reach a tile of them.
 
-Blocks of 16 x 16 pixels go row by row; within a block 8 x 8 after 8 x 8, within these 4 x 4 after 4 x 4. Pixels
-without surface are left out, so the tiles of the kernels are filled and still compact: fewer lights reach into them
-than into a piece of a row.
-
-Which lights can reach which tile of receivers: what lies behind a plane adds exactly 0 and need not be summed.
-
-A tile is bounded by boxes around its positions and its normals. A light is passed over when the whole tile lies
-behind the light's surface, or the light behind the surface of every receiver, by more than the rounding of the
-cosines: then each term is 0 in the kernels' arithmetic as well, and the sum is the same to the bit.
+Blocks of 16 x 16 pixels go row by row, within a block 8 x 8 after 8 x 8, within these 4 x 4 after 4 x 4, without pixels
+that show no surface: tiles are filled and compact. A light is passed over when the whole tile lies behind its surface,
+or it behind the surface of every receiver, by more than rounding: its terms are 0 in the kernels too.
 """
 
 from typing import Any

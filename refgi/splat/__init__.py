@@ -1,9 +1,6 @@
-"""Pixel lights splatted onto the picture, three methods that do not import each other.
+"""Pixel lights splatted onto the picture, three methods that do not import each other: `sii`, `multires`, `gather`.
 
-`sii` (Dachsbacher and Stamminger 2006) adds the irradiance of each pixel light to the pixels where it is significant;
-`multires` (Nichols and Wyman 2009) evaluates them all at subsplats, large where nothing changes; `gather` (2005), which
-both replaced, lets each pixel look around its own place in the map. All sum the same pair term, Eq. 2; lights and pair
-sums are those of `refgi.lights` and `refgi.pairs`, which other methods share.
+All sum the same pair term, Eq. 2; lights and pair sums are those of `refgi.lights` and `refgi.pairs`.
 """
 
 from refgi.lights import walk_lights

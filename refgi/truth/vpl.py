@@ -13,9 +13,15 @@ import numpy as np
 from refgi.diagnostics import SamplingError, asked
 from refgi.lights.settings import LightSettings, MapLights, most_lights
 from refgi.method import Approximation, Extent, Method
-from refgi.pairs.estimates import error_of_halves, half_of, sample_pixels, warn_of_sampling, with_seen_light
+from refgi.pairs.estimates import (
+    error_of_halves,
+    half_of,
+    sample_pixels,
+    warn_of_mirrors,
+    warn_of_sampling,
+    with_seen_light,
+)
 from refgi.pairs.irradiance import Receivers
-from refgi.pairs.pixel_lights import warn_of_mirrors
 from refgi.pairs.shadow_rays import BATCH, Hidden, receivers, shadowed_sum
 from refgi.rays import Tracer
 from refgi.scene import Geometry
@@ -121,7 +127,7 @@ def vpl_lobes(frame: "Frame", settings: VplSettings) -> Array:
 
     (3, h, w) radiance towards the eye in the frame's dtype, W/m^2/sr, linear RGB; 0 where there is no lobe.
     """
-    from refgi.pairs.glossy import shadowed_radiance
+    from refgi.pairs.shadow_rays import shadowed_radiance
     from refgi.rsm.buffers.leaving import spread_over_picture
 
     lights, maps = _lights(frame, settings)

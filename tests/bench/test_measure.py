@@ -25,7 +25,7 @@ def test_no_time_has_compiling_in_it(box):
     """The small picture that loads a method's kernels runs what the picture that is timed runs."""
     with observe() as log:
         load_kernels(small_frame(box, SIZE), choice("val", lights=64), 300 * 300)
-    assert "multires.error_driven" in {run.name for run in log.runs if run.status == "ran"}
+    assert "error_target.error_driven" in {run.name for run in log.runs if run.status == "ran"}
 
 
 def picture_of(frame, choice, seed):

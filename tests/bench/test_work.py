@@ -14,7 +14,7 @@ from refgi.lights.selection import choose_lights
 from refgi.methods import METHODS
 from refgi.rays import Tracer
 from refgi.settings import from_text
-from refgi.splat.sii.reach.fragments import fragments
+from refgi.splat.sii.fragments import fragments
 from tests.bench.conftest import SIZE
 
 pytestmark = pytest.mark.filterwarnings("ignore::refgi.errors.RefgiWarning")
@@ -127,7 +127,7 @@ def test_subsplats_take_each_light(box, frame):
 
 def test_pairs_of_an_error_target_are_those_it_states(box, frame):
     one = choice("multires", f"lights={LIGHTS}", "clamp=none", "subsplats=error", "subsplats.target=0.05")
-    assert taken(box, "multires", *one.changes).pairs == recorded(frame, one, "multires.error_driven").output.pairs
+    assert taken(box, "multires", *one.changes).pairs == recorded(frame, one, "error_target.error_driven").output.pairs
 
 
 def test_each_pass_more_takes_as_many_rays(box):

@@ -173,8 +173,8 @@ def test_faults_of_the_sources_are_programs():
 
 
 def test_the_tests_of_a_file():
-    found = selected(REFGI, "refgi/splat/sii/reach/threshold.py")
-    assert {"tests/splat/sii/reach/test_reference_length.py", "tests/splat/sii/test_sii.py"} <= {*found}
+    found = selected(REFGI, "refgi/splat/sii/threshold.py")
+    assert {"tests/splat/sii/test_reference_length.py", "tests/splat/sii/test_sii.py"} <= {*found}
     assert "tests/splat/gather/test_gather.py" not in found
     assert "tests/splat/multires/test_multires.py" in selected(REFGI, "refgi/lights/selection.py")  # imports it
 

@@ -129,7 +129,7 @@ def test_a_small_picture_runs_what_the_one_that_it_stands_for_runs():
     for pixels, ran in ((1 << 16, False), ((1 << 16) + 1, True)):
         with observe() as log, standing_for(pixels):
             val(Frame(load_scene("cornell_box"), width=24, height=18, rsm_resolution=64), of(ValSettings, lights=64))
-        assert ("multires.error_driven" in {run.name for run in log.runs if run.status == "ran"}) is ran
+        assert ("error_target.error_driven" in {run.name for run in log.runs if run.status == "ran"}) is ran
 
 
 @pytest.mark.usefixtures("any_size")
@@ -142,7 +142,7 @@ def test_subsplats_without_an_error_are_every_pixel_to_the_bit(how, kept, monkey
     box = frame(width=80, height=60)
     with observe() as log:
         light = val(box, small(how | {"subsplats.target": 1e-6}))
-    assert log.status("multires.error_driven") == ["ran"]
+    assert log.status("error_target.error_driven") == ["ran"]
     np.testing.assert_array_equal(light, val(box, small(how | {"interleaving": 1})))
 
 
@@ -180,7 +180,7 @@ def test_what_is_lit_at_subsplats(width, how, status):
     """Larger pictures with a clamp, and any by rays, unless every pixel or blocks are asked for."""
     with observe() as log:
         val(frame(width=width, height=256 if width > 80 else 60, rsm_resolution=16), small(how | {"lights": 16}))
-    assert log.status("multires.error_driven") == status
+    assert log.status("error_target.error_driven") == status
 
 
 def test_what_is_not_needed_does_not_run(ball):

@@ -13,16 +13,14 @@ from refgi.error_target.interpolate import blend_weights, surface_levels
 from refgi.error_target.near import near_light
 from refgi.error_target.trial import fill_coarsest, fill_level, fill_picture
 from refgi.errors import InputError
-from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights import PixelLights
 from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import checked
-from refgi.scene import load_scene
-from refgi.splat import Receivers, irradiance
-from refgi.splat.multires.refinement.refine import refine
+from refgi.splat import Receivers
+from refgi.splat.multires.refine import refine
 from refgi.stages import observe
-from tests.splat.multires.choices import by_error, unclamped
+from tests.splat.multires.choices import by_error, frame_of, full_sum, relative_error, unclamped
 
 ROUNDING = 1e-5  # float32 sums of 64 terms, the largest many times the rest
 LINEAR = 1e-5  # of values up to 10: float32 means of four
@@ -30,14 +28,9 @@ TARGETS = (0.2, 0.05, 0.02)
 SCENES = ("cornell_box", "metaballs", "stage", "atrium")
 
 
-def frame_of(name, width=120, height=90):
-    return Frame(load_scene(name), width=width, height=height, rsm_resolution=64)
-
-
-def full_sum(frame, settings):
+def lights_and_sum(frame, settings):
     lights, area = choose_lights(frame, settings.lights), footprints(frame, settings.lights, settings.effective_pairs)
-    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
-    return lights, area, irradiance(receivers, lights, settings.effective_pairs, area)
+    return lights, area, full_sum(frame.gbuffer, lights, settings, area)
 
 
 def driven(buffer, lights, settings, area):
@@ -61,11 +54,6 @@ class Blank(NamedTuple):
         return tuple(getattr(self, name) for name in names)
 
 
-def relative_error(picture, full, covered):
-    difference = (picture - full.astype(float))[:, covered]
-    return math.sqrt((difference**2).mean()) / full[:, covered].mean(dtype=float)
-
-
 @pytest.fixture(scope="module")
 def box():
     return frame_of("cornell_box")
@@ -77,7 +65,7 @@ def test_every_promise_is_kept_against_the_full_sum(name):
     frame = frame_of(name)
     covered = frame.gbuffer.covered
     for clamp in ("none", "disc") if name == "cornell_box" else ("none",):
-        lights, area, full = full_sum(frame, unclamped(lights=64, clamp=clamp))
+        lights, area, full = lights_and_sum(frame, unclamped(lights=64, clamp=clamp))
         for target in TARGETS:
             for seed in (0, 1):
                 settings = by_error(target, lights=64, clamp=clamp, seed=seed)
@@ -90,13 +78,13 @@ def test_every_promise_is_kept_against_the_full_sum(name):
 def test_pairs_are_saved_and_all_counted(monkeypatch):
     frame = frame_of("cornell_box", 300, 300)
     settings = by_error(0.05, lights=64)
-    lights, area, full = full_sum(frame, settings)
+    lights, area, full = lights_and_sum(frame, settings)
     evaluated, near, add_lights = [], [], sum_module.add_lights
     monkeypatch.setattr(sum_module, "add_lights", lambda p, *how: evaluated.append(p.T) or add_lights(p, *how))
     monkeypatch.setattr(sum_module, "near_light", lambda *how: near.append(near_light(*how)) or near[-1])
     with observe() as log:
         found = driven(frame.gbuffer, lights, settings, area)
-    said = next(run.reason for run in log.runs if run.name == "multires.full_sum")
+    said = next(run.reason for run in log.runs if run.name == "error_target.full_sum")
     assert said.startswith(f"{found.pairs / found.full_pairs:.1%} of its pairs")
     points = np.concatenate(evaluated)
     assert len(np.unique(points, axis=0)) == len(points)  # no pixel twice
@@ -109,7 +97,7 @@ def test_pairs_are_saved_and_all_counted(monkeypatch):
 
 def test_subsplats_are_the_pictures(box):
     settings = by_error(0.05, lights=64)
-    lights, area, full = full_sum(box, settings)
+    lights, area, full = lights_and_sum(box, settings)
     found = driven(box.gbuffer, lights, settings, area)
     times = sum(np.kron(leaf, np.ones((1 << level, 1 << level)))[:90, :120]
                 for level, leaf in enumerate(leaves(found).leaf))
@@ -124,7 +112,7 @@ def test_subsplats_are_the_pictures(box):
 
 def test_no_error_at_all_is_the_full_sum_to_the_bit(box):
     settings = by_error(1e-6, lights=64)
-    lights, area, full = full_sum(box, settings)
+    lights, area, full = lights_and_sum(box, settings)
     found = driven(box.gbuffer, lights, settings, area)
     np.testing.assert_array_equal(found.irradiance, full)
     assert found.error == found.high == 0
@@ -133,7 +121,7 @@ def test_no_error_at_all_is_the_full_sum_to_the_bit(box):
 
 def test_threads_change_no_bit(box):
     settings = by_error(0.05, lights=64)
-    lights, area, _ = full_sum(box, settings)
+    lights, area, _ = lights_and_sum(box, settings)
     found = driven(box.gbuffer, lights, settings, area)
     with threads(1):
         alone = driven(box.gbuffer, lights, settings, area)
@@ -145,7 +133,7 @@ def test_threads_change_no_bit(box):
 def test_small_pictures(width, height):
     frame = frame_of("metaballs", width, height)
     settings = by_error(0.1, lights=64, coarsest=4)
-    lights, area, full = full_sum(frame, settings)
+    lights, area, full = lights_and_sum(frame, settings)
     found = driven(frame.gbuffer, lights, settings, area)
     assert np.isfinite(found.irradiance).all()
     assert relative_error(found.irradiance, full, frame.gbuffer.covered) <= 0.1
@@ -153,7 +141,7 @@ def test_small_pictures(width, height):
 
 def test_nothing_to_see_and_no_light(box):
     settings = by_error(0.1, lights=64)
-    lights, area, _ = full_sum(box, settings)
+    lights, area, _ = lights_and_sum(box, settings)
     dark = driven(box.gbuffer, lights._replace(flux=np.zeros_like(lights.flux)), settings, area)
     assert (dark.irradiance == 0).all()
     assert dark.error == dark.high == 0

@@ -108,25 +108,6 @@ def test_nearest_cells_equal_those_of_a_literal_twin():
     np.testing.assert_allclose(lights.flux, expected[:, expected.any(axis=0)], rtol=ROUNDING)
 
 
-@pytest.mark.feature("SII-03")
-def test_filtering_calms_the_light_under_sub_texel_motion(evidence):
-    """In a sphere E = sum(Phi) / (4 pi R^2) wherever the lights lie: what jumps is the flux, of a chequered wall."""
-    ball = sphere(12, 2.0)
-    wall = geometry(ball.vertices, ball.faces, materials=np.random.default_rng(1).integers(0, 2, len(ball.faces)))
-    materials = material_table([Material(diffuse=(0.1, 0.4, 0.7)), Material(diffuse=(0.8, 0.5, 0.2))], np.float64)
-    jumps = {}
-    for filtered in (False, True):
-        irradiance = []
-        for step in range(24):
-            light = SpotLight((step * 1e-3, 0.1, 0.2), (0.1, -1, 0.3), 0.5, 0.9, (1, 1, 1))  # texels are 0.1 m wide
-            rsm = reflective_shadow_map(wall, materials, light, 64, np.float64)
-            lights = choose_pixel_lights([rsm], count=64, pattern="grid", filtered=filtered)
-            irradiance.append(lights.flux.sum(axis=1) / (16 * math.pi))
-        jumps[filtered] = (np.diff(irradiance, axis=0).std(axis=0) / np.mean(irradiance, axis=0)).max()
-    assert jumps[True] < 0.5 * jumps[False]
-    evidence(f"relative std of E over 24 sub-texel steps: {jumps[False]:.1e} plain, {jumps[True]:.1e} filtered")
-
-
 def test_a_filtered_light_on_a_dark_texel_moves_to_the_nearest_bright_one():
     rsm = box_map()
     lights = choose_pixel_lights([rsm], count=1, pattern="grid", filtered=True)

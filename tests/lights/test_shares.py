@@ -1,4 +1,4 @@
-"""How lights are shared out among lamps: against a twin, by hand, and in the mean where lamps outnumber lights."""
+"""How lights are shared out among lamps: against a twin, by hand, in the mean; the areas that texels stand for."""
 
 import dataclasses
 import math
@@ -10,16 +10,17 @@ from hypothesis import strategies as st
 
 from refgi.frame import Frame
 from refgi.lights import choose_pixel_lights
-from refgi.lights.selection import choose_lights
+from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import LightSettings, most_lights
-from refgi.lights.shares import lamp_shares, map_flux, map_shares
+from refgi.lights.shares import lamp_shares, map_flux, map_shares, texel_areas
 from refgi.lights.walk import _shares
 from refgi.methods import METHODS, render
 from refgi.rays import Tracer
-from refgi.scene import PointLight, SpotLight, light_table, load_scene, material_table
+from refgi.scene import DirectionalLight, PointLight, SpotLight, light_table, load_scene, material_table
 from refgi.settings import of
+from refgi.splat import SiiSettings
 from tests.lights.test_pixel_lights import box_map, cube_map, with_flux
-from tests.naive.shares import shares_of
+from tests.naive.shares import nearest_grid, shares_of
 
 MISSES = SpotLight((50.0, 60.0, 70.0), (1.0, 1.0, 1.0), 0.1, 0.2, (5.0, 5.0, 5.0))
 SMALL = {"width": 24, "height": 24, "rsm_resolution": 32}
@@ -163,3 +164,68 @@ def test_there_are_no_more_lights_than_memory_is_planned_for(how, count):
 def test_methods_say_that_the_count_is_a_total():
     for name in ("sii", "multires", "val", "vpl"):
         assert "all lamps together" in str(METHODS[name].settings().lights.__dataclass_fields__["count"].metadata)
+
+
+ROUNDING = 3e-7  # float32: solid angle, position and normal are rounded once each
+KINDS = {"spot": BOX.lights[0], "cube": PointLight((0.3, 0.3, 0.2), (1.0, 2.0, 0.0)),
+         "directional": DirectionalLight((0.1, -0.9, 0.3), (1.0, 1.0, 1.0))}
+
+
+def by_hand(rsm, light):
+    """Return O d^2 / cos of every texel that reflects, 0 elsewhere."""
+    lobe = 0 if rsm.lobe_flux is None else rsm.lobe_flux
+    areas = np.zeros(rsm.solid_angle.shape)
+    for i, j in zip(*np.nonzero((rsm.flux + lobe).any(axis=0)), strict=True):
+        if isinstance(light, DirectionalLight):
+            towards, square = -np.asarray(light.direction, float), 1.0
+        else:
+            towards = np.asarray(light.position, float) - rsm.position[:, i, j]
+            square = towards @ towards
+        cosine = abs(towards @ rsm.normal[:, i, j]) / np.linalg.norm(towards)
+        areas[i, j] = rsm.solid_angle[i, j] * square / max(cosine, 1e-3)
+    return areas
+
+
+def whole(rsm):
+    """Return the areas of all texels, (H, W)."""
+    return texel_areas(rsm, np.arange(rsm.texels)).reshape(rsm.projection.shape)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("kind", [*KINDS, "glossy"])
+def test_areas_are_those_of_the_formula(kind, dtype):
+    scene = load_scene("ring") if kind == "glossy" else BOX.with_lights(KINDS[kind])
+    rsm = Frame(scene, rsm_resolution=40, dtype=dtype).rsms[0]
+    areas, expected = whole(rsm), by_hand(rsm, scene.lights[0])
+    assert areas.dtype == dtype
+    assert expected.any()
+    np.testing.assert_allclose(areas, expected, rtol=ROUNDING, atol=0)
+
+
+def test_lobes_alone_have_an_area():
+    rsm = Frame(load_scene("ring"), rsm_resolution=40).rsms[0]
+    assert rsm.lobe_flux is not None
+    mirror = rsm._replace(flux=np.zeros_like(rsm.flux))
+    np.testing.assert_array_equal(whole(mirror) > 0, rsm.lobe_flux.any(axis=0))
+
+
+@pytest.mark.parametrize("pattern", ["grid", "halton"])
+def test_each_light_has_its_texels_area_times_the_texels_it_stands_for(pattern):
+    """By hand, on a spot's and a point light's map of other flux."""
+    frame = Frame(BOX.with_lights(KINDS["spot"], KINDS["cube"]), rsm_resolution=40)
+    settings = of(SiiSettings, lights=256, pattern=pattern, clamp="disc")
+    lights, area = choose_lights(frame, settings.lights), footprints(frame, settings.lights, settings.pairs)
+    shares = shares_of(256, [float(rsm.flux.sum()) for rsm in frame.rsms])
+    cells = shares if pattern == "halton" else map(nearest_grid, shares, (1, 6))
+    for index, (rsm, drawn) in enumerate(zip(frame.rsms, cells, strict=True)):
+        here = lights.map_index == index
+        expected = by_hand(rsm, frame.scene.lights[index]).ravel()[lights.texel[here]] * rsm.texels / drawn
+        np.testing.assert_allclose(area[here], expected, rtol=ROUNDING)
+
+
+def test_lights_without_their_weight_have_their_texels_flux_under_a_rounded_grid():
+    frame = Frame(BOX.with_lights(KINDS["spot"], KINDS["cube"]), rsm_resolution=40)
+    lights = choose_lights(frame, of(LightSettings, count=256, pattern="grid", as_published={"sii_no_tn"}))
+    for index, rsm in enumerate(frame.rsms):
+        here = lights.map_index == index
+        np.testing.assert_allclose(lights.flux[:, here], rsm.flux.reshape(3, -1)[:, lights.texel[here]], rtol=ROUNDING)

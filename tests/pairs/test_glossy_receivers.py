@@ -8,12 +8,11 @@ import pytest
 from refgi.errors import InputError
 from refgi.jit import threads
 from refgi.lights import PixelLights
-from refgi.pairs.glossy import block_order, glossy_radiance, glossy_summed
 from refgi.pairs.glossy_sum import FARTHEST, TILE_ROWS, M, load_lobes, receiver_lobes_of
+from refgi.pairs.irradiance import block_order, glossy_radiance, glossy_summed
 from refgi.pairs.lobe_culling import CORNERS, bound_receivers, lights_in_lobes
-from refgi.pairs.packing import pack
 from refgi.pairs.pair_sum import GROUP, load_tile
-from refgi.pairs.pixel_lights import Range
+from refgi.pairs.pixel_lights import Range, pack
 from refgi.pairs.ranged_sum import LANES
 from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp, LobeSettings, PairSettings, SphereClamp
 from refgi.rsm.buffers.leaving import GlossyPoints

@@ -8,8 +8,16 @@ import pytest
 
 from refgi.jit import threads
 from refgi.pairs.lobe_sum import add_lobes
-from refgi.pairs.packing import pack_clamp, pack_lobes, pack_widening
-from refgi.pairs.pixel_lights import CLAMPED, FULL_LOBE, NO_NORM, Range, lobe_norm_factor
+from refgi.pairs.pixel_lights import (
+    CLAMPED,
+    FULL_LOBE,
+    NO_NORM,
+    Range,
+    lobe_norm_factor,
+    pack_clamp,
+    pack_lobes,
+    pack_widening,
+)
 from refgi.pairs.ranged_sum import LANES
 from refgi.settings import of
 from refgi.splat import PairSettings, Receivers, irradiance

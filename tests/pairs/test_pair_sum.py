@@ -1,4 +1,4 @@
-"""Eq. 2 for diffuse lights: oracle, closed forms, properties, sameness."""
+"""Eq. 2 for diffuse lights: oracle, closed forms, properties, sameness; the order of tiles."""
 
 import math
 
@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from refgi.errors import InputError
 from refgi.jit import threads
-from refgi.pairs.packing import pack_diffuse
 from refgi.pairs.pair_sum import GROUP, TILE, geometry_term, sum_pairs
-from refgi.pairs.tiles import bound_tile, lights_in_reach
+from refgi.pairs.pixel_lights import pack_diffuse
+from refgi.pairs.tiles import block_by_block, bound_tile, lights_in_reach
 from refgi.settings import of
 from refgi.splat import PairSettings, Receivers, irradiance
 from tests.naive import eq2
@@ -282,6 +282,8 @@ def test_no_lights_and_no_pixels():
     ({"clamp_value": 1e19, "clamp": "sphere"}, "clamp.value"),
     ({"widening": -1.0}, "widening"), ({"lobe_norm": "x"}, "lobe.norm"), ({"as_published": {"no_pi"}}, "as_published"),
 ])
+
+
 def test_settings_are_checked(change, message):
     with pytest.raises(InputError, match=message):
         of(PairSettings, **change)
@@ -298,3 +300,28 @@ def test_arrays_are_checked():
     for clamp in ("disc", "sphere"):
         with pytest.raises(InputError, match=f"footprint: .* 4 lights for the clamp '{clamp}'"):
             irradiance(receivers, lights, of(PairSettings, clamp=clamp))
+
+
+def literal(covered):
+    """Blocks of 16 row by row; within one 8 x 8 after 8 x 8, within these 4 x 4 after 4 x 4, row by row."""
+    height, width = covered.shape
+    places = []
+    for top in range(0, height, 16):
+        for left in range(0, width, 16):
+            for eight in range(4):
+                for four in range(4):
+                    for pixel in range(16):
+                        y = top + 8 * (eight // 2) + 4 * (four // 2) + pixel // 4
+                        x = left + 8 * (eight % 2) + 4 * (four % 2) + pixel % 4
+                        if y < height and x < width and covered[y, x]:
+                            places.append(y * width + x)
+    return places
+
+
+@pytest.mark.parametrize("shape", [(16, 16), (32, 48), (33, 47), (15, 64), (1, 1), (3, 40)])
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.999, 1.0])
+def test_pixels_go_block_by_block(shape, share):
+    covered = np.random.default_rng(3).random(shape) < share
+    assert block_by_block(covered).tolist() == literal(covered)
+    nth = np.flatnonzero(np.random.default_rng(4).random(int(covered.sum())) < 0.3)  # few of them, or none
+    assert block_by_block(covered, nth).tolist() == [literal(covered)[i] for i in nth]

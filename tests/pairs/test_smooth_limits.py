@@ -13,9 +13,8 @@ from refgi.frame import Frame
 from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.splat.multires.multires import multires
-from refgi.splat.sii.lobes import sii_lobes
 from refgi.splat.sii.settings import SiiSettings
-from refgi.splat.sii.sii import sii
+from refgi.splat.sii.sii import sii, sii_lobes
 from refgi.truth import TruthSettings, VplSettings, trace_truth, vpl
 from refgi.truth.vpl import vpl_lobes
 from tests.glossy import glossy_box

@@ -1,4 +1,4 @@
-"""Glossy and diffuse pairs where numbers are extreme: sharp lobes, touching lights, grazing, tiny, huge, far away."""
+"""Glossy and diffuse pairs where numbers are extreme: sharp lobes, touching, grazing, tiny, huge, far away."""
 
 import dataclasses
 import math
@@ -11,10 +11,12 @@ from hypothesis import strategies as st
 
 from refgi import Frame, load_scene
 from refgi.methods import find_method, render
+from refgi.pairs.pixel_lights import HEADROOM, PixelLights, pack
 from refgi.scene import DirectionalLight
 from refgi.settings import of, replaced
 from refgi.splat import PairSettings, SiiSettings, irradiance
 from refgi.splat.sii.sii import splat
+from refgi.splat.sii.threshold import all_peaks, light_range, low_irradiance
 from tests.pairs import sets
 
 U = 2.0**-24  # unit of rounding of float32
@@ -164,6 +166,8 @@ def lit_room():
 @pytest.mark.parametrize("how", [PairSettings(), of(PairSettings, widening=0.5), SiiSettings(),
                                  of(SiiSettings, cut_share=0.05, reference_length=1.0),
                                  of(SiiSettings, cut_share=0.05, reference_length=1.0, stochastic=True)])
+
+
 @pytest.mark.parametrize("factor", [2.0, 4.0, 0.5, 1024.0])
 @pytest.mark.feature("REF-05")
 def test_powers_of_two_scale_to_the_bit(how, factor, evidence):
@@ -255,3 +259,53 @@ def test_buffers_of_a_moved_scene_count_from_its_origin():
     there = frame.gbuffer.position + np.reshape(frame.origin, (3, 1, 1))
     np.testing.assert_allclose(there - np.reshape((1e5, 0, -64.0), (3, 1, 1)), plain.gbuffer.position, atol=1e-6)
     assert math.dist(frame.origin, (1e5, 0, -64.0)) < 2 * scene.geometry.diagonal
+
+
+UP = np.array([[0.0], [1.0], [0.0]], np.float32)
+NORMS = ("none", "full_lobe", "clamped")
+SETTINGS = ({}, {"clamp": "disc"}, {"clamp": "sphere", "clamp_value": 1e18}, {"clamp": "distance", "clamp_value": 1e18},
+            {"widening": 1e9}, {"cut_share": 1e9, "reference_length": 1e-9}, {"cut_irradiance": 1e300},
+            {"as_published": {"per_light_ilow"}, "reference_length": 1e-9})
+
+
+def odd_lights(flux: float, exponent: float, axis: tuple[float, float, float]) -> PixelLights:
+    def planes(values):
+        return np.ascontiguousarray(np.broadcast_to(np.asarray(values, np.float32).reshape(3, -1), (3, 3)))
+
+    return PixelLights(planes([1e9] * 3), planes(UP), planes([flux] * 3), planes([flux] * 3), planes(axis),
+                       np.full(3, exponent, np.float32), 3)
+
+
+@pytest.mark.parametrize("flux", [0.0, 1e-45, 1.0, 1e20, 1e38])
+@pytest.mark.parametrize("exponent", [0.0, 1e20])
+@pytest.mark.parametrize("axis", [(0, 1, 0), (0, -1, 0), (1, -1e-3, 0), (0, 0, 0)])
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+def test_all_that_is_packed_is_finite(flux, exponent, axis, real):
+    lights = odd_lights(flux, exponent, axis)
+    for norm in NORMS:
+        for options in SETTINGS:
+            settings = of(SiiSettings, lobe_norm=norm, **options)
+            for footprint in (0.0, 3e38):
+                packed = pack(lights, settings.pairs, np.full(3, footprint), real)
+                assert np.isfinite(packed.diffuse).all()
+                assert packed.lobes is None or np.isfinite(packed.lobes.lights).all()
+                assert packed.spheres is None or np.isfinite(packed.spheres).all()
+                low = low_irradiance(lights, settings)
+                assert math.isfinite(low)
+                for peak in all_peaks(packed):
+                    assert np.isfinite(light_range(peak, low, settings.reach, 0, real).square).all()
+
+
+def test_peaks_within_the_dtype_are_as_the_equation_says():
+    lights = odd_lights(2.0, 9.0, (0, 1, 0))
+    packed = pack(lights, of(PairSettings, lobe_norm="full_lobe"), None, np.float64)
+    assert packed.lobes.lights[10:13] == pytest.approx(np.full((3, 3), 2 * 10 / (2 * math.pi)), rel=1e-12)
+    beyond = pack(odd_lights(1e20, 1e20, (0, 1, 0)), of(PairSettings, lobe_norm="full_lobe"), None, np.float32)
+    assert beyond.lobes.lights[10:13].max() == np.float32(np.finfo(np.float32).max / HEADROOM)
+
+
+def test_a_tiny_share_cuts_nothing_for_any_light():
+    settings = of(SiiSettings, as_published={"per_light_ilow"}, cut_share=1e-300, reference_length=1.0)
+    reach = light_range(np.array([1.0, 0.0, 1e-30]), 0.0, settings.reach, 0, np.float32)
+    farthest = math.sqrt(np.finfo(np.float32).max)
+    assert reach.square.tolist() == [np.float32(farthest), 0.0, np.float32(farthest)]

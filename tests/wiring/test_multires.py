@@ -252,7 +252,7 @@ def test_the_promise(name):
     full, covered = full_sum(frame, settings), frame.gbuffer.covered
     with observe(record=True) as log:
         light = multires(frame, settings)
-    split = next(run.output for run in log.runs if run.name == "multires.error_driven").split
+    split = next(run.output for run in log.runs if run.name == "error_target.error_driven").split
     off = light - full
     assert np.sqrt((off[:, covered] ** 2).mean()) <= settings.subsplats.target * full[:, covered].mean()
     assert len(split) - 1 == literal.coarsest_level(covered.shape, settings.subsplats.coarsest)
@@ -310,7 +310,7 @@ def test_lightcuts_are_part_of_an_error(monkeypatch):
     keys = {"subsplats": "error", "subsplats.target": 0.05, "subsplats.coarsest": 16}
     covered = frame.gbuffer.covered
     full = multires(frame, cut(**{"subsplats.coarsest": 65536}))[:, covered]
-    choice = sys.modules["refgi.pairs.lightcuts.choice"]
+    choice = sys.modules["refgi.pairs.lightcuts.cuts"]
     monkeypatch.setattr(choice, "LEAST_LIGHTS", 1000)
     monkeypatch.setattr(choice, "LEAST_PAIRS", 0)
     monkeypatch.setattr(choice, "estimated_share", lambda *_: 0.5)
@@ -326,7 +326,7 @@ def test_lightcuts_are_part_of_an_error(monkeypatch):
 
 def test_lightcuts_are_chosen_where_they_pay(monkeypatch):
     """By an estimate alone: at subsplats the bits of those asked for by name, with an error target a share of it."""
-    choice = sys.modules["refgi.pairs.lightcuts.choice"]
+    choice = sys.modules["refgi.pairs.lightcuts.cuts"]
     monkeypatch.setattr(choice, "LEAST_LIGHTS", 1000)
     monkeypatch.setattr(choice, "LEAST_PAIRS", 0)
     monkeypatch.setattr(choice, "TILES", 1)

@@ -14,7 +14,7 @@ from refgi.methods import METHODS
 from refgi.settings import replaced
 from refgi.splat import Receivers, SiiSettings, cut_irradiance, sii
 from refgi.splat.sii.approximations import sii_ledger
-from refgi.splat.sii.reach.fragments import fragments
+from refgi.splat.sii.fragments import fragments
 from refgi.stages import Memory, reusing
 from tests.literal.whole import sii as literal
 from tests.literal.whole.pairs import occluded_of, with_clamp
@@ -183,7 +183,7 @@ def test_lightcuts_reach_the_sum(half):
 @pytest.mark.parametrize("share", [0.5, 2.0])
 def test_lightcuts_are_chosen_where_they_pay(monkeypatch, share):
     """By an estimate alone, to the bit; the picture says so, and a cut leaves them out."""
-    choice = sys.modules["refgi.pairs.lightcuts.choice"]
+    choice = sys.modules["refgi.pairs.lightcuts.cuts"]
     monkeypatch.setattr(choice, "LEAST_LIGHTS", 1000)
     monkeypatch.setattr(choice, "LEAST_PAIRS", 0)
     monkeypatch.setattr(choice, "estimated_share", lambda *_: share)

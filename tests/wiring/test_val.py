@@ -82,7 +82,7 @@ def test_the_promise(name, evidence):
     full, covered = clustered.picture(frame, with_clamp(settings)), frame.gbuffer.covered
     with observe(record=True) as log:
         off = val(frame, settings) - full
-    found = next(run.output for run in log.runs if run.name == "multires.error_driven")
+    found = next(run.output for run in log.runs if run.name == "error_target.error_driven")
     error = np.sqrt((off[:, covered] ** 2).mean()) / full[:, covered].mean()
     evidence(f"{name}: {error:.2%} off every light at every pixel, {found.pairs / found.full_pairs:.0%} of the pairs")
     assert error <= settings.subsplats.target

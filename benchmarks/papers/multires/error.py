@@ -25,7 +25,7 @@ from benchmarks.papers.records import Case, Figure, Picture, Table, relative
 from benchmarks.papers.workbench import Errors, Gallery, Workbench, errors_of, seen_by
 from refgi.compare.pictures import DIVERGING, Scale, luminance
 from refgi.frame import Frame
-from refgi.lights.footprints import with_equal_solid_angles
+from refgi.lights.shares import with_equal_solid_angles
 from refgi.pairs.settings import DistanceClamp
 from refgi.scene import Camera, Material, Scene, SpotLight
 from refgi.scene.builtin.surfaces import rectangle

@@ -16,7 +16,7 @@ from refgi.compare.pages import Axes, Curve, curves_plot
 from refgi.scene import Scene
 from refgi.settings import flat, replaced
 from refgi.splat.multires import ByError, ByGeometry, ByIrradiance, Criteria, MultiresSettings, multires
-from refgi.splat.multires.lobes import multires_lobes
+from refgi.splat.multires.multires import multires_lobes
 
 # eye and target on the way, m: towards the body, close past it, over it and back
 WAY = np.array([

@@ -28,10 +28,10 @@ from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.settings import replaced
 from refgi.splat.multires import ByGeometry, ByIrradiance, Criteria, MultiresSettings, multires
-from refgi.splat.multires.light_lists.per_light import per_light_counts
+from refgi.splat.multires.evaluate import evaluate, representative_points
+from refgi.splat.multires.per_light import per_light_counts
 from refgi.splat.multires.settings import Criterion, Upsampling
-from refgi.splat.multires.subsplats.evaluate import evaluate, representative_points
-from refgi.splat.multires.subsplats.upsample import upsample
+from refgi.splat.multires.upsample import upsample
 from refgi.types import Array
 
 PICTURE_LIGHTS = 256  # of Table 1's pictures

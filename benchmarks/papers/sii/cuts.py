@@ -15,8 +15,8 @@ from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.settings import of, replaced
 from refgi.splat import GatherSettings, SiiSettings, gather, sii
-from refgi.splat.sii.reach.fragments import FRAGMENT_BITS, SAMPLE_BITS, Fragments, gather_bits
-from refgi.splat.sii.reach.threshold import PAPER_LIGHTS, PAPER_OVERDRAW, low_irradiance
+from refgi.splat.sii.fragments import FRAGMENT_BITS, SAMPLE_BITS, Fragments, gather_bits
+from refgi.splat.sii.threshold import PAPER_LIGHTS, PAPER_OVERDRAW, low_irradiance
 from refgi.stages import observe
 from refgi.types import Array
 

@@ -27,11 +27,11 @@ from refgi.lights.warp import Method, warp_samples
 from refgi.sampling import halton
 from refgi.settings import of
 from refgi.splat import Receivers, SiiSettings, sii
-from refgi.splat.sii.reach.bounds import appendix_ellipsoid
-from refgi.splat.sii.reach.fragments import Fragments, fragments
-from refgi.splat.sii.reach.threshold import PAPER_CUT, PAPER_LIGHTS
-from refgi.splat.sii.reach.threshold import reference_length as reference_length_of
+from refgi.splat.sii.bounds import appendix_ellipsoid
+from refgi.splat.sii.fragments import Fragments, fragments
 from refgi.splat.sii.settings import RelativeCut
+from refgi.splat.sii.threshold import PAPER_CUT, PAPER_LIGHTS
+from refgi.splat.sii.threshold import reference_length as reference_length_of
 from refgi.stages import Memory, observe
 from refgi.types import Array
 

@@ -1,20 +1,20 @@
-"""Sums over cuts through the light tree: clusters fine enough for each group of receivers, and for its halves.
+"""Sums over cuts through the light tree: clusters fine enough for each group of receivers, and whether they pay.
 
-A cut begins at the highest level. Nodes whose bound is above a threshold are replaced by their children, until the
-bounds add up to S <= error (E - S), E the least sum over channels of the group's receivers. A node that is large beside
-the group is opened by it; one that is small but near is left to the group's halves, of which each sees it from one
-side, and they to theirs. What is accepted on the way adds to the sums and to S of all receivers of the group. The last
-halves lower their threshold until S suffices; where what was accepted before them is too much already, they begin anew
-from the top.
+Nodes whose bound is above a threshold are replaced by their children, until the bounds add up to S <= error (E - S), E
+the least sum over channels of the group's receivers. A node large beside the group is opened; one that is small but
+near is left to the group's halves, and they to theirs. The last halves lower their threshold until S suffices; where
+what was accepted before is too much already, they begin anew from the top. `chosen` estimates from counts of pairs and
+bounds, never from clocks, whether that takes less than the sum of all lights.
 """
 
-from typing import NamedTuple
+import math
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from refgi.diagnostics import LightcutsChoice, tell_lightcuts
 from refgi.jit import kernel, prange
-from refgi.pairs.lightcuts.bounds import bound_group
-from refgi.pairs.lightcuts.groups import group_receivers, half_of
+from refgi.pairs.lightcuts.groups import bound_group, group_receivers, half_of
 from refgi.pairs.lightcuts.nodes import (
     Nodes,
     add_nodes,
@@ -28,10 +28,16 @@ from refgi.pairs.lightcuts.nodes import (
     restore_totals,
     sum_of_errors,
 )
-from refgi.pairs.lightcuts.tree import LightTree
-from refgi.pairs.pair_sum import NX, ROWS, TILE, TOTAL, X
-from refgi.stages import stage, tally
+from refgi.pairs.lightcuts.tree import LightTree, light_tree
+from refgi.pairs.pair_sum import NX, ROWS, TILE, TOTAL, Clamp, X
+from refgi.pairs.settings import LEAST_LIGHTS, AutoLightcuts, Lightcuts
+from refgi.pairs.tile_counts import tiles_behind
+from refgi.pairs.tiles import block_by_block, taken
+from refgi.stages import counted_pixels, skip, stage, tally
 from refgi.types import Array
+
+if TYPE_CHECKING:
+    from refgi.pairs.pixel_lights import Packed, PixelLights
 
 DEPTHS = 4  # of halving
 UNDIVIDED = 96  # receivers of a group that is not halved
@@ -219,3 +225,83 @@ def _finish(
             threshold *= min(max(share * share, STEPS[0]), STEPS[1])
             threshold = min(threshold, LOWER * largest_error(nodes, count))
         count = refine(tree, nodes, count, threshold, group, 0.0)
+
+
+LEAST_PAIRS = 1 << 30  # of light and receiver; fewer are summed in full
+LIGHTS = 4096  # in the tree that is tried, at most a quarter of all
+TILES, PART = 16, 64  # tiles of the full sum that are looked at, and receivers of each that a cut is tried for
+GROWTH = 0.3, 0.8  # powers of the number of lights that a cut's work grows with
+PAIR, TEST, CUT_PAIR, BOUND, NODE, RECEIVER = 0.42, 0.2, 0.45, 34.0, 600.0, 160.0  # ns of one thread
+SURE = 0.7  # of the full sum's time, what clusters may be estimated to take: estimates are 0.8 to 2.3 times what is met
+
+
+def for_lights(lightcuts: AutoLightcuts | Lightcuts | None, lights: "PixelLights") -> AutoLightcuts | Lightcuts | None:
+    """Return lightcuts, none for "auto" where lights are few."""
+    count = lights.flux.shape[1]
+    if isinstance(lightcuts, AutoLightcuts) and count < LEAST_LIGHTS:
+        skip("pairs.lightcuts", f"{count:,} lights: fewer than {LEAST_LIGHTS:,} are summed in full")
+        return None
+    return lightcuts
+
+
+def chosen(lightcuts: AutoLightcuts, packed: "Packed", planes: tuple[Array, Array], covered: Array) -> Lightcuts | None:
+    """Return bounded lightcuts where they take less time than the full sum of diffuse lights, else none.
+
+    `planes`: positions and normals (3, h, w) of the receivers.
+    """
+    count, covered = packed.diffuse.shape[1] - 1, np.asarray(covered, np.bool_)
+    number = int(np.count_nonzero(covered))
+    if packed.spheres is not None or not bool((packed.diffuse[6:] >= 0).all()):
+        skip("pairs.lightcuts", "spheres and lights of negative flux have no bound")
+        return None
+    if count < LEAST_LIGHTS or count * counted_pixels(number) < LEAST_PAIRS:
+        skip("pairs.lightcuts", f"{count:,} diffuse lights at {number:,} points are summed in full")
+        return None
+    if count * number < LEAST_PAIRS:  # a small picture that stands for a large one
+        return Lightcuts(lightcuts.error)
+    first = np.linspace(0, number - TILE, TILES).astype(np.int64) // TILE * TILE
+    places = block_by_block(covered, (first[:, None] + np.arange(TILE)).reshape(-1))
+    position, normal = (taken(np.asarray(part, packed.diffuse.dtype), places) for part in planes)
+    share = estimated_share(position, normal, packed.diffuse, packed.clamp, lightcuts.error, number)
+    if share > SURE:
+        skip("pairs.lightcuts", f"estimated to take {share:.2g} times the time of the full sum of {count:,} lights")
+        return None
+    choice = LightcutsChoice(count, lightcuts.error, share)
+    skip("pairs.full_sum", choice.statement)
+    tell_lightcuts(choice)
+    return Lightcuts(lightcuts.error)
+
+
+def estimated_share(
+    position: Array, normal: Array, lights: Array, clamp: Clamp | None, error: float, number: int
+) -> float:
+    """Return the estimated time of clusters over that of the full sum of packed lights at `number` receivers.
+
+    position, normal (3, TILES TILE): Some of the receivers, tile by tile.
+    """
+    count = lights.shape[1] - 1
+    behind, tiles = tiles_behind(position, normal, lights)
+    full = count * (PAIR * (1 - behind / tiles) + TEST / TILE)
+    most = min(count // 4, LIGHTS)
+    few, many = (_work(position, normal, lights, clamp, error, some) for some in (most // 4, most))
+    growth = min(max(math.log(many / few, 4), GROWTH[0]), GROWTH[1])
+    cuts = many * (count / most) ** growth + RECEIVER + NODE * count / number
+    return float(cuts / full)
+
+
+def _work(position: Array, normal: Array, lights: Array, clamp: Clamp | None, error: float, number: int) -> float:
+    """Return the time that cuts through a tree over `number` of the lights take for a receiver, ns."""
+    count = lights.shape[1] - 1
+    some = np.append((np.arange(number) + 0.5) * count // number, count).astype(np.int64)
+    soft = clamp if clamp is None else clamp._replace(softness=np.ascontiguousarray(clamp.softness[some]))
+    tree = light_tree(np.ascontiguousarray(lights[:, some]), soft, error)
+    orders, starts = list[Array](), list[Array]()
+    for tile in range(position.shape[1] // TILE):
+        place = tile * TILE + tile % (TILE // PART) * PART + np.arange(PART)
+        part, start = group_receivers(position[:, place], normal[:, place])
+        orders.append(place[part])
+        starts.append(tile * PART + start[:-1])
+    order = np.concatenate(orders)
+    pairs, bounds = sum_groups(position, normal, order, np.append(np.concatenate(starts), len(order)), tree,
+                               np.zeros_like(position))
+    return (CUT_PAIR * pairs + BOUND * bounds) / len(order)

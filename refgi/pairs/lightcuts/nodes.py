@@ -5,10 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from refgi.jit import kernel
-from refgi.pairs.lightcuts.bounds import fill_errors
-from refgi.pairs.lightcuts.groups import LANES
+from refgi.pairs.lightcuts.groups import LANES, fill_errors
 from refgi.pairs.lightcuts.tree import BOUND_ROWS, FAN, RADIUS, SOFT, LightTree, block_of
-from refgi.pairs.pair_sum import COMPENSATION, GROUP, NX, SUM, TOTAL, X, pair_term
+from refgi.pairs.pair_sum import GROUP, NX, SUM, TOTAL, X, close_lanes, pair_term
 from refgi.types import Array
 
 BATCH = 128  # nodes whose bounds are computed at a time
@@ -181,7 +180,7 @@ def add_nodes(tile: Array, begin: int, end: int, tree: LightTree, chosen: Array,
                                                      _limits(tree, d)))
             else:
                 _add_four(tile, start, stop, nodes, (None, None, None, None))
-        _close(tile, start, stop)
+        close_lanes(tile, start, stop)
 
 
 @kernel
@@ -211,20 +210,6 @@ def _add_four(tile: Array, start: Any, stop: Any, nodes: Any, limits: Any) -> No
         tile[SUM, i] = tile[SUM, i] + g1 * one[6] + g2 * two[6] + g3 * three[6] + g4 * four[6]
         tile[SUM + 1, i] = tile[SUM + 1, i] + g1 * one[7] + g2 * two[7] + g3 * three[7] + g4 * four[7]
         tile[SUM + 2, i] = tile[SUM + 2, i] + g1 * one[8] + g2 * two[8] + g3 * three[8] + g4 * four[8]
-
-
-@kernel
-def _close(tile: Array, start: Any, stop: Any) -> None:
-    """Add rows SUM to rows TOTAL as `pair_sum.close_group`, for some receivers."""
-    zero = tile.dtype.type(0.0)
-    for c in range(3):
-        for i in range(start, stop):
-            added, old, lost = tile[SUM + c, i], tile[TOTAL + c, i], tile[COMPENSATION + c, i]
-            part = added - lost
-            total = old + part
-            tile[COMPENSATION + c, i] = lost if added == zero else (total - old) - part
-            tile[TOTAL + c, i] = old if added == zero else total
-            tile[SUM + c, i] = zero
 
 
 @kernel

@@ -1,19 +1,13 @@
 """The light tree: clusters of clusters of lights in the order of a k-d tree, each with what its bound needs.
 
-A set of lights is halved at the median of its widest side, of positions or of normals, whose unit counts as NORMALS
-times the width of the scene; the first half has as many lights as fill a subtree. Halves that follow each other are
-one level of the light tree, so its clusters are squarish patches that face one way. Halving is by selection and
-depends on nothing but the lights: the same bits for every number of threads.
-
-Level 0 are the lights in the order of `compact_order`; a node of level l joins FAN neighbours of level l - 1. A node's
-representative is a light at the mean position, with the mean normal, which is shorter than 1 where normals differ, and
-the flux of all: means are weighted by the sum over the channels. Nodes lie level by level in one array.
-
-Symbols of a cluster: w_i = sum over channels of Phi_i / pi, p and m its mean position and the direction of its mean
-reversed normal, s^2 and v^2 the mean squared distance of positions to p and of normals to their mean, D = sum over
-channels of ``|sum_i (Phi_i / pi) (y_i - p)|`` and N the same of normals: 0 but for colours that change within the
-cluster, and rounding; A areas. All its lights lie within a radius of p and a height of the plane through p across m,
-and their normals within a turn of m.
+Lights are halved by selection at the median of the widest side, of positions or of normals, whose unit counts as
+NORMALS times the width of the scene: the same bits for every number of threads. A node of level l joins FAN neighbours
+of level l - 1; its representative is a light at the mean position, with the mean normal, not of unit length, and the
+flux of all (means weighted by the sum over channels). Symbols of a cluster: w_i = sum over channels of Phi_i / pi, p
+and m its mean position and the direction of its mean reversed normal, s^2 and v^2 the mean squared distance of
+positions to p and of normals to their mean, D = sum over channels of ``|sum_i (Phi_i / pi) (y_i - p)|`` and N the same
+of normals, A areas. All its lights lie within a radius of p and a height of the plane through p across m, and their
+normals within a turn of m.
 """
 
 import math
@@ -64,7 +58,7 @@ def _halve_level(keys: Array, order: Array, capacity: int, deep: bool) -> None:
             waiting -= 1
             begin, end, half = begins[waiting], ends[waiting], sizes[waiting] // 2
             if end - begin > half:
-                _select(keys, order, begin, end, begin + half, _widest(keys, begin, end))
+                select(keys.T, order, 0, begin, end, begin + half, _widest(keys, begin, end))
             if deep and half > 1:
                 middle = min(begin + half, end)
                 begins[waiting], ends[waiting], sizes[waiting] = begin, middle, half
@@ -91,20 +85,26 @@ def _widest(keys: Array, begin: int, end: int) -> int:
 
 
 @kernel
-def _select(keys: Array, order: Array, begin: int, end: int, middle: int, row: int) -> None:
-    """Put the least values of a column before `middle` and the others behind it (Hoare's selection)."""
+def swap(keys: Array, order: Array, first: int, i: int, j: int) -> None:
+    """Exchange columns i and j of keys (6, n), and entries first + i and first + j of their order."""
+    for row in range(6):
+        keys[row, i], keys[row, j] = keys[row, j], keys[row, i]
+    order[first + i], order[first + j] = order[first + j], order[first + i]
+
+
+@kernel
+def select(keys: Array, order: Array, first: int, begin: int, end: int, middle: int, row: int) -> None:
+    """Put the least values of a row of begin to end - 1 before `middle`, the others behind it (Hoare's selection)."""
     low, high = begin, end - 1
     while low < high:
-        pivot, i, j = keys[(low + high) // 2, row], low, high
+        pivot, i, j = keys[row, (low + high) // 2], low, high
         while i <= j:
-            while keys[i, row] < pivot:
+            while keys[row, i] < pivot:
                 i += 1
-            while keys[j, row] > pivot:
+            while keys[row, j] > pivot:
                 j -= 1
             if i <= j:
-                for column in range(6):
-                    keys[i, column], keys[j, column] = keys[j, column], keys[i, column]
-                order[i], order[j] = order[j], order[i]
+                swap(keys, order, first, i, j)
                 i, j = i + 1, j - 1
         if middle <= j:
             high = j

@@ -1,12 +1,15 @@
-"""Gathering around the projected point (Reflective Shadow Maps 2005): what splatting replaced, and its baseline.
-
-`gather` sums the texels around each pixel's own place in the map: `gather_sum` sums Eq. 2 over a disc of texels there,
-`interpolation` carries the light of a coarse grid of pixels to the others.
-"""
+"""Gathering around the projected point (Reflective Shadow Maps 2005): what splatting replaced, and its baseline."""
 
 from refgi.method import Method
-from refgi.splat.gather.gather import APPROXIMATIONS, PRESETS, DiscSettings, GatherSettings, Interpolation, gather
-from refgi.splat.gather.lobes import gather_lobes
+from refgi.splat.gather.gather import (
+    APPROXIMATIONS,
+    PRESETS,
+    DiscSettings,
+    GatherSettings,
+    Interpolation,
+    gather,
+    gather_lobes,
+)
 
 __all__ = [
     "PRESETS",

@@ -1,8 +1,7 @@
 """Gathering from the reflective shadow map (Dachsbacher and Stamminger 2005), the baseline of SII Fig. 12.
 
 Each pixel sums texels in a disc around its own place in the map. With `grid` the sum runs at a coarse grid of pixels
-first; a pixel whose coarse neighbours resemble it in place and normal gets their interpolated light, every other pixel
-runs the sum itself.
+first; a pixel whose coarse neighbours resemble it in place and normal gets their interpolated light.
 """
 
 import dataclasses
@@ -13,15 +12,24 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from refgi.diagnostics import SamplingError, asked, is_due
-from refgi.lights.settings import RSM_RESOLUTION, VISIBILITY
+from refgi.lights.settings import RSM_RESOLUTION, VISIBILITY, changed
 from refgi.method import Approximation
 from refgi.pairs.estimates import LEAST_SAMPLED, error_of_halves, sample_pixels, warn_of_loss, warn_of_sampling
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.tiles import clear, receiving
+from refgi.rsm.buffers.leaving import GlossyPoints, spread_over_picture
 from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
-from refgi.splat.gather.gather_sum import GatherMap, centers, disc_loss, disc_pattern, gather_discs
-from refgi.splat.gather.interpolation import SimilarityLimits, coarse_pixels, interpolate
+from refgi.splat.gather.gather_sum import (
+    GatherMap,
+    SimilarityLimits,
+    centers,
+    coarse_pixels,
+    disc_loss,
+    disc_pattern,
+    gather_discs,
+    interpolate,
+)
 from refgi.stages import skip, stage, tally
 from refgi.types import Array
 
@@ -153,8 +161,6 @@ def gather_irradiance(receivers: Receivers, rsms: "Sequence[Rsm]", disc: DiscSet
     rsms: Reflective shadow maps, one a light; of glossy materials only the diffuse part is gathered.
     -> (3, h, w): Irradiance, W/m^2, linear RGB; 0 where there is no surface. Excludes the receiver's albedo/pi.
 
-    Notes
-    -----
     E = (2 pi r_max^2 T / S) sum xi_1 E_t with T the texels of one map and E_t the light of one texel (Eq. 2), which
     has the mean of the full sum over the disc. The papers scale by hand. A receiver outside the map gathers
     where the straight way to the map's middle meets its border. Maps of several faces are one sheet: a disc runs on
@@ -184,7 +190,7 @@ def gather_sampling_error(receivers: Receivers, rsms: "Sequence[Rsm]", disc: Dis
         middle = centers(rsm.projection, sample.position)
         # a Halton set's halves are its first and last points
         for part, total in zip(np.array_split(pattern, 2), halves, strict=True):
-            gather_discs(sample.position, sample.normal, middle, source, part, scale, total)
+            gather_discs(sample.position, sample.normal, middle, source, part, scale, None, total)
     return error_of_halves(halves[0], halves[1], disc.samples, "samples of a disc")
 
 
@@ -193,7 +199,7 @@ def _gather_one(points: Array, normals: Array, rsm: "Rsm", disc: DiscSettings, t
         skip("gather.lobes", "gathering takes the diffuse part alone")
     tally("pairs", lambda: points.shape[1] * disc.samples)
     source, pattern, scale = disc_texels(rsm, disc, points.dtype)
-    gather_discs(points, normals, centers(rsm.projection, points), source, pattern, scale, total)
+    gather_discs(points, normals, centers(rsm.projection, points), source, pattern, scale, None, total)
 
 
 def disc_texels(rsm: "Rsm", disc: DiscSettings, dtype: np.dtype[Any]) -> tuple[GatherMap, Array, Any]:
@@ -224,12 +230,36 @@ def _many(settings: GatherSettings, _: Mapping[str, Any]) -> GatherSettings:
     return dataclasses.replace(settings, disc=disc)
 
 
-def _every_pixel(settings: GatherSettings, _: Mapping[str, Any]) -> GatherSettings:
-    return dataclasses.replace(settings, interpolation=None)
-
-
 APPROXIMATIONS = (
     VISIBILITY, RSM_RESOLUTION,
     Approximation("cut", "texels beyond a disc around the pixel's place in the map are left out", _whole_map),
     Approximation("few samples", f"S texels of the disc; off: {MANY}", _many),
-    Approximation("upsampling", "pixels of a coarse grid are evaluated, similar ones interpolated", _every_pixel))
+    Approximation("upsampling", "pixels of a coarse grid are evaluated, similar ones interpolated",
+                  changed(interpolation=None)))
+
+
+def gather_lobes(frame: "Frame", settings: GatherSettings) -> Array:
+    """Return the radiance towards the eye that receivers' lobes make of the texels in their discs.
+
+    (3, h, w), W/m^2/sr, linear RGB, without visibility; 0 where there is no lobe. Every glossy pixel runs the sum, and
+    none is interpolated.
+    """
+    points = frame.glossy_points
+    return spread_over_picture(points, gather_glossy(points, frame.rsms, settings.disc), (frame.height, frame.width))
+
+
+@stage("gather.glossy")
+def gather_glossy(points: GlossyPoints, rsms: "tuple[Rsm, ...]", disc: DiscSettings) -> Array:
+    """Sum the radiance that lobes make of the texels in each receiver's disc.
+
+    rsms: Reflective shadow maps, one a light; of glossy materials only the diffuse part is gathered.
+    -> (3, n): W/m^2/sr, linear RGB: the terms of `gather_irradiance`, each times f_s.
+    """
+    total = np.zeros_like(points.position)
+    for rsm in rsms:
+        tally("pairs", lambda: len(points.pixel) * disc.samples)
+        source, pattern, scale = disc_texels(rsm, disc, points.position.dtype)
+        gather_discs(points.position, points.normal, centers(rsm.projection, points.position), source, pattern, scale,
+                     points, total)
+    radiance: Array = total * points.specular
+    return radiance

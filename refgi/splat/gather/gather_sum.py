@@ -1,9 +1,7 @@
-"""The sum of RSM gathering: each receiver sums Eq. 2 over a disc of texels around its own place in the map.
+"""The sum of RSM gathering: Eq. 2 over a disc of texels around each receiver's place in the map, and interpolation.
 
-The pattern is polar with radius r_max xi_1, so its density falls as 1 / r and each sample weighs xi_1
-(Dachsbacher and Stamminger 2005). Symbols as in `pair_sum`.
-
-`centers` places the disc; `disc_loss` estimates, from sampled pixels and texels, the share of light outside all discs.
+The pattern is polar with radius r_max xi_1, so its density falls as 1 / r and each sample weighs xi_1 (Dachsbacher and
+Stamminger 2005). `disc_loss` estimates the share of light outside all discs. Symbols as in `pair_sum`.
 """
 
 import math
@@ -16,12 +14,15 @@ from refgi.jit import kernel, prange
 from refgi.pairs.estimates import lost_share, sample_pixels
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.pair_sum import geometry_term
+from refgi.radiometry import lobe_gap, lobe_power, receiver_norm
+from refgi.rsm.buffers.leaving import GlossyPoints
 from refgi.sampling import GATHERING, draws, halton
 from refgi.stages import stage
 from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.rsm import Projection, Rsm
+
 TEXELS = 1024  # of each map
 SAMPLED = 512  # pixels
 CORNER = math.sqrt(2)  # map widths: a disc of that radius holds the whole map, wherever its centre lies
@@ -63,34 +64,40 @@ def disc_offsets(points: Array, weight_squared: bool = False) -> Array:
 
 @kernel(parallel=True)
 def gather_discs(
-    position: Array, normal: Array, center: Array, source: GatherMap, pattern: Array, scale: Any, irradiance: Array
+    position: Array, normal: Array, center: Array, source: GatherMap, pattern: Array, scale: Any,
+    lobes: GlossyPoints | None, irradiance: Array,
 ) -> None:
-    """Add E = scale * sum over the pattern of weight Phi g for every receiver, W/m^2.
+    """Add E = scale * sum over the pattern of weight Phi g for every receiver, W/m^2, or what lobes make of it.
 
-    `position` and `normal` (3, n) are the receivers, `center` (2, n) float64 their continuous row and column in the
-    map; `pattern` (S, 3) holds rows down, columns right and weight; `scale` is 1 / (pi S) times the texels in a disc of
-    unit weight. Texels outside the map count 0.
+    `center` (2, n) float64: rows and columns of receivers (3, n) in the map; `pattern` (S, 3): rows down, columns
+    right, weight; `scale`: 1 / (pi S) times the texels in a disc of unit weight.
     """
     real = position.dtype.type
     height, width = source.flux.shape[1:]
+    p, n, flux = source
     for i in prange(position.shape[1]):
         red, green, blue = real(0.0), real(0.0), real(0.0)
         x, y, z = position[0, i], position[1, i], position[2, i]
         nx, ny, nz = normal[0, i], normal[1, i], normal[2, i]
+        norm = scale
+        if lobes is not None:
+            norm = receiver_norm(lobes.exponent[i]) * scale
         for s in range(pattern.shape[0]):
             t, u = sample_texel(center, pattern, i, s)
-            if 0 <= t < height and 0 <= u < width:
-                fr, fg, fb = source.flux[0, t, u], source.flux[1, t, u], source.flux[2, t, u]
-                if fr > 0 or fg > 0 or fb > 0:
-                    p, n = source.position, source.normal
-                    # SII Eq. (2)
-                    g = geometry_term(p[0, t, u] - x, p[1, t, u] - y, p[2, t, u] - z,
-                                      -n[0, t, u], -n[1, t, u], -n[2, t, u], nx, ny, nz)
-                    g *= real(pattern[s, 2])
-                    red, green, blue = red + g * fr, green + g * fg, blue + g * fb
-        irradiance[0, i] += red * scale
-        irradiance[1, i] += green * scale
-        irradiance[2, i] += blue * scale
+            if 0 <= t < height and 0 <= u < width and (flux[0, t, u] > 0 or flux[1, t, u] > 0 or flux[2, t, u] > 0):
+                dx, dy, dz = p[0, t, u] - x, p[1, t, u] - y, p[2, t, u] - z
+                # SII Eq. (2), times the lobe
+                g = geometry_term(dx, dy, dz, -n[0, t, u], -n[1, t, u], -n[2, t, u], nx, ny, nz)
+                if g > 0:
+                    weight = real(pattern[s, 2])
+                    if lobes is not None:
+                        weight *= lobe_power(lobe_gap(lobes.mirrored[0, i], lobes.mirrored[1, i], lobes.mirrored[2, i],
+                                                      dx, dy, dz), lobes.exponent[i])
+                    g *= weight
+                    red, green, blue = red + g * flux[0, t, u], green + g * flux[1, t, u], blue + g * flux[2, t, u]
+        irradiance[0, i] += red * norm
+        irradiance[1, i] += green * norm
+        irradiance[2, i] += blue * norm
 
 
 @kernel
@@ -187,3 +194,86 @@ def _add_shares(position: Array, normal: Array, center: Array, lights: Array, te
                 inside += term
         sums[0, i] += inside
         sums[1, i] += whole
+
+
+LEAST_SIMILAR = 3  # of the four coarse neighbours that must be similar to a pixel
+
+
+class SimilarityLimits(NamedTuple):
+    """How far a coarse pixel's surface may differ from a pixel's."""
+
+    least_cosine: float  # between their normals
+    reach: float  # distance between their surfaces, m
+
+
+def coarse_pixels(height: int, width: int, grid: int) -> tuple[Array, Array]:
+    """Return rows and columns, rising, of the coarse pixels: the middles of grid x grid cells, at most one a pixel.
+
+    >>> coarse_pixels(8, 4, 2)[0].tolist()
+    [2, 6]
+    """
+    rows, columns = (((np.arange(min(grid, size)) + 0.5) * size / min(grid, size)).astype(np.int64)
+                     for size in (height, width))
+    return rows, columns
+
+
+def interpolate(
+    receivers: Receivers, coarse_light: Array, coarse: tuple[Array, Array], limits: SimilarityLimits
+) -> tuple[Array, Array]:
+    """Interpolate irradiance (3, h, w) between coarse pixels (rows, columns) where surfaces are similar.
+
+    Returns it, 0 where it could not be, and where it could be, (h, w) bool: three of four neighbours are similar, or
+    the pixel is a coarse one itself. Weights are bilinear and made to sum to 1 over the similar neighbours.
+    """
+    covered = np.asarray(receivers.covered)
+    result = np.zeros_like(coarse_light)
+    interpolated = np.zeros_like(covered)
+    lines = (*_neighbours(coarse[0], covered.shape[0]), *_neighbours(coarse[1], covered.shape[1]))
+    _interpolate(receivers.position, receivers.normal, coarse_light, covered, lines, limits, (result, interpolated))
+    at_coarse = np.ix_(*coarse)
+    interpolated[at_coarse] = covered[at_coarse]
+    channels = np.ix_(np.arange(3), *coarse)
+    result[channels] = coarse_light[channels]
+    return result, interpolated
+
+
+def _neighbours(coarse: Array, size: int) -> tuple[Array, Array, Array]:
+    """Return for each pixel of an axis the coarse pixels around it and the weight of the second, 0 to 1."""
+    pixel = np.arange(size)
+    first = np.clip(np.searchsorted(coarse, pixel, side="right") - 1, 0, max(0, len(coarse) - 2))
+    low, high = coarse[first], coarse[np.minimum(first + 1, len(coarse) - 1)]
+    return low, high, np.clip((pixel - low) / np.maximum(high - low, 1), 0, 1)
+
+
+@kernel(parallel=True)
+def _interpolate(
+    position: Array, normal: Array, coarse_light: Array, covered: Array, lines: Any, limits: SimilarityLimits, out: Any
+) -> None:
+    top, bottom, down, left, right, across = lines
+    result, interpolated = out
+    real = position.dtype.type
+    for i in prange(covered.shape[0]):
+        for j in range(covered.shape[1]):
+            if not covered[i, j]:
+                continue
+            total, similar = 0.0, 0
+            for corner in range(4):
+                r, c = bottom[i] if corner & 2 else top[i], right[j] if corner & 1 else left[j]
+                if covered[r, c] and _similar(position, normal, i, j, r, c, limits):
+                    weight = (down[i] if corner & 2 else 1.0 - down[i]) * (across[j] if corner & 1 else 1.0 - across[j])
+                    similar += 1
+                    total += weight
+                    for channel in range(3):
+                        result[channel, i, j] += real(weight) * coarse_light[channel, r, c]
+            interpolated[i, j] = total > 0.0 and similar >= LEAST_SIMILAR
+            for channel in range(3):
+                result[channel, i, j] = result[channel, i, j] / real(total) if interpolated[i, j] else real(0.0)
+
+
+@kernel
+def _similar(position: Array, normal: Array, i: int, j: int, r: int, c: int, limits: SimilarityLimits) -> Any:
+    cosine, square = 0.0, 0.0
+    for axis in range(3):
+        cosine += normal[axis, i, j] * normal[axis, r, c]
+        square += (position[axis, i, j] - position[axis, r, c]) ** 2
+    return cosine >= limits.least_cosine and square <= limits.reach * limits.reach

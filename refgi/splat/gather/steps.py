@@ -9,9 +9,16 @@ import numpy as np
 from refgi.pairs.irradiance import Receivers
 from refgi.rsm.buffers.extent import Extent
 from refgi.rsm.raster.projection import Projection, project
-from refgi.splat.gather import gather_sum, interpolation
-from refgi.splat.gather.gather_sum import GatherMap, disc_offsets, disc_points, fill_texels, gather_discs
-from refgi.splat.gather.interpolation import SimilarityLimits, coarse_pixels
+from refgi.splat.gather import gather_sum
+from refgi.splat.gather.gather_sum import (
+    GatherMap,
+    SimilarityLimits,
+    coarse_pixels,
+    disc_offsets,
+    disc_points,
+    fill_texels,
+    gather_discs,
+)
 from refgi.stages import stage
 from refgi.types import Array
 
@@ -95,7 +102,8 @@ def disc_sum(
     total, scale = np.zeros_like(points), real(radius**2 * texels / (math.pi * len(weight)))
     for chosen, own in zip(texel.reshape(len(weight), -1)[:, shown], weight.astype(np.float64), strict=True):
         middle = np.where(chosen < 0, -1.0, np.stack(np.divmod(chosen, flux.shape[2])) + 0.5)
-        gather_discs(points, normals, np.ascontiguousarray(middle), source, np.array([[0.0, 0.0, own]]), scale, total)
+        gather_discs(points, normals, np.ascontiguousarray(middle), source, np.array([[0.0, 0.0, own]]), scale,
+                     None, total)
     light = np.zeros((3, shown.size), real)
     light[:, shown] = total
     return light.reshape(position.shape)
@@ -131,7 +139,7 @@ def interpolate(
     """
     limits = SimilarityLimits(least_cosine, reach * extent.diagonal)
     coarse = coarse_pixels(covered.shape[0], covered.shape[1], grid)
-    result, chosen = interpolation.interpolate(Receivers(position, normal, covered), irradiance, coarse, limits)
+    result, chosen = gather_sum.interpolate(Receivers(position, normal, covered), irradiance, coarse, limits)
     return chosen, np.where(chosen, result, irradiance)
 
 

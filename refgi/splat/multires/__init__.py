@@ -1,14 +1,13 @@
 """Adaptive multiresolution splatting (Nichols and Wyman 2009): pixel lights evaluated where the picture changes.
 
-`multires` evaluates the lights of `sii` at subsplats, large where nothing changes. `refinement` lists subsplats,
-`subsplats` evaluates them and upsamples to pixels, `light_lists` refines for each light by its own irradiance and
+`multires` evaluates the lights of `sii` at subsplats, large where nothing changes: `refine` lists them, `evaluate` sums
+Eq. 2 at them, `upsample` makes pixels of them; `per_light` refines for each light by its own irradiance and
 `error_target` until an error is met. Unlike in the paper, subsplats at full resolution are not filtered.
 """
 
 from refgi.method import Method
 from refgi.splat.multires.approximations import APPROXIMATIONS, multires_ledger
-from refgi.splat.multires.lobes import multires_lobes
-from refgi.splat.multires.multires import extra_bytes, multires, shared_subsplats
+from refgi.splat.multires.multires import extra_bytes, multires, multires_lobes, shared_subsplats
 from refgi.splat.multires.settings import (
     PRESETS,
     ByError,

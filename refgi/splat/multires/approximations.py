@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from refgi.cluster.settings import ClusteredShadows
-from refgi.error_target.settings import MOST_CELLS
+from refgi.error_target.grid import MOST_CELLS
 from refgi.ledger import Ledger, account
 from refgi.lights.selection import choose_lights
 from refgi.lights.settings import (
@@ -15,6 +15,7 @@ from refgi.lights.settings import (
     OPENNESS,
     RSM_RESOLUTION,
     VISIBILITY,
+    changed,
     most_lights,
     without_clamp,
 )
@@ -58,14 +59,6 @@ def _every_pair(settings: MultiresSettings, options: Mapping[str, Any]) -> Multi
     return dataclasses.replace(settings, lightcuts=None) if many else settings
 
 
-def _undarkened(settings: MultiresSettings, _: Mapping[str, Any]) -> MultiresSettings:
-    return dataclasses.replace(settings, detail=0.0)
-
-
-def _at_pixels(settings: MultiresSettings, _: Mapping[str, Any]) -> MultiresSettings:
-    return dataclasses.replace(settings, supersampled=False)
-
-
 APPROXIMATIONS = (
     VISIBILITY._replace(about="nothing blocks indirect light, or shadows of clusters for a ray to each light",
                         off=_by_rays, limit=_ignores_visibility),
@@ -74,8 +67,8 @@ APPROXIMATIONS = (
     OPENNESS, CLAMP._replace(off=_unclamped), AMBIENT_OCCLUSION,
     Approximation("subsplats", "cells of many pixels are evaluated at one and upsampled", _every_pixel),
     Approximation("lightcuts", "clusters stand for their lights where the sum's error is bounded", _every_pair),
-    Approximation("detail", "surfaces that turn away from the camera are darkened (Eq. 3)", _undarkened),
-    Approximation("supersampling", "a pixel is the mean of four, not its centre", _at_pixels))
+    Approximation("detail", "surfaces that turn away from the camera are darkened (Eq. 3)", changed(detail=0.0)),
+    Approximation("supersampling", "a pixel is the mean of four, not its centre", changed(supersampled=False)))
 
 
 @stage("multires.ledger")
@@ -84,8 +77,6 @@ def multires_ledger(frame: "Frame", settings: MultiresSettings) -> Ledger:
 
     -> Ledger: Its lines sum to `emitted` but for the rounding of the frame's dtype.
 
-    Notes
-    -----
     Lights are summed in full, without lightcuts.
     `interpolated` is every pixel's sum less the picture before Eq. 3, and so holds twice the size and the printed
     forms of subsplats as well. It sums all lights at every pixel three times or more: on the Cornell box at 512 x 512

@@ -8,7 +8,7 @@ import math
 from typing import ClassVar, Literal
 
 from refgi.cluster.settings import ClusteredShadows, ValSettings
-from refgi.error_target.settings import LEAST_TARGET, MOST_CELLS, ErrorTarget
+from refgi.error_target.grid import LEAST_TARGET, MOST_CELLS, ErrorTarget
 from refgi.errors import expect
 from refgi.lights.settings import OCCLUSION, LightSettings, MapLights, Openness, clamped_pairs, expect_footprints
 from refgi.pairs.settings import (

@@ -13,6 +13,7 @@ from refgi.lights.settings import (
     OPENNESS,
     RSM_RESOLUTION,
     VISIBILITY,
+    changed,
     every_light,
     most_lights,
     with_clamp,
@@ -40,16 +41,8 @@ def _uncut(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
     return dataclasses.replace(settings, reach=dataclasses.replace(settings.reach, cut=None, seed=0))
 
 
-def _full_resolution(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
-    return dataclasses.replace(settings, half_resolution=False)
-
-
 def _unclamped(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
     return replaced(settings, {"pairs.clamp": "none", "compensation": "none"})
-
-
-def _full_precision(settings: SiiSettings, _: Mapping[str, Any]) -> SiiSettings:
-    return dataclasses.replace(settings, quantisation="none")
 
 
 def _every_pair(settings: SiiSettings, options: Mapping[str, Any]) -> SiiSettings:
@@ -63,8 +56,10 @@ APPROXIMATIONS = (
     AMBIENT_OCCLUSION,
     Approximation("cut", "pairs whose irradiance is below a threshold are left out", _uncut),
     Approximation("lightcuts", "clusters stand for their lights where the sum's error is bounded", _every_pair),
-    Approximation("storage", "half floats and 8 bits for the buffers of lights and receivers", _full_precision),
-    Approximation("upsampling", "one pixel of 2 x 2 is evaluated, the others are upsampled", _full_resolution))
+    Approximation("storage", "half floats and 8 bits for the buffers of lights and receivers",
+                  changed(quantisation="none")),
+    Approximation("upsampling", "one pixel of 2 x 2 is evaluated, the others are upsampled",
+                  changed(half_resolution=False)))
 
 
 @stage("sii.ledger")
@@ -73,8 +68,6 @@ def sii_ledger(frame: "Frame", settings: SiiSettings) -> Ledger:
 
     -> Ledger: Its lines sum to `emitted` but for the rounding of the frame's dtype.
 
-    Notes
-    -----
     Lights are summed in full, without lightcuts.
     On the Cornell box at 512 x 512 it takes six times as long as the picture.
     """

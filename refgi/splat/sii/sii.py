@@ -1,4 +1,4 @@
-"""Splatting Indirect Illumination (Dachsbacher and Stamminger 2006): the method and its sum.
+"""Splatting Indirect Illumination (Dachsbacher and Stamminger 2006): the method, its sum, lobes of glossy receivers.
 
 `sii` chooses pixel lights and adds each one's irradiance to the pixels where it is significant (Eq. 2, Sec. 3). The
 paper draws a bound of each light and lights the pixels it covers. Here the bound lists lights for tiles of pixels, and
@@ -9,25 +9,33 @@ Symbols: B = I(w) / r^2 (W/m^2), the irradiance a light causes at most, I_low th
 """
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from refgi.lights.ambient_occlusion import occluded
-from refgi.lights.selection import choose_lights, footprints
+from refgi.lights.selection import choose_lights, footprints, occluded
 from refgi.lights.settings import with_clamp
 from refgi.pairs.estimates import report_sampling, thinned, warn_of_clamp
-from refgi.pairs.irradiance import Receivers, checked, irradiance, over_receivers
-from refgi.pairs.lightcuts.choice import for_lights
+from refgi.pairs.irradiance import (
+    Receivers,
+    as_receivers,
+    checked,
+    glossy_radiance,
+    glossy_summed,
+    irradiance,
+    over_receivers,
+)
+from refgi.pairs.lightcuts.cuts import for_lights
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.ranged_sum import LANES, sum_pairs_in_range, sum_weighted_pairs
 from refgi.pairs.settings import GeometryClamp
 from refgi.pairs.sphere_sum import sum_spheres
-from refgi.splat.sii.half_resolution import half_resolution
-from refgi.splat.sii.reach.lists import EVERY, LightLists, Some, listed_pairs
-from refgi.splat.sii.reach.threshold import warn_of_cut, with_reference_length
-from refgi.splat.sii.settings import SiiSettings
-from refgi.splat.sii.storage import as_stored
+from refgi.rsm.buffers.leaving import GlossyPoints, spread_over_picture
+from refgi.settings import replaced
+from refgi.splat.sii.lists import EVERY, LightLists, Some, listed_pairs
+from refgi.splat.sii.options import as_stored, half_resolution
+from refgi.splat.sii.settings import FullBound, SiiSettings, TangentBound
+from refgi.splat.sii.threshold import warn_of_cut, with_reference_length
 from refgi.stages import skip, stage, tally
 from refgi.types import Array
 
@@ -74,7 +82,7 @@ def sii(frame: "Frame", settings: SiiSettings) -> Array:
                     all_summed=settings.lightcuts is None)
     clamp = settings.pairs.clamp
     if settings.compensation == "screen" and isinstance(clamp, GeometryClamp) and clamp.value is not None:
-        from refgi.splat.sii.compensation import screen_compensation  # hssil's levels, which no other sii needs
+        from refgi.splat.sii.options import screen_compensation  # hssil's levels, which no other sii needs
 
         depth, normal, albedo = frame.gbuffer.resolve("depth", "normal", "albedo")
         light = light + screen_compensation(depth, normal, albedo, frame.direct, frame.gbuffer.projection, clamp.value)
@@ -117,16 +125,7 @@ def splat(
     return _splat(receivers, lights, settings, footprint, projection)
 
 
-def _splat_steps(
-    receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None,
-    projection: "Projection | None",  # noqa: ARG001 bounds change no bit
-) -> Array:
-    from refgi.splat.sii.reach.steps import splat_steps
-
-    return splat_steps(receivers, lights, settings, footprint)
-
-
-@stage("sii.splat", steps=_splat_steps)
+@stage("sii.splat", steps="refgi.splat.sii.steps.splat_steps")
 def _splat(
     receivers: Receivers, lights: "PixelLights", settings: SiiSettings, footprint: Array | None,
     projection: "Projection | None",
@@ -163,38 +162,78 @@ def sum_in_range(
     packed = checked(receivers, lights, settings.pairs, footprint)
     settings = with_reference_length(receivers, lights, settings)
     lists = LightLists(packed, settings, outside, receivers.covered.shape[1], projection)
-    weighted = outside or settings.reach.stochastic
+    run = sum_weighted_pairs if outside or settings.reach.stochastic else sum_pairs_in_range
 
     def add(here: Array, facing: Array, places: Array, sums: Array) -> None:
         if lists.diffuse is not None and packed.spheres is not None:
             tally("pairs", lambda: here.shape[1] * np.count_nonzero(packed.shines))
             sum_spheres(here, facing, packed.diffuse, packed.spheres, lists.diffuse, sums)
         elif lists.diffuse is not None:
-            run = sum_weighted_pairs if weighted else sum_pairs_in_range
             for some, listed in lists.of_diffuse(here, facing, places):
-                if some is EVERY:  # all at once, into what holds nothing yet
-                    _tally(listed, LANES, sums)
-                    run(here, facing, packed.diffuse, packed.clamp, lists.diffuse, listed, sums)
-                    continue
-                points, normals, found = _chosen(some, here, facing)
-                _tally(listed, LANES, found)
-                run(points, normals, packed.diffuse, packed.clamp, lists.diffuse, listed, found)
-                sums[:, some] += found
+                add_listed(run, here, facing, (packed.diffuse, packed.clamp, lists.diffuse), some, listed, sums)
         if packed.lobes is not None:
             for some, listed in lists.of_lobes(here, facing, places):
-                points, normals, found = _chosen(some, here, facing)
-                _tally(listed, LANES, found)
-                add_lobes(points, normals, *packed.lobes, lists.lobes, listed, found)
-                sums[:, some] += found
+                add_listed(add_lobes, here, facing, (*packed.lobes, lists.lobes), some, listed, sums)
+
+    def add_listed(
+        kernel: Any, here: Array, facing: Array, read: tuple[Any, ...], some: Some, listed: Array, sums: Array
+    ) -> None:
+        points, normals = (np.ascontiguousarray(part[:, some]) for part in (here, facing))
+        found = sums if some is EVERY else np.zeros_like(points)
+        tally("pairs", lambda: listed_pairs(listed, LANES, found.shape[1]))
+        kernel(points, normals, *read, listed, found)
+        if found is not sums:
+            sums[:, some] += found
 
     return over_receivers(receivers, packed, add)
 
 
-def _tally(listed: Array, lanes: int, found: Array) -> None:
-    tally("pairs", lambda: listed_pairs(listed, lanes, found.shape[1]))
+def sii_lobes(frame: "Frame", settings: SiiSettings) -> Array:
+    """Return the radiance towards the eye that receivers' lobes make of the pixel lights of `sii`.
+
+    (3, h, w), W/m^2/sr, linear RGB, without visibility; 0 where there is no lobe. Every glossy pixel sums all lights,
+    one by one, whatever `half_resolution` and `lightcuts` say of irradiance. A cut leaves out the same pairs as from
+    the irradiance: its threshold is of the irradiance that a light causes at most, and knows nothing of the receiver's
+    lobe. Lights are as `quantisation` stores them; glossy pixels, which the paper has none of, keep their floats.
+    """
+    settings = with_clamp(settings)
+    receivers, lights = as_stored(Receivers(*frame.gbuffer.resolve("position", "normal", "covered")),
+                                  choose_lights(frame, settings.lights), settings)
+    footprint = footprints(frame, settings.lights, settings.pairs)
+    points = frame.glossy_points
+    if settings.reach.cut is None:
+        radiance = glossy_radiance(points, lights, settings.pairs, footprint, frame.width)
+    else:
+        resolved = with_reference_length(receivers, lights, settings)
+        radiance = glossy_in_range(points, lights, resolved, footprint, frame.width)
+    return spread_over_picture(points, radiance, (frame.height, frame.width))
 
 
-def _chosen(some: Some, here: Array, facing: Array) -> tuple[Array, Array, Array]:
-    """Return positions, normals and zeros (3, m) for some of the receivers."""
-    points, normals = (np.ascontiguousarray(part[:, some]) for part in (here, facing))
-    return points, normals, np.zeros_like(points)
+@stage("sii.glossy_sum")
+def glossy_in_range(
+    points: GlossyPoints, lights: "PixelLights", settings: SiiSettings, footprint: Array | None = None, width: int = 0,
+) -> Array:
+    """Sum the radiance that lobes make of the pairs with B >= I_low (SII Sec. 3.4).
+
+    settings: The parts `reach`, with its reference length, and `pairs`; the bound does not matter.
+    width: As for `glossy_radiance`.
+    -> (3, n): W/m^2/sr, linear RGB.
+    """
+    packed = checked(as_receivers(points), lights, settings.pairs, footprint)
+    if settings.reach.on_screen:  # receivers come as a list, not as a picture
+        settings = replaced(settings, {"reach.bound": TangentBound()})
+    lists = LightLists(packed, settings, False, 1, None)
+    ranges = lists.diffuse, lists.lobes
+    if isinstance(settings.reach.bound, FullBound):
+        return glossy_summed(points, packed, ranges, width)
+
+    def listed(position: Array, normal: Array) -> tuple[Array | None, Array | None]:
+        diffuse = lobes = None
+        places = np.arange(position.shape[1])
+        if lists.diffuse is not None and packed.spheres is None:  # spheres reach over their horizon
+            ((_, diffuse),) = lists.of_diffuse(position, normal, places)
+        if lists.lobes is not None:
+            ((_, lobes),) = lists.of_lobes(position, normal, places)
+        return diffuse, lobes
+
+    return glossy_summed(points, packed, ranges, width, listed)

@@ -4,8 +4,8 @@ from functools import partial
 
 import numpy as np
 
-from refgi.splat.sii.reach.steps import ellipsoids
 from refgi.splat.sii.settings import SiiSettings
+from refgi.splat.sii.steps import ellipsoids
 from refgi.vectors.cases import sii
 from refgi.vectors.cases.scenes import AWAY, DOWN, SPOT, SUN, Plan, Plans, cases_of, recorded_plan, room
 from refgi.vectors.recipe import Recipe

@@ -6,7 +6,7 @@ import numpy as np
 
 from refgi.literal import gather
 from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, PERSPECTIVE, Projection, project
-from refgi.splat.gather.interpolation import LEAST_SIMILAR, coarse_pixels
+from refgi.splat.gather.gather_sum import LEAST_SIMILAR, coarse_pixels
 from refgi.types import Array
 from refgi.vectors.forms.beside import Arguments, Described, form_of, own
 

@@ -6,16 +6,13 @@ import pytest
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.pixel_lights import PixelLights
 from refgi.pairs.settings import DiscClamp, DistanceClamp, GeometryClamp
+from tests.pairs.sets import unit
 
 CLAMPS = {"none": None, "disc": DiscClamp(), "distance": DistanceClamp(0.15), "geometry": GeometryClamp(8.0)}
 NAMES = ("cube", "floor", "corner", "ball", "coincident", "tiny", "far", "wide", "colours", "uneven", "dim")
 # each scene with two clamps, each clamp with half of the scenes; the others are slow
 GRID = [pytest.param(name, clamp, marks=[] if (i - j) % 4 < 2 else [pytest.mark.slow])
         for i, name in enumerate(NAMES) for j, clamp in enumerate(CLAMPS)]
-
-
-def unit(vectors):
-    return vectors / np.linalg.norm(vectors, axis=0)
 
 
 def scene(name, lights, receivers, seed=0, dtype=np.float32):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from refgi.pairs.lightcuts.bounds import bound_group, fill_errors
+from refgi.pairs.lightcuts.groups import bound_group, fill_errors
 from refgi.pairs.lightcuts.tree import BOUND_ROWS, FAN, SOFT, block_of, light_tree
-from refgi.pairs.packing import pack
 from refgi.pairs.pair_sum import ROWS, TILE
+from refgi.pairs.pixel_lights import pack
 from refgi.pairs.settings import PairSettings
 from tests.naive import lightcuts as naive
 from tests.pairs.lightcuts.scenes import CLAMPS, GRID, NAMES, scene

@@ -8,11 +8,11 @@ import pytest
 from refgi.diagnostics import diagnosing
 from refgi.jit import threads
 from refgi.pairs.irradiance import Receivers, irradiance
-from refgi.pairs.lightcuts import choice
+from refgi.pairs.lightcuts import cuts as choice
 from refgi.pairs.lightcuts.cuts import sum_groups
 from refgi.pairs.lightcuts.groups import group_receivers
 from refgi.pairs.lightcuts.tree import light_tree
-from refgi.pairs.packing import pack
+from refgi.pairs.pixel_lights import pack
 from refgi.pairs.settings import AutoLightcuts, Lightcuts, PairSettings, SphereClamp
 from refgi.pairs.tile_counts import tiles_behind
 from refgi.pairs.tiles import block_by_block, taken

@@ -10,8 +10,8 @@ from refgi.jit import threads
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.lightcuts.groups import LANES, group_receivers
 from refgi.pairs.lightcuts.tree import FAN, level_starts, light_tree
-from refgi.pairs.packing import pack
 from refgi.pairs.pair_sum import TILE
+from refgi.pairs.pixel_lights import pack
 from refgi.pairs.settings import Lightcuts, PairSettings, SphereClamp
 from refgi.stages import observe
 from tests.naive import lightcuts as naive

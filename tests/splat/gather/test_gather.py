@@ -12,8 +12,7 @@ from refgi.scene import DirectionalLight, PointLight, load_scene
 from refgi.settings import of
 from refgi.splat import GatherSettings, Receivers, SiiSettings, gather, sii
 from refgi.splat.gather.gather import gather_counted, gather_irradiance
-from refgi.splat.gather.gather_sum import disc_pattern
-from refgi.splat.gather.interpolation import SimilarityLimits, coarse_pixels, interpolate
+from refgi.splat.gather.gather_sum import SimilarityLimits, coarse_pixels, disc_pattern, interpolate
 from tests.literal.whole import gather as naive
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss

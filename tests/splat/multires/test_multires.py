@@ -17,12 +17,12 @@ from refgi.method import Extent
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, PointLight, load_scene
 from refgi.settings import changed, leaves, of, replaced
-from refgi.splat import MultiresSettings, Receivers, irradiance, multires, shared_subsplats
+from refgi.splat import MultiresSettings, multires, shared_subsplats
 from refgi.splat.multires import ByError
 from refgi.splat.multires.multires import halved, light_areas
 from refgi.splat.multires.settings import PRESETS
 from refgi.stages import observe
-from tests.splat.multires.choices import only
+from tests.splat.multires.choices import frame_of, full_sum, only
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
 
@@ -32,19 +32,14 @@ DEMO_CLAMP = {"clamp": "distance", "clamp_value": math.sqrt(0.2)}  # r^2 >= 0.2 
 FLOORS = {"tent": 0.10, "demo": 0.10, "nearest": 0.15, "naive_bilinear": 1.0}
 
 
-def frame(name="cornell_box", width=61, height=45, **options):
-    return Frame(load_scene(name), width=width, height=height, **{"rsm_resolution": 64} | options)
-
-
-def full_sum(at, settings):
-    receivers = Receivers(*at.gbuffer.resolve("position", "normal", "covered"))
-    pairs = settings.effective_pairs
-    return irradiance(receivers, choose_lights(at, settings.lights), pairs, footprints(at, settings.lights, pairs))
+def whole(at, settings):
+    return full_sum(at.gbuffer, choose_lights(at, settings.lights), settings,
+                    footprints(at, settings.lights, settings.effective_pairs))
 
 
 @pytest.fixture(scope="module")
 def box():
-    return frame()
+    return frame_of(width=61, height=45)
 
 
 @pytest.mark.parametrize("change", [{}, {"clamp": "disc"}, {"pattern": "halton", "warp": "A"}, DEMO_CLAMP])
@@ -52,7 +47,7 @@ def box():
 def test_all_pixels_as_subsplats_are_the_full_sum(box, change, evidence):
     """Limit: with as many coarsest cells as pixels nothing is interpolated, and no bit differs."""
     settings = of(MultiresSettings, lights=64, coarsest=4096, **change)
-    np.testing.assert_array_equal(multires(box, settings), full_sum(box, settings))
+    np.testing.assert_array_equal(multires(box, settings), whole(box, settings))
     evidence(f"every pixel a subsplat, {change or 'defaults'}: the bits of the full sum")
 
 
@@ -60,23 +55,10 @@ def test_all_pixels_as_subsplats_are_the_full_sum(box, change, evidence):
 def test_fewer_subsplats_come_near_the_full_sum(box, mode):
     """Picture: on the box with the demo's clamp; the naive modes stay far (Fig. 7)."""
     settings = of(MultiresSettings, lights=64, upsampling=mode, **DEMO_CLAMP)
-    covered, full = box.gbuffer.covered, full_sum(box, settings).astype(float)
+    covered, full = box.gbuffer.covered, whole(box, settings).astype(float)
     off = np.sqrt(((multires(box, settings) - full)[:, covered] ** 2).mean()) / full[:, covered].mean()
     assert len(shared_subsplats(box.gbuffer, settings.subsplats).level) < 0.7 * covered.sum()
     assert off < FLOORS[mode]
-
-
-def test_a_supersampled_picture_is_the_mean_of_four(box):
-    """Oracle: the method at twice the size, averaged over what shows a surface; uncovered pixels stay black."""
-    settings = of(MultiresSettings, lights=64, **DEMO_CLAMP)
-    large = frame(width=122, height=90)
-    light, covered = multires(large, settings).astype(float), large.gbuffer.covered
-    four = covered.reshape(45, 2, 61, 2).sum(axis=(1, 3))
-    mean = light.reshape(3, 45, 2, 61, 2).sum(axis=(2, 4)) / np.maximum(four, 1)
-    got = multires(box, replaced(settings, {"supersampled": True}))
-    inside = box.gbuffer.covered & (four > 0)
-    np.testing.assert_allclose(got[:, inside], mean[:, inside], rtol=3e-7)  # one rounding of a mean of four
-    assert not got[:, ~box.gbuffer.covered].any()
 
 
 @pytest.mark.feature("REF-20")
@@ -123,7 +105,7 @@ def test_the_demos_disc_is_pi_over_its_frustum(box, evidence):
 @pytest.mark.parametrize("size", [(1, 1), (1, 13), (17, 1), (2, 3), (33, 31)])
 @pytest.mark.parametrize("real", [np.float32, np.float64])
 def test_odd_sizes_and_thread_counts(size, real):
-    at = frame(width=size[0], height=size[1], rsm_resolution=16, dtype=real)
+    at = frame_of(width=size[0], height=size[1], rsm_resolution=16, dtype=real)
     settings = of(MultiresSettings, lights=16, rim=1)
     light = multires(at, settings)
     assert light.shape == (3, size[1], size[0])
@@ -149,9 +131,9 @@ def test_nothing_to_see_is_black():
     ("ring", (200, 200), {"lights": 4, "subsplats": ByError(0.01, 1)})])
 def test_cells_that_look_dark_do_not_hold_an_error_up(scene, size, change):
     """Limit: where samples have irradiance but no cell that could be split, every pixel is evaluated in the end."""
-    at = frame(scene, *size, rsm_resolution=16)
+    at = frame_of(scene, *size, rsm_resolution=16)
     settings = of(MultiresSettings, **change)
-    full, covered = full_sum(at, settings).astype(float), at.gbuffer.covered
+    full, covered = whole(at, settings).astype(float), at.gbuffer.covered
     off = np.sqrt(((multires(at, settings) - full)[:, covered] ** 2).mean())
     assert off <= settings.subsplats.target * full[:, covered].mean()
 
@@ -182,10 +164,10 @@ def test_near_pairs_are_clamped_where_that_is_possible(box, change, clamp):
 
 def test_the_default_clamp_keeps_subsplats_near_the_full_sum():
     """Picture: light beside lights grows without bound, and no coarse subsplat can follow it (Fig. 13)."""
-    at, off = frame(width=96, height=96, rsm_resolution=256), {}
+    at, off = frame_of(width=96, height=96, rsm_resolution=256), {}
     for clamp in ("auto", "none"):
         settings = of(MultiresSettings, clamp=clamp)
-        light, full = multires(at, settings).astype(float), full_sum(at, settings).astype(float)
+        light, full = multires(at, settings).astype(float), whole(at, settings).astype(float)
         off[clamp] = np.sqrt(((light - full)[:, at.gbuffer.covered] ** 2).mean()) / full[:, at.gbuffer.covered].mean()
     assert off["auto"] < FLOORS["tent"]
     assert off["none"] > 2 * off["auto"]
@@ -233,7 +215,7 @@ def test_the_table_of_methods_knows_it():
     ({}, True), (only("normal"), False), ({"subsplats": ByError(0.1)}, False), ({"subsplats": "irradiance"}, False)])
 def test_depth_is_computed_only_where_a_criterion_looks_at_it(change, asked):
     """Skip: the light is the same to the bit with the depth resolved beforehand."""
-    at, other = frame(width=33, height=20), frame(width=33, height=20)
+    at, other = frame_of(width=33, height=20), frame_of(width=33, height=20)
     settings = of(MultiresSettings, lights=16, **change)
     light = multires(at, settings)
     assert ("depth" in at.gbuffer._channels) == asked

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from refgi.frame import Frame
-from refgi.lights.footprints import with_equal_solid_angles
 from refgi.lights.selection import choose_lights
+from refgi.lights.shares import with_equal_solid_angles
 from refgi.rsm.buffers.solid_angle import texel_solid_angles
 from refgi.rsm.raster.projection import PERSPECTIVE, Projection, spot_projection
 from refgi.scene import PointLight, SpotLight, load_scene
@@ -20,6 +20,7 @@ from refgi.stages import observe
 from tests.literal.whole import multires as literal
 from tests.literal.whole.pairs import irradiance_of
 from tests.naive import eq2
+from tests.splat.multires.choices import frame_of, relative_error
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
 
@@ -31,21 +32,16 @@ TEXEL = 0.02  # of the ratio at the rim: a texel there spans about a hundredth o
 
 @pytest.fixture(scope="module")
 def atrium():
-    return Frame(load_scene("atrium:faces=10000"), width=128, height=128, rsm_resolution=128)
+    return frame_of("atrium:faces=10000", 128, 128, rsm_resolution=128)
 
 
 @pytest.fixture(scope="module")
 def box():
-    return Frame(load_scene("cornell_box"), width=24, height=20, rsm_resolution=128)
+    return frame_of(width=24, height=20, rsm_resolution=128)
 
 
 def subsplats(frame, **changes):
     return len(shared_subsplats(frame.gbuffer, of(MultiresSettings, **changes).subsplats).pixel)
-
-
-def rmse(image, reference, covered):
-    off = (image.astype(np.float64) - reference)[:, covered]
-    return 100 * math.sqrt((off**2).mean()) / reference[:, covered].mean(dtype=np.float64)
 
 
 def clamped(frame, share=0.02, **changes):
@@ -65,11 +61,11 @@ def test_lights_stand_on_texel_centres_of_a_fixed_grid(box, evidence):
         assert np.isin(column, grid).all()
         assert len(np.unique(lights.texel)) == len(lights.texel) == lights.flux.any(axis=0).sum()
         assert lights.drawn == n * n
-        found.append(rmse(multires(box, clamped(box, lights=n * n, coarsest=EVERY_PIXEL)), every, covered))
+        found.append(relative_error(multires(box, clamped(box, lights=n * n, coarsest=EVERY_PIXEL)), every, covered))
     assert found == sorted(found, reverse=True)
     assert found[-1] == 0
     evidence("RMSE to the sum over 128² texels: "
-             + ", ".join(f"{n}² lights {off:.2g} %" for n, off in zip((16, 32, 64, 128), found, strict=True)))
+             + ", ".join(f"{n}² lights {100 * off:.2g} %" for n, off in zip((16, 32, 64, 128), found, strict=True)))
 
 
 @pytest.mark.feature("AMS-15")
@@ -87,7 +83,7 @@ def test_supersampled_is_the_mean_of_four_pixels(box, evidence):
     assert not got[:, ~box.gbuffer.covered].any()
     plain = multires(box, replaced(settings, {"supersampled": False}))
     evidence(f"equal to means of four to {np.abs(got[:, both] / mean[:, both] - 1).max():.0e}; differs from one "
-             f"sample a pixel by {rmse(got, plain, both):.1f} % of the mean")
+             f"sample a pixel by {100 * relative_error(got, plain, both):.1f} % of the mean")
 
 
 class Map(NamedTuple):
@@ -169,10 +165,11 @@ def test_cost_and_error_over_the_normal_threshold(atrium, evidence):
     saved = {side: row[0] - row[-1] for side, row in counts.items()}
     assert saved[32] < 0.1 * saved[128]
     assert saved[64] < 0.25 * saved[128]
-    off = [rmse(multires(atrium, clamped(atrium, lights=64, normal_threshold=t)), full, covered) for t in THRESHOLDS]
+    off = [relative_error(multires(atrium, clamped(atrium, lights=64, normal_threshold=t)), full, covered)
+           for t in THRESHOLDS]
     assert off == sorted(off)
     evidence("thresholds " + ", ".join(map(str, THRESHOLDS)) + "; subsplats at 128²: "
-             + ", ".join(map(str, counts[128])) + "; RMSE: " + ", ".join(f"{value:.1f} %" for value in off)
+             + ", ".join(map(str, counts[128])) + "; RMSE: " + ", ".join(f"{100 * value:.1f} %" for value in off)
              + "; saved at 16², 32², 64² of what is saved at 128²: "
              + ", ".join(f"{saved[side] / saved[128]:.1%}" for side in (16, 32, 64)))
 

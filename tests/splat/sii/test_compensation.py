@@ -14,7 +14,7 @@ from refgi.frame import Frame
 from refgi.scene import Camera, DirectionalLight, Scene, merge
 from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
-from refgi.splat.sii.compensation import _within
+from refgi.splat.sii.options import _within
 from tests.form_factors import polygon_form_factor
 from tests.truth.scenes import rectangle
 

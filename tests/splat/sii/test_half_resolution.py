@@ -9,7 +9,7 @@ from refgi.literal.upsampling import joint_bilateral
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
-from refgi.splat.sii.half_resolution import _block_pixels, half_resolution
+from refgi.splat.sii.options import _block_pixels, half_resolution
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 

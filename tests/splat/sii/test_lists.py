@@ -11,7 +11,7 @@ from refgi.pairs.ranged_sum import LANES, reached, sum_pairs_in_range
 from refgi.scene import load_scene
 from refgi.settings import from_text
 from refgi.skips import count_skips, without_skip
-from refgi.splat.sii.lobes import glossy_in_range
+from refgi.splat.sii.sii import glossy_in_range
 from tests.pairs.sets import random_directions
 
 pytestmark = pytest.mark.filterwarnings("ignore::refgi.errors.RefgiWarning")

@@ -15,7 +15,7 @@ from refgi.scene import Camera, DirectionalLight, Scene, merge
 from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.approximations import sii_ledger
-from refgi.splat.sii.reach.fragments import fragments
+from refgi.splat.sii.fragments import fragments
 from tests.form_factors import polygon_form_factor
 from tests.naive import eq2
 from tests.truth.scenes import rectangle

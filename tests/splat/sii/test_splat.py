@@ -16,11 +16,11 @@ from refgi.pairs.ranged_sum import LANES, range_factor
 from refgi.scene import Geometry, Material, load_scene, merge
 from refgi.settings import of, replaced
 from refgi.splat import PairSettings, Receivers, irradiance
-from refgi.splat.sii.reach.bounds import covered_pixels, light_solids, screen_quads
-from refgi.splat.sii.reach.fragments import fragments, gather_bits
-from refgi.splat.sii.reach.threshold import low_irradiance
+from refgi.splat.sii.bounds import covered_pixels, light_solids, screen_quads
+from refgi.splat.sii.fragments import fragments, gather_bits
 from refgi.splat.sii.settings import SiiSettings
 from refgi.splat.sii.sii import cut_irradiance, splat
+from refgi.splat.sii.threshold import low_irradiance
 from tests import lamps
 from tests.naive import bounds as naive
 from tests.naive.radiometry import lobe_fraction

@@ -11,7 +11,7 @@ from refgi.lights.selection import choose_lights
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
-from refgi.splat.sii.storage import stored_lights, stored_surface
+from refgi.splat.sii.options import stored_lights, stored_surface
 from tests.lamps import corner
 from tests.literal.whole.sii import stored
 from tests.naive import storage

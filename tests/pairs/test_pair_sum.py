@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from refgi.errors import InputError
 from refgi.jit import threads
+from refgi.literal import pairs as literal
 from refgi.pairs.packing import pack_diffuse
 from refgi.pairs.pair_sum import GROUP, TILE, geometry_term, sum_pairs
 from refgi.pairs.tiles import bound_tile, lights_in_reach
 from refgi.settings import of
 from refgi.splat import PairSettings, Receivers, irradiance
-from tests.naive import eq2
 from tests.pairs import sets
 
 PLAIN = PairSettings()
@@ -33,9 +33,8 @@ def summed(receivers, lights, settings=PLAIN, footprint=None):
 def test_sum_is_that_of_the_twin(real, evidence):
     rng = np.random.default_rng(1)
     receivers, lights = sets.room(rng, 37, real)
-    args = (part[:, 0].astype(np.float64) for part in receivers[:2])
-    twin = sets.lights(*(part.astype(np.float64) for part in lights[:3]))
-    expected = eq2.irradiance(*args, twin)
+    to, of_lights = ([part.astype(np.float64) for part in parts] for parts in (receivers[:2], lights[:3]))
+    expected = literal.irradiance(*to, np.zeros((1, 37)), *of_lights)[:, 0]
     got = summed(receivers, lights)
     assert not got[expected == 0].any()
     error = np.abs(got - expected)[expected > 0].max() / expected.mean()

@@ -16,8 +16,8 @@ import OpenEXR
 from benchmarks.stability.file_formats import Format, read_scene
 from refgi.errors import InputError
 from refgi.image.picture import read_colour
-from refgi.vectors.bugfile import BugEntry, BugWriter, Told
 from refgi.vectors.check import Asked, Kit, check_output
+from refgi.vectors.manifest import BugEntry, BugWriter, Told
 from tests.scene.samples import FACES, TRIANGLES
 from tests.scene.test_gltf_pose import File
 from tests.scene.test_ply_files import ply

@@ -90,7 +90,7 @@ def _rendered(session: Session, job: "Job", files: "Pictures", again: str | None
     kept = stages.Memory() if job.still is not None else None  # frames of a resting scene share their buffers
     engine = None
     if options["engine"] == "literal":
-        from refgi.vectors.engine import Literal
+        from refgi.vectors.recorded import Literal
 
         engine = Literal()
     with on_threads(options["threads"]), progress() as tell, stages.observe(

@@ -10,7 +10,7 @@ from click.core import ParameterSource
 from refgi.cli.options import seen, shadows, speech
 from refgi.cli.session import Session, progress, say, table
 from refgi.cli.settings import preset
-from refgi.vectors.options import OPTIONS
+from refgi.vectors.report import OPTIONS
 
 if TYPE_CHECKING:
     from refgi.vectors.manifest import KitManifest

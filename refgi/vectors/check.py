@@ -14,11 +14,20 @@ import numpy as np
 from refgi.errors import InputError
 from refgi.types import Array
 from refgi.vectors.bounds import MOST_SPARED, distance, large_value
-from refgi.vectors.bugfile import BugEntry, Bugs
 from refgi.vectors.causes import EXPLAINED, Difference, explain, explained, places_of
 from refgi.vectors.judge import Judged, judge, judge_estimate, unlike
 from refgi.vectors.kit import Asked, DamagedError, Kit, fits, places_of_case
-from refgi.vectors.manifest import ArrayVerdict, CaseManifest, Cause, Result, StageEntry, StageVerdict, Verdict
+from refgi.vectors.manifest import (
+    ArrayVerdict,
+    BugEntry,
+    Bugs,
+    CaseManifest,
+    Cause,
+    Result,
+    StageEntry,
+    StageVerdict,
+    Verdict,
+)
 from refgi.vectors.port import IN_ORDER, Got, Port
 from refgi.vectors.report import (
     CAUSES,

@@ -11,8 +11,7 @@ import numpy as np
 
 from refgi.errors import InputError, shortened
 from refgi.types import Array
-from refgi.vectors.bugfile import BUGS, Bugs
-from refgi.vectors.manifest import KIT, CaseManifest, KitManifest, read_model
+from refgi.vectors.manifest import BUGS, KIT, Bugs, CaseManifest, KitManifest, read_model
 from refgi.vectors.storage import Depth
 
 MAGIC = b"\x93NUMPY"

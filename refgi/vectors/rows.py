@@ -15,7 +15,7 @@ import dataclasses
 import functools
 import inspect
 import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import resources
 from typing import Any, NamedTuple
@@ -99,15 +99,18 @@ def called_by(function: Any) -> tuple[Function, ...]:
     return tuple(found)
 
 
-def _literal_names(function: Function) -> Iterator[Function]:
-    """Yield the functions of refgi.literal that a function names."""
+@functools.cache
+def _literal_names(function: Function) -> tuple[Function, ...]:
+    """Return the functions of refgi.literal that a function names."""
+    found = []
     for node in ast.walk(ast.parse(code_of(function))):
         known = function.__globals__.get(node.id) if isinstance(node, ast.Name) else None
         value = inspect.unwrap(known) if callable(known) else known  # of functools.cache
         if isinstance(value, Function) and value.__module__.startswith(PACKAGE):
-            yield value
+            found.append(value)
         if isinstance(known, types.ModuleType) and known.__name__.startswith(PACKAGE):
             raise StaleEditError(f"{_name(function)}: expected names of functions, got {known.__name__}")
+    return tuple(found)
 
 
 @functools.cache

@@ -19,8 +19,7 @@ from refgi.vectors.cases.scenes import SPOT, room
 from refgi.vectors.check import Asked, Kit, check_output
 from refgi.vectors.export import export_kit
 from refgi.vectors.manifest import CASE, SCHEMAS, VERSION, CaseManifest, KitManifest, read_model, schema_text
-from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Bug, Spec, axes_of, expected_of, kind_of
+from refgi.vectors.spec import Bug, Recipe, Spec, axes_of, expected_of, kind_of
 from tests.vectors import kit_hashes
 
 LARGEST = 20e6  # bytes of the quick kit

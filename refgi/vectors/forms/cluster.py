@@ -1,15 +1,16 @@
-"""Literal forms of stages of clustered visibility: area lights, maps, light."""
+"""Literal forms of stages of clustered visibility: area lights, their maps and light, visibility by the maps."""
 
 from typing import Any
 
 import numpy as np
 
 from refgi.cluster.settings import GeometryBlur
-from refgi.literal import val_areas, val_filters, val_maps
+from refgi.literal import val_areas, val_back_projection, val_filters, val_maps, val_series, val_visibility
 from refgi.rsm.buffers.extent import SAMPLES
-from refgi.vectors.forms import visibility
-from refgi.vectors.forms.beside import BY_INVERSE, Arguments, Described, alone, form_of, ids, own, written
+from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, ids, own, written
+from refgi.vectors.forms.lights import RECEIVERS, clamp_of, unknown
 from refgi.vectors.rows import Form
+from refgi.vectors.spec import Arrays, Run
 
 MESH = {"vertices": "geometry.vertices", "faces": "geometry.faces"}
 BOXES = {name: (f"{name}.low", f"{name}.high") for name in ("visible", "illuminated")}
@@ -87,17 +88,12 @@ def interleaving(arguments: Arguments) -> Described:
 
 def parts(arguments: Arguments) -> Described:
     """Return the light of clusters without clamp or with discs."""
-    pairs = arguments["pairs"]
-    clamp = "none" if pairs.clamp is None else pairs.clamp.name()
-    plain = pairs.offset == 0 and not pairs.as_published and pairs.lobe.norm == "clamped" and not pairs.lobe.widening
-    exact, facts = ("receivers.position", "light_position"), {"clamp": clamp}
-    if clamp not in ("none", "disc") or not plain:
+    exact, facts = ("receivers.position", "light_position"), {"clamp": clamp_of(arguments["pairs"])}
+    if unknown(arguments["pairs"]):
         return Described(exact=exact, facts=facts)
-    form = form_of(val_areas.parts, arguments, others={
-        "position": "receivers.position", "normal": "receivers.normal", "triangle_id": "receivers.covered"},
-        adapt={"triangle_id": ids})
+    form = form_of(val_areas.parts, arguments, others=RECEIVERS, adapt={"triangle_id": ids})
     dealt = () if arguments["subset"] is None else ("parts/interleaved",)
-    return Described(form, own("parts", *dealt), exact, facts=facts, variants=written(form, BY_INVERSE))
+    return Described(form, own("parts", *dealt), exact, facts=facts)
 
 
 def shadowed(arguments: Arguments) -> Described:
@@ -112,9 +108,8 @@ def blur(arguments: Arguments) -> Described:
     by_surface = isinstance(settings, GeometryBlur)
     how: dict[str, Any] = {"extent": np.inf, "cosine": -np.inf, "every_subset": False}
     how = {name: getattr(settings, name) for name in how} if by_surface else how
-    form = form_of(val_filters.blur, arguments, others={
-        "position": "receivers.position", "normal": "receivers.normal", "triangle_id": "receivers.covered",
-        "box": BOXES["visible"], **how}, adapt={"triangle_id": ids})
+    form = form_of(val_filters.blur, arguments, others={**RECEIVERS, "box": BOXES["visible"], **how},
+                   adapt={"triangle_id": ids})
     lists = ("blur/geometry", f"blur/every subset {how['every_subset']}") if by_surface else ()
     facts = {"window": "x - n // 2 on, moved inwards at the rim", **({
         "extent, of the visible box's diagonal": how["extent"], "least cosine": how["cosine"],
@@ -123,10 +118,139 @@ def blur(arguments: Arguments) -> Described:
                      ("receivers.position", "receivers.normal"), facts=facts)
 
 
+PLACES = {"position": "places.position", "center": "places.center", "frame": "places.frame"}
+SIZES = {"delta": "places.delta", "near": "places.near"}
+COVERED: dict[str, Any] = {"triangle_id": "places.covered"}
+EXACT = ("places.center",)
+OF_SEARCH = tuple(("val_visibility", one) for one in ("penumbra", "region"))
+SLACK = {"slack, of the distance": 1e-3}
+
+
+def by_default(arguments: Arguments) -> bool:
+    """Tell whether discs are found as errata say: by no printed form, nor by another size of the light."""
+    return not any(arguments.get(name) for name in ("solid_angle", "alpha", "squares", "foreshortened", "axial"))
+
+
+def series(arguments: Arguments) -> Described:
+    """Return the numbers of the series."""
+    plain = arguments["attenuation"] == 0 and arguments["rescale"] == "none" and arguments["fixed"] is None
+    return Described(form_of(val_series.series, arguments, ("weight", "bias", "end")),
+                     own("series", "series/plain" if plain else "series/damped"))
+
+
+def depth_scale(arguments: Arguments) -> Described:
+    """Return the scales of maps."""
+    kind = arguments["kind"]
+    others = (f"depth_scale/not {one}" for one in ("log_map", "map", "scene") if one != kind)
+    unit = "depths per octave" if kind == "log_map" else "1/m"
+    return Described(form_of(val_maps.depth_scale, arguments, ("origin", "slope")),
+                     own("depth_scale", f"depth_scale/{kind}", *others), specs={"slope": {"unit": unit}})
+
+
+def map_depths(arguments: Arguments) -> Described:
+    """Return depths of the series."""
+    kind = "map_depths/log_map" if arguments["logarithmic"] else "map_depths/linear"
+    return Described(form_of(val_maps.map_depths, arguments), own(
+        "map_depths", kind, *(("map_depths/mirrored",) if arguments["mirrored"] else ())), ("depth",))
+
+
+BY_ADDITION = (("s, co = np.sin(c * z), np.cos(c * z)",
+                "waves, s2, c2 = [(np.sin(np.pi * z), np.cos(np.pi * z))], np.sin(2 * np.pi * z), "
+                "np.cos(2 * np.pi * z); "
+                "[waves.append((a * c2 + b * s2, b * c2 - a * s2)) for _ in range(terms - 1) for a, b in waves[-1:]]; "
+                "s, co = (np.concatenate(one, axis=1) for one in zip(*waves))"),)  # sines of sums: two for all terms
+
+
+def basis(arguments: Arguments) -> Described:
+    """Return the channels of texels."""
+    kept = {"sines and cosines": "8 bits: floor((x + 1) 127.5 + 0.5001) / 127.5 - 1",
+            "times the depth, and the depth": "half floats"} if arguments["in_bytes"] else {}
+    form = form_of(val_maps.basis, arguments)
+    return Described(form, own("basis", *(("basis/bytes",) if arguments["in_bytes"] else ())), ("t",), facts=kept,
+                     variants=() if arguments["in_bytes"] else written(form, BY_ADDITION))
+
+
+def mip_levels(arguments: Arguments) -> Described:
+    """Return the levels above the map."""
+    count = (arguments["basis"].shape[2] - 1).bit_length()
+    form = form_of(val_filters.mip_levels, arguments, tuple(str(level) for level in range(1, count + 1)))
+    return Described(form, own("mip_levels", *(("mip_levels/bytes",) if arguments["in_bytes"] else ())))
+
+
+def mip_means(arguments: Arguments) -> Described:
+    """Return means by levels."""
+    levels = ("basis", *(f"levels.{level}" for level in arguments["levels"]))
+    return Described(form_of(val_filters.mip_means, arguments, others={"levels": levels}), own("means", "mip_means"),
+                     facts={"level": "max(0, log2(radius * texels a side) - 1)"}, variants=(by_shares,))
+
+
+def by_shares(stage: Run, reads: Names, writes: Names) -> Run:  # noqa: ARG001 as every variant
+    """Return means at coordinates of textures, which are rounded as numbers in [0, 1] are."""
+    name = reads["region"]
+
+    def run(arrays: Arrays, _: Any) -> Arrays:
+        region = np.array(arrays[name], np.float64)
+        region[:, :2] = 2.0 * np.float32(0.5 * region[:, :2] + 0.5) - 1.0
+        return stage({**arrays, name: region}, np.float64)
+
+    return run
+
+
+def csm_penumbra(arguments: Arguments) -> Described:
+    """Return penumbrae by the series."""
+    form = form_of(val_series.csm_penumbra, arguments, ("shaded", "z_avg", "region", "t"), {**PLACES, **SIZES})
+    exact = (("val_visibility", "cone"), *own("csm_penumbra", "shade")) if by_default(arguments) else ()
+    return Described(form, (*OF_SEARCH, *exact), EXACT, facts={"least blocked share": 0.02})
+
+
+def csm(arguments: Arguments) -> Described:
+    """Return V by the series."""
+    hard = ("csm/hard",) if arguments["hard"] is not None else ()
+    return Described(form_of(val_series.csm, arguments), own("csm", "shade", *hard))
+
+
+def search(arguments: Arguments) -> Described:
+    """Return search discs."""
+    form = form_of(val_visibility.search, arguments, ("pending", "region", "distance"),
+                   {**PLACES, **SIZES, **COVERED}, adapt={"triangle_id": ids})
+    exact = ("search/exact", "cone") if by_default(arguments) else ()
+    return Described(form, own("search", "region", *exact), EXACT, facts={"steepest, degrees": 80})
+
+
+def depth_tests(arguments: Arguments) -> Described:
+    """Return V by a square of depth tests."""
+    texels = arguments["texels"]
+    form = form_of(val_visibility.depth_tests, arguments, others={**PLACES, **SIZES, **COVERED},
+                   adapt={"triangle_id": ids})
+    lists = ("kernel", f"kernel {texels}") if texels > 1 else ("texel",)
+    return Described(form, own("depth_tests", *lists, *(("hard",) if arguments["points_only"] else ())),
+                     facts={**SLACK, "of lights without extent, texels": 1})
+
+
+def pcss_penumbra(arguments: Arguments) -> Described:
+    """Return penumbrae texel by texel."""
+    form = form_of(val_visibility.pcss_penumbra, arguments, ("shaded", "z_avg", "region"), {**PLACES, **SIZES})
+    return Described(form, own("pcss_penumbra", "penumbra", "region", *(("cone",) if by_default(arguments) else ()),
+                                     *(("cone test",) if arguments["cone"] else ())),
+                     facts=SLACK)
+
+
+def back_projection(arguments: Arguments) -> Described:
+    """Return V by texels projected back."""
+    form = form_of(val_back_projection.back_projection, arguments, others={
+        "position": "places.position", "triangle_id": "places.covered", "map_center": "places.center",
+        "frame": "places.frame"}, adapt={"triangle_id": ids})
+    return Described(form, own("back_projection"), EXACT, facts={
+        **SLACK, "cells along a side of the rectangle": val_back_projection.CELLS,
+        "least side, of the farthest place": val_back_projection.LEAST_SIDE})
+
+
 FORMS = {
     "rsm.visible_extent": visible_extent, "rsm.illuminated_extent": illuminated_extent,
     **{f"cluster.{one.__name__}": one for one in (
-        kmeans_assign, areas, occluders, depth_maps, interleaving, parts, shadowed, blur)},
+        kmeans_assign, areas, occluders, depth_maps, interleaving, parts, shadowed, blur, series, depth_scale,
+        map_depths, basis, mip_levels, mip_means, csm_penumbra, csm, search, depth_tests, pcss_penumbra,
+        back_projection)},
     "cluster.kmeans_start": alone(val_areas.kmeans_start, AXES, ("position", "normal")),
     "cluster.kmeans_means": alone(val_areas.kmeans_means, AXES, AXES),
     "cluster.kmeans_rounds": alone(val_areas.kmeans_rounds, CLUSTERS, ("position", "normal", *AXES), others=LIT),
@@ -137,4 +261,7 @@ FORMS = {
     "cluster.frames_behind": alone(val_maps.frames_behind),
     "cluster.map_ranges": alone(val_maps.map_ranges, ("near", "far")),
     "cluster.sampled_pixels": alone(val_areas.sampled_pixels, ("position", "normal", "triangle_id"), ("shifts",)),
-    **visibility.FORMS}
+    "cluster.disc_means": alone(val_filters.disc_means, lists=("means", "disc_means")),
+    "cluster.box_means": alone(val_filters.box_means, lists=("means", "box_means")),
+    "cluster.pcss": alone(val_visibility.pcss, others=PLACES, facts=SLACK),
+    "cluster.of_both": alone(val_visibility.of_both)}

@@ -12,9 +12,8 @@ from refgi.scene.light import Lamp
 from refgi.scene.model import Light
 from refgi.vectors.bounds import ROUNDING
 from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, ids, own, written
-from refgi.vectors.recipe import writing
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Arrays, Run
+from refgi.vectors.spec import Arrays, Run, writing
 
 KINDS = "perspective", "parallel", "paraboloid"  # of maps, in names of lists
 QUADRATURE = 8.0  # roundings that a float32 sum over a texel's nodes gathers; the bound is SAFETY times as wide

@@ -1,15 +1,14 @@
-"""Literal forms of stages of screen-space light: levels, samples, sums, blur, upsampling."""
+"""Literal forms of stages of screen-space light: levels, samples, sums, blur, upsampling, earlier frames."""
 
 import numpy as np
 
-from refgi.literal import hssil_crown, hssil_levels, upsampling
+from refgi.literal import hssil_crown, hssil_levels, temporal, upsampling
 from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.sssil.settings import Bilateral
 from refgi.types import Array
-from refgi.vectors.forms.beside import Arguments, Described, Names, form_of, own
-from refgi.vectors.recipe import reading, writing
+from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, own
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Arrays, Bug, Run
+from refgi.vectors.spec import Arrays, Bug, Run, reading, writing
 
 EYE = "positions are relative to the eye, z times the ray of depth 1 through the pixel's centre (E-HSS-10)"
 AREA = "E-HSS-06"
@@ -190,9 +189,33 @@ def level_upsampling(arguments: Arguments) -> Described:
         "depth_of_a_texel": "mean, at its centre" if mean else "nearest, at its corner along the slope"})
 
 
+VIEW = {key: f"projection.{key}" for key in ("origin", "frame", "half")}
+
+
+def reprojection(arguments: Arguments) -> Described:
+    """Return the look-up in the frame before."""
+    counted = ("count",) if arguments["frames"] is not None else ()
+    form = form_of(temporal.reprojection, arguments, ("light", "weight", *counted), VIEW)
+    return Described(form, own("reprojection", f"reprojection/{arguments['fetch']}"),
+                     ("position", "projection.origin", "depth"))
+
+
+def blend(arguments: Arguments) -> Described:
+    """Return the blend with earlier light."""
+    counted = arguments["frames"] is not None
+    form = form_of(temporal.blend, arguments, ("irradiance", "share", *(("count",) if counted else ())))
+    kinds = (("counted", "frames"), ("entering", "entering_share"), ("moving", "speed"))
+    return Described(form, own("blend", *(f"blend/{kind}" for kind, name in kinds if arguments[name] is not None)))
+
+
 FORMS = {"sssil.first_level": first_level, "sssil.coarser_level": coarser_level, "sssil.first_mean": first_mean,
          "sssil.level_of_means": level_of_means, "sssil.first_mean_radiance": first_mean_radiance,
          "sssil.coarser_mean_radiance": coarser_mean_radiance, "sssil.points_and_shifts": points_and_shifts,
          "sssil.sample_points": sample_points, "sssil.crown_samples": crown_samples,
          "sssil.mirrored_samples": mirrored_samples, "sssil.every_texel": every_texel,
-         "sssil.gather_samples": gather_samples, "sssil.blur": blur, "sssil.upsample": level_upsampling}
+         "sssil.gather_samples": gather_samples, "sssil.blur": blur, "sssil.upsample": level_upsampling,
+         "sssil.motion": alone(temporal.motion, ("position", "normal", "speed"), ("vertices", "before", "position"),
+                               others=VIEW, specs={"speed": {"unit": "pixels"}}),
+         "sssil.reprojection": reprojection,
+         "sssil.entering": alone(temporal.entering, ("made", "share"), ("position", "projection.origin"), others=VIEW),
+         "sssil.clamp": alone(temporal.clamp), "sssil.blend": blend}

@@ -211,7 +211,9 @@ def check_stage(port: Port, step: StageEntry, *, dirty: bool) -> StageVerdict:
     judged = {name: Judged(ArrayVerdict(name=name, verdict="invalid", tier=tiers[name], said=why, damaged=True))
               for name, why in got.damaged.items()}
     judged |= {name: _judged(port, name, got, tiers[name]) for name in got.arrays}
-    verdicts = [judged[name].verdict if name in judged else _not_run(name, tiers[name], bool(judged))
+    absent: dict[str, Any] = {"verdict": "invalid", "said": "missing, though other arrays of the stage are there"} if (
+        judged) else {"verdict": "not-run"}
+    verdicts = [judged[name].verdict if name in judged else ArrayVerdict(name=name, tier=tiers[name], **absent)
                 for name in step.writes]
     kinds = {one.verdict for one in verdicts}
     verdict: Verdict = next(one for one in ORDER if one in kinds)
@@ -219,12 +221,6 @@ def check_stage(port: Port, step: StageEntry, *, dirty: bool) -> StageVerdict:
     upstream = ("dirty" if dirty else "clean") if asked.chained else "isolated"
     return StageVerdict(case=port.case.id, stage=step.name, verdict=verdict, upstream=upstream,  # type: ignore[arg-type]
                         arrays=tuple(verdicts), causes=tuple(causes))
-
-
-def _not_run(name: str, tier: str, others: bool) -> ArrayVerdict:
-    """Return the verdict on an array that is not there: missing where others of its stage are."""
-    return ArrayVerdict(name=name, verdict="invalid" if others else "not-run", tier=tier,
-                        said="missing, though other arrays of the stage are there" if others else "")
 
 
 def stage_of_array(kit: Kit, case: str, name: str, got: Array, tier: str = "T1") -> StageVerdict:

@@ -10,7 +10,6 @@ import math
 import secrets
 import shutil
 from collections.abc import Callable, Mapping
-from functools import partial
 from importlib import resources
 from pathlib import Path
 
@@ -127,7 +126,8 @@ def _write_kit(
         entries, told = [], _Told()
         for number, (name, make) in enumerate(cases.items()):
             share = number / len(cases)
-            manifest = write_case(make(), part, told, partial(_tell_within, tell, name, share, len(cases)))
+            manifest = write_case(make(), part, told, lambda stage, done, name=name, share=share: tell(  # type: ignore[misc]
+                f"{name}: {stage}" if stage else name, share + done / len(cases)))
             text = text_of(manifest)
             (part / "cases" / name / CASE).write_text(text, encoding="utf-8", newline="\n")
             entries.append(KitEntry(id=name, method=manifest.method, what=manifest.what,
@@ -145,11 +145,6 @@ def _write_kit(
         shutil.rmtree(part, ignore_errors=True)
     tell("done", 1.0)
     return made
-
-
-def _tell_within(tell: Tell, name: str, begun: float, cases: int, stage: str, share: float) -> None:
-    """Tell of a stage of a case."""
-    tell(f"{name}: {stage}" if stage else name, begun + share / cases)
 
 
 class _Told:

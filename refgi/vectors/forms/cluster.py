@@ -21,15 +21,13 @@ APART = (((AWAY, "st = along[k] @ position[:, of == k] - along[k] @ center[:, k,
          ((AWAY, "st = along[k] @ position[:, of == k] - along[k, :, ::-1] @ center[::-1, k, None]"),))
 
 
-def visible_extent(arguments: Arguments) -> Described:  # noqa: ARG001
-    """Return the box of what pixels see."""
+def _visible_extent(arguments: Arguments) -> Described:  # noqa: ARG001
     form = Form(val_areas.visible_extent, {"position": "position", "triangle_id": "covered"}, ("low", "high"),
                 adapt={"triangle_id": ids})
     return Described(form, own("visible_extent", "box"))
 
 
-def illuminated_extent(arguments: Arguments) -> Described:
-    """Return the box of what reflects direct light, of maps that no grid leaves texels of."""
+def _illuminated_extent(arguments: Arguments) -> Described:
     maps, lobes = arguments["map_positions"], arguments["map_lobe_fluxes"]
     if max(one.shape[2] for one in maps) > SAMPLES:
         return Described()
@@ -39,16 +37,14 @@ def illuminated_extent(arguments: Arguments) -> Described:
     return Described(form, own("illuminated_extent", "box"))
 
 
-def kmeans_assign(arguments: Arguments) -> Described:
-    """Return the nearest clusters."""
+def _kmeans_assign(arguments: Arguments) -> Described:
     kind = arguments["distance"]
     others = (f"kmeans_assign/not {one}" for one in ("raw", "normalised", "squared") if one != kind)
     return Described(form_of(val_areas.kmeans_assign, arguments, ("of", "distance"), LIT),
                      own("kmeans_assign", f"kmeans_assign/{kind}", *others), ("position", "normal", "center", "axis"))
 
 
-def areas(arguments: Arguments) -> Described:
-    """Return the rectangles of clusters."""
+def _areas(arguments: Arguments) -> Described:
     form = form_of(val_areas.areas, arguments, ("frame", "axes", "side", "offset", "delta", "radius", "members"))
     lists = ("areas/root" if arguments["extent"] == "root" else "areas/not root",
              "areas/fixed" if arguments["axes"] == "fixed" else "areas/not fixed",
@@ -58,8 +54,7 @@ def areas(arguments: Arguments) -> Described:
         variants=written(form, *APART))
 
 
-def occluders(arguments: Arguments) -> Described:
-    """Return which triangles may block."""
+def _occluders(arguments: Arguments) -> Described:
     if arguments["ends"] is None or arguments["ends"].lights.size == 0:
         return Described()
     ends = {name: tuple(f"ends.{leaf}" for leaf in leaves) for name, leaves in BOXES.items()}
@@ -68,8 +63,7 @@ def occluders(arguments: Arguments) -> Described:
     return Described(form, own("occluders"), facts={"tolerance, of the diagonal of the boxes' common box": 1e-6})
 
 
-def depth_maps(arguments: Arguments) -> Described:
-    """Return maps that are rasterized past a ball, of triangles without holes."""
+def _depth_maps(arguments: Arguments) -> Described:
     exact = ("geometry.vertices", "center", "frame")
     usual = arguments["renderer"] == "raster" and arguments["near_geometry"] == "ball"
     if not usual or arguments["geometry"].cut is not None:
@@ -79,15 +73,13 @@ def depth_maps(arguments: Arguments) -> Described:
                      facts={"projection": "paraboloid (x, y) / (1 + z)"}, work=work)
 
 
-def interleaving(arguments: Arguments) -> Described:
-    """Return subsets of lights."""
+def _interleaving(arguments: Arguments) -> Described:
     return Described(form_of(val_areas.interleaving, arguments),
                      own("interleaving", f"interleaving/{arguments['assignment']}"),
                      facts={"subset of a pixel": "(row mod n) n + column mod n"})
 
 
-def parts(arguments: Arguments) -> Described:
-    """Return the light of clusters without clamp or with discs."""
+def _parts(arguments: Arguments) -> Described:
     exact, facts = ("receivers.position", "light_position"), {"clamp": clamp_of(arguments["pairs"])}
     if unknown(arguments["pairs"]):
         return Described(exact=exact, facts=facts)
@@ -96,14 +88,12 @@ def parts(arguments: Arguments) -> Described:
     return Described(form, own("parts", *dealt), exact, facts=facts)
 
 
-def shadowed(arguments: Arguments) -> Described:
-    """Return the sum over area lights."""
+def _shadowed(arguments: Arguments) -> Described:
     seen = {} if arguments["share"] is not None else {"share": np.ones((1, 1, 1))}
     return Described(form_of(val_areas.shadowed, arguments, others=seen), own("shadowed"))
 
 
-def blur(arguments: Arguments) -> Described:
-    """Return means over pixels of a surface, or over all."""
+def _blur(arguments: Arguments) -> Described:
     settings, size = arguments["settings"], arguments["size"]
     by_surface = isinstance(settings, GeometryBlur)
     how: dict[str, Any] = {"extent": np.inf, "cosine": -np.inf, "every_subset": False}
@@ -131,15 +121,13 @@ def by_default(arguments: Arguments) -> bool:
     return not any(arguments.get(name) for name in ("solid_angle", "alpha", "squares", "foreshortened", "axial"))
 
 
-def series(arguments: Arguments) -> Described:
-    """Return the numbers of the series."""
+def _series(arguments: Arguments) -> Described:
     plain = arguments["attenuation"] == 0 and arguments["rescale"] == "none" and arguments["fixed"] is None
     return Described(form_of(val_series.series, arguments, ("weight", "bias", "end")),
                      own("series", "series/plain" if plain else "series/damped"))
 
 
-def depth_scale(arguments: Arguments) -> Described:
-    """Return the scales of maps."""
+def _depth_scale(arguments: Arguments) -> Described:
     kind = arguments["kind"]
     others = (f"depth_scale/not {one}" for one in ("log_map", "map", "scene") if one != kind)
     unit = "depths per octave" if kind == "log_map" else "1/m"
@@ -147,8 +135,7 @@ def depth_scale(arguments: Arguments) -> Described:
                      own("depth_scale", f"depth_scale/{kind}", *others), specs={"slope": {"unit": unit}})
 
 
-def map_depths(arguments: Arguments) -> Described:
-    """Return depths of the series."""
+def _map_depths(arguments: Arguments) -> Described:
     kind = "map_depths/log_map" if arguments["logarithmic"] else "map_depths/linear"
     return Described(form_of(val_maps.map_depths, arguments), own(
         "map_depths", kind, *(("map_depths/mirrored",) if arguments["mirrored"] else ())), ("depth",))
@@ -161,8 +148,7 @@ BY_ADDITION = (("s, co = np.sin(c * z), np.cos(c * z)",
                 "s, co = (np.concatenate(one, axis=1) for one in zip(*waves))"),)  # sines of sums: two for all terms
 
 
-def basis(arguments: Arguments) -> Described:
-    """Return the channels of texels."""
+def _basis(arguments: Arguments) -> Described:
     kept = {"sines and cosines": "8 bits: floor((x + 1) 127.5 + 0.5001) / 127.5 - 1",
             "times the depth, and the depth": "half floats"} if arguments["in_bytes"] else {}
     form = form_of(val_maps.basis, arguments)
@@ -170,15 +156,13 @@ def basis(arguments: Arguments) -> Described:
                      variants=() if arguments["in_bytes"] else written(form, BY_ADDITION))
 
 
-def mip_levels(arguments: Arguments) -> Described:
-    """Return the levels above the map."""
+def _mip_levels(arguments: Arguments) -> Described:
     count = (arguments["basis"].shape[2] - 1).bit_length()
     form = form_of(val_filters.mip_levels, arguments, tuple(str(level) for level in range(1, count + 1)))
     return Described(form, own("mip_levels", *(("mip_levels/bytes",) if arguments["in_bytes"] else ())))
 
 
-def mip_means(arguments: Arguments) -> Described:
-    """Return means by levels."""
+def _mip_means(arguments: Arguments) -> Described:
     levels = ("basis", *(f"levels.{level}" for level in arguments["levels"]))
     return Described(form_of(val_filters.mip_means, arguments, others={"levels": levels}), own("means", "mip_means"),
                      facts={"level": "max(0, log2(radius * texels a side) - 1)"}, variants=(by_shares,))
@@ -196,29 +180,25 @@ def by_shares(stage: Run, reads: Names, writes: Names) -> Run:  # noqa: ARG001 a
     return run
 
 
-def csm_penumbra(arguments: Arguments) -> Described:
-    """Return penumbrae by the series."""
+def _csm_penumbra(arguments: Arguments) -> Described:
     form = form_of(val_series.csm_penumbra, arguments, ("shaded", "z_avg", "region", "t"), {**PLACES, **SIZES})
     exact = (("val_visibility", "cone"), *own("csm_penumbra", "shade")) if by_default(arguments) else ()
     return Described(form, (*OF_SEARCH, *exact), EXACT, facts={"least blocked share": 0.02})
 
 
-def csm(arguments: Arguments) -> Described:
-    """Return V by the series."""
+def _csm(arguments: Arguments) -> Described:
     hard = ("csm/hard",) if arguments["hard"] is not None else ()
     return Described(form_of(val_series.csm, arguments), own("csm", "shade", *hard))
 
 
-def search(arguments: Arguments) -> Described:
-    """Return search discs."""
+def _search(arguments: Arguments) -> Described:
     form = form_of(val_visibility.search, arguments, ("pending", "region", "distance"),
                    {**PLACES, **SIZES, **COVERED}, adapt={"triangle_id": ids})
     exact = ("search/exact", "cone") if by_default(arguments) else ()
     return Described(form, own("search", "region", *exact), EXACT, facts={"steepest, degrees": 80})
 
 
-def depth_tests(arguments: Arguments) -> Described:
-    """Return V by a square of depth tests."""
+def _depth_tests(arguments: Arguments) -> Described:
     texels = arguments["texels"]
     form = form_of(val_visibility.depth_tests, arguments, others={**PLACES, **SIZES, **COVERED},
                    adapt={"triangle_id": ids})
@@ -227,16 +207,14 @@ def depth_tests(arguments: Arguments) -> Described:
                      facts={**SLACK, "of lights without extent, texels": 1})
 
 
-def pcss_penumbra(arguments: Arguments) -> Described:
-    """Return penumbrae texel by texel."""
+def _pcss_penumbra(arguments: Arguments) -> Described:
     form = form_of(val_visibility.pcss_penumbra, arguments, ("shaded", "z_avg", "region"), {**PLACES, **SIZES})
     return Described(form, own("pcss_penumbra", "penumbra", "region", *(("cone",) if by_default(arguments) else ()),
                                      *(("cone test",) if arguments["cone"] else ())),
                      facts=SLACK)
 
 
-def back_projection(arguments: Arguments) -> Described:
-    """Return V by texels projected back."""
+def _back_projection(arguments: Arguments) -> Described:
     form = form_of(val_back_projection.back_projection, arguments, others={
         "position": "places.position", "triangle_id": "places.covered", "map_center": "places.center",
         "frame": "places.frame"}, adapt={"triangle_id": ids})
@@ -246,11 +224,11 @@ def back_projection(arguments: Arguments) -> Described:
 
 
 FORMS = {
-    "rsm.visible_extent": visible_extent, "rsm.illuminated_extent": illuminated_extent,
-    **{f"cluster.{one.__name__}": one for one in (
-        kmeans_assign, areas, occluders, depth_maps, interleaving, parts, shadowed, blur, series, depth_scale,
-        map_depths, basis, mip_levels, mip_means, csm_penumbra, csm, search, depth_tests, pcss_penumbra,
-        back_projection)},
+    "rsm.visible_extent": _visible_extent, "rsm.illuminated_extent": _illuminated_extent,
+    **{f"cluster.{one.__name__[1:]}": one for one in (
+        _kmeans_assign, _areas, _occluders, _depth_maps, _interleaving, _parts, _shadowed, _blur, _series, _depth_scale,
+        _map_depths, _basis, _mip_levels, _mip_means, _csm_penumbra, _csm, _search, _depth_tests, _pcss_penumbra,
+        _back_projection)},
     "cluster.kmeans_start": alone(val_areas.kmeans_start, AXES, ("position", "normal")),
     "cluster.kmeans_means": alone(val_areas.kmeans_means, AXES, AXES),
     "cluster.kmeans_rounds": alone(val_areas.kmeans_rounds, CLUSTERS, ("position", "normal", *AXES), others=LIT),

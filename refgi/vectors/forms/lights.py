@@ -16,8 +16,7 @@ POINTS = ("receivers.position", "lights.position")
 RECEIVERS = {"position": "receivers.position", "normal": "receivers.normal", "triangle_id": "receivers.covered"}
 
 
-def importance(arguments: Arguments) -> Described:
-    """Return the importance of texels, not spread evenly, nor as printed."""
+def _importance(arguments: Arguments) -> Described:
     if arguments["defensive"] or arguments["as_printed"]:
         return Described()
     form = form_of(lights.importance, {**arguments, "peaked": arguments["kind"] != "flux"})
@@ -26,21 +25,18 @@ def importance(arguments: Arguments) -> Described:
                                *(["importance/cube"] if cube else [])) if plain else ())
 
 
-def halton_points(arguments: Arguments) -> Described:
-    """Return Halton points."""
+def _halton_points(arguments: Arguments) -> Described:
     shifted, later = bool(arguments["shifts"][arguments["number"]].any()), arguments["number"] > 0
     return Described(form_of(lights.halton_points, arguments), own(
         "halton", *(["halton/shifted"] if shifted else []), *(["halton/later"] if later else []),
         *(["halton/shifted later"] if shifted and later else [])))
 
 
-def grid_points(arguments: Arguments) -> Described:
-    """Return the centres of cells of one map."""
+def _grid_points(arguments: Arguments) -> Described:
     return Described() if arguments["maps"] > 1 else Described(form_of(lights.grid_points, arguments), own("grid"))
 
 
-def warp(arguments: Arguments) -> Described:
-    """Return warped points and their weights."""
+def _warp(arguments: Arguments) -> Described:
     maps, how = arguments["maps"], arguments["warp"]
     form = form_of(literal_warp, {**arguments, "levels": how.levels, "method": how.method},
                    ("warped", "density_weight"))
@@ -58,8 +54,7 @@ def summed_row_by_row(stage: Run, reads: Names, _: Names) -> Run:
     return reading(stage, **{reads["importance"]: tilted})
 
 
-def texels(arguments: Arguments) -> Described:
-    """Return texels and T/N w, where neither lamps are drawn nor weights scaled."""
+def _texels(arguments: Arguments) -> Described:
     maps, rows, columns, number, counts = (arguments[one] for one in ("maps", "rows", "columns", "number", "counts"))
     total, count = maps * rows * columns, counts[number]
     specs = {"texel": {"index_of": (maps * rows, columns)}}
@@ -72,8 +67,7 @@ def texels(arguments: Arguments) -> Described:
                      factors={"T/N": total / count, "number of lights N": count, "number of texels T": total})
 
 
-def pixel_lights(arguments: Arguments) -> Described:
-    """Return lights of single texels."""
+def _pixel_lights(arguments: Arguments) -> Described:
     maps, glossy = range(len(arguments["texel"])), arguments["lobe_flux"] is not None
     if arguments["cell"] or (glossy and any(one is None for one in arguments["lobe_flux"])):
         return Described()
@@ -87,16 +81,14 @@ def pixel_lights(arguments: Arguments) -> Described:
         maps) > 1 else []), *(["lights/warped"] if warped else []), *(["lights/cube"] if cube else [])))
 
 
-def footprints(arguments: Arguments) -> Described:
-    """Return the surface that each light stands for."""
+def _footprints(arguments: Arguments) -> Described:
     maps = range(len(arguments["lamp"]))
     form = form_of(lights.footprints, arguments, others={
         name: tuple(f"{name}.{k}" for k in maps) for name in ("solid_angle", "drawn", "weight", "lamp")})
     return Described(form, own("footprints"))
 
 
-def pair_sum(arguments: Arguments) -> Described:
-    """Return Eq. 2 and 3 without clamp or with discs."""
+def _pair_sum(arguments: Arguments) -> Described:
     lights, settings, count = arguments["lights"], arguments["settings"], arguments["lights"].flux.shape[1]
     facts = {"clamp": clamp_of(settings), "lobe_norm": NORM, "lights_drawn": lights.drawn}
     if unknown(settings) or arguments["lightcuts"] is not None:
@@ -125,8 +117,7 @@ def pair_reads(glossy: bool) -> dict[str, str]:
             **({name: f"lights.{name}" for name in ("lobe_flux", "lobe_axis", "lobe_exponent")} if glossy else {})}
 
 
-def single_pairs(arguments: Arguments) -> Described:
-    """Return pairs of one light and one receiver each."""
+def _single_pairs(arguments: Arguments) -> Described:
     glossy = arguments["lobe_flux"] is not None
     lists = own(*pair_lists("pairs", glossy, False, arguments["flux"].shape[1]))
     form = form_of(pairs.pairs, arguments)
@@ -142,7 +133,7 @@ def pair_lists(entry: str, glossy: bool, disc: bool, count: int) -> tuple[str, .
             f"{entry}/{kind}", *(("pair/several",) if count > 1 else ()))
 
 
-FORMS = {"lights.importance": importance, "lights.halton_points": halton_points, "lights.grid_points": grid_points,
-         "lights.warp": warp, "lights.texels": texels, "lights.pixel_lights": pixel_lights,
-         "lights.footprints": footprints,
-         "pairs.sum": pair_sum, "pairs.pairs": single_pairs, "lights.occlude": alone(pairs.occluded)}
+FORMS = {"lights.importance": _importance, "lights.halton_points": _halton_points, "lights.grid_points": _grid_points,
+         "lights.warp": _warp, "lights.texels": _texels, "lights.pixel_lights": _pixel_lights,
+         "lights.footprints": _footprints,
+         "pairs.sum": _pair_sum, "pairs.pairs": _single_pairs, "lights.occlude": alone(pairs.occluded)}

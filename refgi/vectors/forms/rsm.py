@@ -58,8 +58,7 @@ def snapped(columns: int, rows: int, parallel: bool) -> tuple[Callable[[Run, Nam
     return tuple(partial(variant, side) for side in ((1, 1), (1, -1), (-1, 1), (-1, -1)))
 
 
-def visible_triangles(arguments: Arguments) -> Described:
-    """Return the nearest triangles of a view of planes."""
+def _visible_triangles(arguments: Arguments) -> Described:
     maps = arguments["projection"]
     facts = {"projection": KINDS[maps.kind], "maps": maps.maps, "rows": maps.height, "columns": maps.width}
     if maps.kind == PARABOLOID or arguments["geometry"].cut_outs is not None:
@@ -71,8 +70,7 @@ def visible_triangles(arguments: Arguments) -> Described:
                      variants=snapped(maps.width, maps.height, maps.kind == ORTHOGRAPHIC))
 
 
-def surface(arguments: Arguments) -> Described:
-    """Return what a view of planes sees, where no texture colours it."""
+def _surface(arguments: Arguments) -> Described:
     maps, geometry = arguments["projection"], arguments["geometry"]
     if unknown(arguments):
         return Described()
@@ -86,8 +84,7 @@ def surface(arguments: Arguments) -> Described:
                      variants=written(form, *RAYS))
 
 
-def reflected_flux(arguments: Arguments) -> Described:
-    """Return the flux of a lamp's map of planes that looks along it, where there are neither textures nor glass."""
+def _reflected_flux(arguments: Arguments) -> Described:
     maps, geometry, lamp, materials = (arguments[one] for one in ("projection", "geometry", "lamp", "materials"))
     facts = {"lamp": lamp.kind, **({"falloff": lamp.falloff} if lamp.kind == "spot" else {})}
     glossy, cube, spot = bool(materials.specular.any()), maps.maps > 1, lamp.kind == "spot"
@@ -135,16 +132,14 @@ def sizes(maps: Projection) -> dict[str, object]:
     return {"rows": maps.height, "columns": maps.width, "parallel": maps.kind == ORTHOGRAPHIC}
 
 
-def facing(arguments: Arguments) -> Described:
-    """Return the normals of the triangles that pixels see."""
+def _facing(arguments: Arguments) -> Described:
     smooth = arguments["geometry"].vertex_normals is not None
     form = form_of(val_areas.facing, arguments, others=MESH if smooth else {})
     return Described(form, own("facing/smooth" if smooth else "facing/flat"),
                      paper="E-VAL-14; docs/conventions: which normal serves what")
 
 
-def shadow_map(arguments: Arguments) -> Described:
-    """Return the test of receivers' planes by a map of planes."""
+def _shadow_map(arguments: Arguments) -> Described:
     maps, lamp, smooth = (arguments[one] for one in ("projection", "lamp", "interpolated"))
     if maps.kind == PARABOLOID or arguments["bias"] is not None:
         return Described()
@@ -155,8 +150,7 @@ def shadow_map(arguments: Arguments) -> Described:
                      ("position", "normal", "depth", "map_position"))
 
 
-def shadow_rays(arguments: Arguments) -> Described:
-    """Return the test of receivers by rays, without cut-outs."""
+def _shadow_rays(arguments: Arguments) -> Described:
     key = place_of(arguments["lamp"])
     if arguments["geometry"].cut_outs is not None:
         return Described()
@@ -170,8 +164,7 @@ def place_of(lamp: Lamp) -> str:
     return "direction" if lamp.place is None else "place"
 
 
-def direct_light(arguments: Arguments) -> Described:
-    """Return the direct irradiance of all lamps."""
+def _direct_light(arguments: Arguments) -> Described:
     lamps = arguments["lamps"]
     reads = {"position": "position", "normal": "normal", "triangle_id": "covered",
              "visible": tuple(f"visible.{k}" for k in range(len(lamps))),
@@ -187,8 +180,7 @@ def direct_light(arguments: Arguments) -> Described:
                      facts={"lamps": [lamp.kind for lamp in lamps], "falloff": [lamp.falloff for lamp in lamps]})
 
 
-def leaving_radiance(arguments: Arguments) -> Described:
-    """Return what the camera receives."""
+def _leaving_radiance(arguments: Arguments) -> Described:
     lists = (one for one in ("extra", "emission") if arguments[one] is not None)
     return Described(form_of(direct.leaving_radiance, arguments), own("leaving", *(f"leaving/{one}" for one in lists)))
 
@@ -200,8 +192,8 @@ def falloff_lists(lamps: Sequence[Light | Lamp]) -> tuple[str, ...]:
             *(("falloff/squared",) if "squared_ramp" in kinds else ()))
 
 
-FORMS = {"rsm.visible_triangles": visible_triangles, "rsm.surface": surface, "rsm.map_triangles": visible_triangles,
-         "rsm.map_surface": surface, "rsm.reflected_flux": reflected_flux,
-         "rsm.facing": facing, "rsm.shadow_map": shadow_map, "rays.shadow_rays": shadow_rays,
-         "rsm.direct_irradiance": direct_light, "rsm.leaving_radiance": leaving_radiance,
+FORMS = {"rsm.visible_triangles": _visible_triangles, "rsm.surface": _surface, "rsm.map_triangles": _visible_triangles,
+         "rsm.map_surface": _surface, "rsm.reflected_flux": _reflected_flux,
+         "rsm.facing": _facing, "rsm.shadow_map": _shadow_map, "rays.shadow_rays": _shadow_rays,
+         "rsm.direct_irradiance": _direct_light, "rsm.leaving_radiance": _leaving_radiance,
          "rsm.emission": alone(direct.emission, lists=())}

@@ -22,8 +22,7 @@ def parts(arguments: Arguments, name: str, *of: str) -> tuple[tuple[str, ...], t
     return tuple(f"{kind}_{name}" for kind in kinds), own(*of, *(f"{one}/glossy" for one in of if glossy))
 
 
-def peaks(arguments: Arguments) -> Described:
-    """Return I_0 of the parts of lights."""
+def _peaks(arguments: Arguments) -> Described:
     if unknown(arguments["pairs"]):
         return Described()
     writes, lists = parts(arguments, "peak", "peaks")
@@ -33,8 +32,7 @@ def peaks(arguments: Arguments) -> Described:
         lists)
 
 
-def strengths(arguments: Arguments) -> Described:
-    """Return B of the parts of lights."""
+def _strengths(arguments: Arguments) -> Described:
     if unknown(arguments["pairs"]):
         return Described()
     writes, _ = parts(arguments, "strength")
@@ -42,8 +40,7 @@ def strengths(arguments: Arguments) -> Described:
     return Described(form, own("strengths"), POINTS)
 
 
-def reference_length(arguments: Arguments) -> Described:
-    """Return the length of a picture."""
+def _reference_length(arguments: Arguments) -> Described:
     lights = arguments["lights"]
     facts = {"lights_drawn": lights.drawn, "share_of_pairs": sii.PAPER_SHARE}
     if unknown(arguments["pairs"]):
@@ -53,26 +50,22 @@ def reference_length(arguments: Arguments) -> Described:
     return Described(form, own("length"), POINTS, facts=facts, factors={"N": lights.drawn})
 
 
-def low_irradiance(arguments: Arguments) -> Described:
-    """Return I_low."""
+def _low_irradiance(arguments: Arguments) -> Described:
     _, lists = parts(arguments, "", "low")
     return Described(form_of(sii.low_irradiance, arguments), lists)
 
 
-def squares(arguments: Arguments) -> Described:
-    """Return R_0^2 of the parts of lights."""
+def _squares(arguments: Arguments) -> Described:
     writes, _ = parts(arguments, "square")
     return Described(form_of(sii.squares, arguments, writes), own("squares"))
 
 
-def kept(arguments: Arguments) -> Described:
-    """Return which pairs count."""
+def _kept(arguments: Arguments) -> Described:
     writes, _ = parts(arguments, "kept")
     return Described(form_of(sii.kept, arguments, writes), own("kept"))
 
 
-def range_sum(arguments: Arguments) -> Described:
-    """Return the sum of the pairs that count."""
+def _range_sum(arguments: Arguments) -> Described:
     if unknown(arguments["pairs"]):
         return Described()
     fields, lists = parts(arguments, "kept", "sum")
@@ -83,14 +76,7 @@ def range_sum(arguments: Arguments) -> Described:
     return Described(form, lists, POINTS)
 
 
-def ellipsoids(arguments: Arguments) -> Described:
-    """Return both bounds."""
-    fields = tuple(f"{kind}_{key}" for kind in ("appendix", "tangent") for key in ("center", "half_width", "height"))
-    return Described(form_of(sii.ellipsoids, arguments, fields), own("ellipsoids"))
-
-
-def stored_lights(arguments: Arguments) -> Described:
-    """Return lights as textures keep them."""
+def _stored_lights(arguments: Arguments) -> Described:
     lights = arguments["lights"]
     lobes = ("lobe_flux", "lobe_axis") if lights.lobe_flux is not None else ()
     names = "position", "normal", "flux", *lobes
@@ -109,15 +95,13 @@ def formed(function: Any, arguments: Arguments, writes: tuple[str, ...] = ("",),
     return form_of(function, arguments, writes, {**SHOWN, **others}, adapt={"triangle_id": ids})
 
 
-def pattern(arguments: Arguments) -> Described:
-    """Return a disc's samples."""
+def _pattern(arguments: Arguments) -> Described:
     kind = "squared" if arguments["weight_squared"] else "plain"
     return Described(form_of(gather.pattern, arguments, ("offset", "weight")), own("pattern", f"pattern/{kind}"),
                      factors={"samples": float(len(arguments["xi"]))})
 
 
-def centers(arguments: Arguments) -> Described:
-    """Return where on a map receivers lie; what lies on its border is exact and decides."""
+def _centers(arguments: Arguments) -> Described:
     maps = arguments["projection"]
     kind, size = KINDS[maps.kind], {"rows": maps.height, "columns": maps.width}
     view = {key: f"projection.{key}" for key in ("origin", "frame", "half")}
@@ -135,27 +119,23 @@ def on_border(maps: Projection, position: Array) -> bool:
     return bool((away < ROUNDING).sum() > 1)
 
 
-def disc_texels(arguments: Arguments) -> Described:
-    """Return the texels of discs; a sample in the middle has the place's own, which then decides."""
+def _disc_texels(arguments: Arguments) -> Described:
     middle = (arguments["offset"] == 0).all(axis=1).any()
     size = arguments["maps"] * arguments["rows"], arguments["columns"]
     return Described(formed(gather.disc_texels, arguments), own("texels"), ("center", "offset") if middle else (),
                      {"": {"index_of": size}})
 
 
-def disc_sum(arguments: Arguments) -> Described:
-    """Return the light of a map's discs."""
+def _disc_sum(arguments: Arguments) -> Described:
     lists = ("sum", *(("sum/offset",) if arguments["offset"] else ()))
     return Described(formed(gather.disc_sum, arguments), own(*lists), ("position", "surface"))
 
 
-def all_maps(arguments: Arguments) -> Described:
-    """Return the light of all maps."""
+def _all_maps(arguments: Arguments) -> Described:
     return Described(form_of(gather.all_maps, arguments), own("maps") if len(arguments["irradiance"]) > 1 else ())
 
 
-def interpolate(arguments: Arguments) -> Described:
-    """Return what is interpolated between coarse pixels, and the light."""
+def _interpolate(arguments: Arguments) -> Described:
     rows, columns = coarse_pixels(arguments["covered"].shape[0], arguments["covered"].shape[1], arguments["grid"])
     form = formed(gather.interpolate, arguments, ("interpolated", "irradiance"), visible=("extent.low", "extent.high"))
     return Described(form, own("interpolate"), ("position",), facts={
@@ -163,9 +143,10 @@ def interpolate(arguments: Arguments) -> Described:
 
 
 FORMS = {"sii.stored_surface": alone(sii.stored_surface, ("position", "normal"), lists=("stored",)),
-         "sii.stored_lights": stored_lights, "sii.peaks": peaks, "sii.strengths": strengths,
-         "sii.reference_length": reference_length,
-         "sii.low_irradiance": low_irradiance, "sii.squares": squares, "sii.kept": kept, "sii.range_sum": range_sum,
-         "sii.ellipsoids": ellipsoids,
-         "gather.pattern": pattern, "gather.centers": centers, "gather.disc_texels": disc_texels,
-         "gather.disc_sum": disc_sum, "gather.all_maps": all_maps, "gather.interpolate": interpolate}
+         "sii.stored_lights": _stored_lights, "sii.peaks": _peaks, "sii.strengths": _strengths,
+         "sii.reference_length": _reference_length,
+         "sii.low_irradiance": _low_irradiance, "sii.squares": _squares, "sii.kept": _kept, "sii.range_sum": _range_sum,
+         "sii.ellipsoids": alone(sii.ellipsoids, tuple(
+             f"{kind}_{key}" for kind in ("appendix", "tangent") for key in ("center", "half_width", "height"))),
+         "gather.pattern": _pattern, "gather.centers": _centers, "gather.disc_texels": _disc_texels,
+         "gather.disc_sum": _disc_sum, "gather.all_maps": _all_maps, "gather.interpolate": _interpolate}

@@ -18,8 +18,7 @@ RADIOMETRY = "docs/radiometry: E = integral of L cos over the hemisphere, L = al
 ESTIMATE = {"tier": "T3", "paper": RADIOMETRY}
 
 
-def path_traced(arguments: Arguments) -> Described:
-    """Return the path-traced irradiance."""
+def _path_traced(arguments: Arguments) -> Described:
     facts = {key: value for key, value in flat(arguments["settings"]).items()
              if isinstance(value, bool | int | float | str)}
     return Described(exact=("scene.geometry.vertices", "position"), paper=RADIOMETRY, facts=facts,
@@ -99,8 +98,7 @@ LIMITS = {"least cosine at the light": 1e-3, "farther by, and still of one surfa
 SHADOWED = ("clamped", "absolute", "at least", "largest light", "first half", "horizon")
 
 
-def visible(arguments: Arguments) -> Described:
-    """Return visibility by rays."""
+def _visible(arguments: Arguments) -> Described:
     form = form_of(vpl.visible, arguments, others=MESH)
     return Described(form, own("visible"), paper="SII Eq. 2 with V", facts={"largest_lift_of_ray_ends": LIFT},
                      variants=(functools.partial(lifted, "position"),))
@@ -117,8 +115,7 @@ def lifted(receiver: str, stage: Run, reads: Names, _: Names) -> Run:
     return run
 
 
-def shadowed_sum(arguments: Arguments) -> Described:
-    """Return the sum of the visible lights."""
+def _shadowed_sum(arguments: Arguments) -> Described:
     if arguments["seen"] is None:
         return Described()
     glossy, form = arguments["lobe_flux"] is not None, form_of(vpl.shadowed_sum, arguments)
@@ -128,8 +125,8 @@ def shadowed_sum(arguments: Arguments) -> Described:
 
 
 FORMS = {
-    "truth.path_traced": path_traced,
-    "vpl.facing": alone(vpl.facing, exact=("vertices",)), "vpl.visible": visible, "vpl.shadowed_sum": shadowed_sum,
+    "truth.path_traced": _path_traced,
+    "vpl.facing": alone(vpl.facing, exact=("vertices",)), "vpl.visible": _visible, "vpl.shadowed_sum": _shadowed_sum,
     "vpl.scattered_points": alone(imperfect.scattered_points, ("point", "point_face", "radius"), ("shift",),
                                   lists=("points",), paper=MAPS),
     "vpl.map_frames": alone(imperfect.map_frames, exact=("normal",), lists=("frames",), paper="Duff et al. 2017",

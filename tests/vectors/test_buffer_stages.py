@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from refgi.literal.colours import tint
+from refgi.literal.buffers import tint
 from refgi.scene import load_scene
 from refgi.vectors.bounds import distance, isolated_bounds, large_value
 from refgi.vectors.cases.hssil import FULL_PLANS, QUICK_PLANS

@@ -77,7 +77,7 @@ def _surface(arguments: Arguments) -> Described:
     form = form_of(buffers.surface, {**arguments, **sizes(maps)}, ("depth", "position", "normal", "albedo"), {
         **MESH, **VIEW, **attributes(arguments), "diffuse": "materials.diffuse"}, double=True)
     if geometry.colours is not None:
-        return Described(form, (("colours", "tint"), ("", "surface/colours")), variants=written(form, *RAYS))
+        return Described(form, (("buffers", "tint"), ("", "surface/colours")), variants=written(form, *RAYS))
     return Described(form, own("surface/side", "surface", f"surface/{KINDS[maps.kind]}", *VIEWS, "surface/albedo",
                                *(("surface/smooth",) if geometry.vertex_normals is not None else ()),
                                *(("view/cube", "view/cube down", "view/cube rows") if maps.maps > 1 else ())),
@@ -97,7 +97,7 @@ def _reflected_flux(arguments: Arguments) -> Described:
         **({"half_angles": "lamp.half_angles"} if spot else {}),
         **{key: f"materials.{key}" for key in ("diffuse", "specular", "exponent")}}, double=True)
     if geometry.colours is not None:
-        lists = (("colours", "tint"), ("", "flux/colours"), *own(*(("flux/glossy colours",) if glossy else ())))
+        lists = (("buffers", "tint"), ("", "flux/colours"), *own(*(("flux/glossy colours",) if glossy else ())))
     else:
         lists = (*own("flux", f"flux/{KINDS[maps.kind]}", *(("flux/spot",) if spot else ()), *falloff_lists([lamp]),
                       *(("flux/cube",) if cube else ()), *(("flux/glossy",) if glossy else ()),

@@ -278,14 +278,10 @@ def _ratios(kit: Kit, case: CaseManifest) -> dict[str, float]:
 
 
 def differences_of(port: Port, step: StageEntry) -> dict[str, Difference]:
-    """Return what is out of the arrays that a port has of one stage, by name.
-
-    Raises
-    ------
-    DamagedError
-        If one cannot be read.
-    """
-    got = port.read_up_to(step)
+    """Return what is out of the arrays that a port has of one stage, by name; DamagedError if one cannot be read."""
+    for one in port.case.stages[: port.case.stages.index(step)]:
+        port.read(one)
+    got = port.read(step)
     for why in got.damaged.values():
         raise DamagedError(why)
     judged = {name: _judged(port, name, got, port.asked.tier_of(step.name, name)) for name in got.arrays}

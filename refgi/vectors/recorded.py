@@ -239,16 +239,14 @@ def run_of(
                 return np.ascontiguousarray(new >= 0)
             return np.ascontiguousarray(new, real if array.dtype.kind == "f" else array.dtype)
 
-        changed = {key: np.dtype(real) if _is_float_type(value) else rebuilt(value, key, handed, real)
+        floats = {key for key, value in arguments.items() if isinstance(value, type | np.dtype)
+                  and np.dtype(value).kind == "f"}
+        changed = {key: np.dtype(real) if key in floats else rebuilt(value, key, handed, real)
                    for key, value in arguments.items()}
         made = _named_outputs(function, stages.recorded(function(**changed)))
         return {array: made[leaf] for leaf, array in writes.items()}
 
     return run
-
-
-def _is_float_type(value: Any) -> bool:
-    return isinstance(value, type | np.dtype) and np.dtype(value) in (np.float32, np.float64)
 
 
 def leaves(value: Any, name: str = "") -> Iterator[tuple[str, Array]]:

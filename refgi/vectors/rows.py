@@ -159,7 +159,8 @@ class Form:
         """Return what the stage writes with another function, such as an edited one."""
         if self.double:
             arrays = {name: one.astype(np.float64) if one.dtype.kind == "f" else one for name, one in arrays.items()}
-        read = {name: self.adapt.get(name, _as_it_is)(_read(arrays, array)) for name, array in self.reads.items()}
+        read = {name: _read(arrays, array) for name, array in self.reads.items()}
+        read |= {name: adapt(read[name]) for name, adapt in self.adapt.items() if name in read}
         made = function(**read, **self.numbers)
         made = dict(zip(self.writes, made if isinstance(made, list | tuple) else (made,), strict=True))
         return made | {name: arrays[array] for name, array in self.kept.items()}
@@ -174,10 +175,6 @@ class Form:
         """Return the likely bugs of some lists, in the order of the file; `of`: a literal module that it calls."""
         module = f"{PACKAGE}.{of}" if of else self.function.__module__
         return tuple(Bug(row.cause, _lazily(self, row), row.paper) for row in rows(module) if row.list in lists)
-
-
-def _as_it_is(array: Array) -> Array:
-    return array
 
 
 def _renamed(reads: Mapping[str, str], leaf: Any) -> Any:

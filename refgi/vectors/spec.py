@@ -114,17 +114,7 @@ Change = Callable[[Array], Array]
 
 
 class Recipe:
-    """Given arrays and stages of a case, in order; stages read what is given or written before them.
-
-    Parameters
-    ----------
-    id : str
-        Stable name, method-name.
-    method : str
-        Short name of the method.
-    what : str
-        What the case shows, one line.
-    """
+    """Given arrays and stages of a case, in order; stages read what is given or written before them."""
 
     def __init__(self, id: str, method: str, what: str) -> None:
         self.id, self.method, self.what = id, method, what
@@ -155,10 +145,6 @@ class Recipe:
         """Return the case."""
         return Case(self.id, self.method, self.what, dict(self.given), dict(self.specs), tuple(self.stages),
                     dict(self.facts), dict(self.factors), self.scene)
-
-    def expected(self) -> dict[str, Array]:
-        """Return every array so far as the kit would keep it, for stages whose shape depends on those before."""
-        return expected_of(self.case())
 
 
 def reading(run: Run, **changes: Change) -> Run:

@@ -183,7 +183,7 @@ def _scene(scene: Scene, size: tuple[int, int]) -> dict[str, Any]:
         "schema": 1,
         "name": scene.name,
         "objects": [{"mesh": "scene.obj", "smooth_normals": scene.geometry.vertex_normals is not None}],
-        "materials": {_name(k): {
+        "materials": {f"material{k}": {
             "type": "phong" if any(one.specular) else "diffuse", "diffuse": list(one.diffuse),
             **({"specular": list(one.specular), "exponent": one.exponent} if any(one.specular) else {})}
             for k, one in enumerate(scene.materials)},
@@ -206,10 +206,6 @@ def _light(light: Any) -> dict[str, Any]:
     return {"type": "directional", "direction": list(light.direction), "irradiance_w_per_m2": list(light.irradiance)}
 
 
-def _name(material: int) -> str:
-    return f"material{material}"
-
-
 def _obj(scene: Scene) -> str:
     geometry, lines, material = scene.geometry, ["# triangles in the order of triangle_id"], -1
     points = geometry.vertices
@@ -223,7 +219,7 @@ def _obj(scene: Scene) -> str:
     for face, own in zip(geometry.faces + 1, geometry.material_of_face, strict=True):
         if own != material:
             material = int(own)
-            lines.append(f"usemtl {_name(material)}")
+            lines.append(f"usemtl material{material}")
         corners = [str(k) if normals is None else f"{k}//{k}" for k in face]
         lines.append(f"f {' '.join(corners)}")
     return "\n".join(lines) + "\n"

@@ -72,11 +72,13 @@ def form_of(
 
 def alone(
     function: Callable[..., Any], writes: tuple[str, ...] = ("",), exact: tuple[str, ...] = (), *,
-    lists: tuple[str, ...] | None = None, others: Mapping[str, Any] = {}, **more: Any,
+    lists: tuple[str, ...] | None = None, others: Mapping[str, Any] = {},
+    adapt: Mapping[str, Callable[[Array], Array]] | None = None, **more: Any,
 ) -> Callable[[Arguments], Described]:
     """Return what describes a stage by its literal function alone, with the rows of that function's name."""
     rows = (function.__name__,) if lists is None else lists
-    return lambda arguments: Described(form_of(function, arguments, writes, others), own(*rows), exact, **more)
+    return lambda arguments: Described(
+        form_of(function, arguments, writes, others, adapt=adapt), own(*rows), exact, **more)
 
 
 def written(form: Form, *ways: Edits) -> tuple[Callable[[Run, Names, Names], Run], ...]:

@@ -21,12 +21,6 @@ APART = (((AWAY, "st = along[k] @ position[:, of == k] - along[k] @ center[:, k,
          ((AWAY, "st = along[k] @ position[:, of == k] - along[k, :, ::-1] @ center[::-1, k, None]"),))
 
 
-def _visible_extent(arguments: Arguments) -> Described:  # noqa: ARG001
-    form = Form(val_areas.visible_extent, {"position": "position", "triangle_id": "covered"}, ("low", "high"),
-                adapt={"triangle_id": ids})
-    return Described(form, own("visible_extent", "box"))
-
-
 def _illuminated_extent(arguments: Arguments) -> Described:
     maps, lobes = arguments["map_positions"], arguments["map_lobe_fluxes"]
     if max(one.shape[2] for one in maps) > SAMPLES:
@@ -224,7 +218,9 @@ def _back_projection(arguments: Arguments) -> Described:
 
 
 FORMS = {
-    "rsm.visible_extent": _visible_extent, "rsm.illuminated_extent": _illuminated_extent,
+    "rsm.visible_extent": alone(val_areas.visible_extent, ("low", "high"), lists=("visible_extent", "box"),
+                                others={"triangle_id": "covered"}, adapt={"triangle_id": ids}),
+    "rsm.illuminated_extent": _illuminated_extent,
     **{f"cluster.{one.__name__[1:]}": one for one in (
         _kmeans_assign, _areas, _occluders, _depth_maps, _interleaving, _parts, _shadowed, _blur, _series, _depth_scale,
         _map_depths, _basis, _mip_levels, _mip_means, _csm_penumbra, _csm, _search, _depth_tests, _pcss_penumbra,

@@ -17,8 +17,8 @@ from refgi import Frame, load_scene
 from refgi.lights.selection import choose_lights, footprints
 from refgi.pairs.irradiance import add_lights
 from refgi.pairs.pair_sum import TILE
-from refgi.pairs.pixel_lights import Packed, pack, with_tree
-from refgi.pairs.settings import Lightcuts
+from refgi.pairs.pixel_lights import Packed, Unpacked
+from refgi.pairs.pixel_lights import clustered as with_clusters
 from refgi.pairs.tiles import block_by_block, taken
 from refgi.settings import of
 from refgi.splat import SiiSettings
@@ -47,7 +47,8 @@ def _of_count(name: str, frame: Frame, count: int, repeats: int) -> Iterator[Row
     position, normal, covered = frame.gbuffer.resolve("position", "normal", "covered")
     places = block_by_block(covered)
     points, normals = taken(position, places), taken(normal, places)
-    packed = pack(lights._replace(lobe_flux=None), pairs, area, points.dtype)  # lobes take as long either way
+    unpacked = Unpacked(lights._replace(lobe_flux=None), pairs, area, points.dtype)  # lobes take as long either way
+    packed = unpacked.packed
     number = packed.diffuse.shape[1] - 1
     if number == 0:
         return
@@ -59,7 +60,7 @@ def _of_count(name: str, frame: Frame, count: int, repeats: int) -> Iterator[Row
         full = partial(_sums, here, facing, packed)
 
         def clustered(error: float = error) -> Any:
-            return _sums(points, normals, with_tree(packed, Lightcuts(error)))
+            return _sums(points, normals, with_clusters(unpacked, error))
 
         of_full, of_cuts = in_turn({"full": full, "cuts": clustered}, repeats, time.process_time).values()
         expected, got = full(), clustered()

@@ -16,8 +16,8 @@ import OpenEXR
 from benchmarks.stability.file_formats import Format, read_scene
 from refgi.errors import InputError
 from refgi.image.picture import read_colour
-from refgi.vectors.bugfile import BugEntry, BugWriter, Told
 from refgi.vectors.check import Asked, Kit, check_output
+from refgi.vectors.manifest import BugEntry, BugWriter, Told
 from tests.scene.samples import FACES, TRIANGLES
 from tests.scene.test_gltf_pose import File
 from tests.scene.test_ply import ply
@@ -154,7 +154,8 @@ def _kit_file(name: str) -> bytes:
 def _bugs() -> bytes:
     bugs, values = BugWriter(), {"sum": np.arange(6, dtype=np.float32).reshape(2, 3)}
     entry = BugEntry(cause="half", shapes={"sum": (2, 3)}, arrays={})
-    bugs.add("sum", entry, {"sum": Told(np.array([1, 2]), np.array([0.5, 1.0], np.float32))}, values)
+    bugs.add("sum", entry, {"sum": Told(np.array([1, 2]), np.array([0.5, 1.0], np.float32))}, values,
+             {"sum": np.full((2, 3), 1e-6, np.float32)})
     return bugs.content()
 
 

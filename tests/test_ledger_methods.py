@@ -8,11 +8,11 @@ from refgi.cluster.val import val_ledger
 from refgi.frame import Frame
 from refgi.ledger import pixel_areas
 from refgi.lights.selection import choose_lights
+from refgi.literal.pairs import pair
 from refgi.scene import SpotLight, load_scene
 from refgi.settings import of
 from refgi.splat.multires import MultiresSettings, multires
 from refgi.splat.multires.approximations import multires_ledger
-from tests.naive import eq2
 from tests.naive.truth import nearest_hit
 from tests.truth.scenes import corner_room, rectangle, scene
 
@@ -68,7 +68,7 @@ def test_what_is_blocked_is_that_of_the_twin(method, settings, limit, evidence):
     for i, j in zip(*np.nonzero(buffer.covered), strict=True):
         x, normal = buffer.position[:, i, j], buffer.normal[:, i, j]
         for p, n, flux in zip(lights.position.T, lights.normal.T, lights.flux.T, strict=True):
-            share = eq2.pair(x, normal, p, n, flux)
+            share = pair(x, normal, p, n, flux)
             if share.any() and is_blocked(geometry, x, p):
                 blocked += areas[i, j] * share
     off = np.abs(ledger.shadowed - blocked).max() / ledger.emitted.max()

@@ -104,7 +104,7 @@ def _rendered(session: Session, job: "Job", files: "Pictures", asked: Asked) -> 
     kept = stages.Memory() if job.still is not None else None  # frames of a resting scene share their buffers
     engine = None
     if asked.engine == "literal":
-        from refgi.vectors.engine import Literal
+        from refgi.vectors.recorded import Literal
 
         engine = Literal()
     with on_threads(asked.threads), progress() as tell, stages.observe(

@@ -2,7 +2,8 @@
 
 A view has k maps of `rows` x `columns` texels, stacked along rows: the faces of a cube, else one. Each map has an eye
 `origin` (k, 3) and a `frame` (k, 3, 3) of rows right, down, forward; on its image plane, at the distance 1, it spans
--half to half (2,), horizontally and vertically. Where rays are `parallel`, `half` is in m. Row 0 is the top row.
+-half to half (2,), horizontally and vertically. Where rays are `parallel` (an orthographic map: all of them run along
+forward, as a directional light's do), `half` is in m. Row 0 is the top row.
 
 Symbols: x, y point of the image plane; o, d start and direction of a texel's ray, d of length 1 along forward;
 H, W rows and columns of all maps.
@@ -12,7 +13,21 @@ from typing import Any
 
 import numpy as np
 
-from refgi.literal.colours import tint
+
+def tint(triangle_id: Any, position: Any, vertices: Any, faces: Any, colours: Any) -> Any:
+    """Return the vertex colours (3, h, w) at points of triangles; 0 where there is no surface.
+
+    `triangle_id` (h, w), -1 for none. `position` (3, h, w): the points, m. `colours` (m, 3, 3): linear factors of each
+    triangle's corners. The share of a corner is the part of the triangle's area that lies across from it.
+    """
+    colour = np.moveaxis(colours[triangle_id], (2, 3), (0, 1))  # corner, rgb, h, w
+    p, q, r = np.moveaxis(vertices[faces[triangle_id]], (2, 3), (0, 1))
+    normal = np.cross(q - p, r - p, axis=0)
+    parts = [np.cross(b - a, position - a, axis=0) for a, b in ((q, r), (r, p), (p, q))]
+    share = np.stack([(part * normal).sum(axis=0) for part in parts]) / (normal * normal).sum(axis=0)
+    total = (share[:, None] * colour).sum(axis=0)
+    return np.where(triangle_id >= 0, total, 0)
+
 
 NEAREST = 1e-9  # share of a triangle's size: a hit that is nearer to the eye is rounding
 

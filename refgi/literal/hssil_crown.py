@@ -44,7 +44,8 @@ def points_and_shifts(start: Any, inner: int, crown: int, rows: int, columns: in
 def crown_samples(points: Any, shifts: Any, inner: int, radius: float, density: str) -> tuple[Any, Any]:
     """Return offsets (rows, columns, n, 2) of samples and how many texels each stands for (HSS Sec. 3.2).
 
-    The first `inner` of n points lie in the disc of radius r, the others in the crown from r to 2 r.
+    The first `inner` of n points lie in the disc of radius r, the others in the crown from r to 2 r. Of the density
+    "uniform" a sample stands for as many texels at each receiver: those weights are (1, 1, n).
     """
     ring = np.where(np.arange(len(points)) < inner, 0.0, 1.0)[None, None]  # 0 in the disc, 1 in the crown
     number = np.where(ring > 0, len(points) - inner, inner)

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from refgi.literal.buffers import rays, surface, texels, unit
-from refgi.literal.colours import tint
+from refgi.literal.buffers import rays, surface, texels, tint, unit
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)
 

@@ -1,4 +1,4 @@
-"""From subsplats to pixels, coarsest level first (AMS Sec. 3.5: Nichols and Wyman 2009; E-AMS-09).
+"""From subsplats to pixels, coarsest level first (AMS Sec. 3.5: Nichols and Wyman 2009; E-AMS-09); the whole method.
 
 Each layer of the illumination buffer holds all of a cell's light or none: interpolated by itself it makes halos and
 rings (Fig. 7). So the light of the coarser level is doubled, cells that were evaluated at this level (leaves) are
@@ -6,14 +6,27 @@ inserted, the result is filtered among the cells that hold light, down to the pi
 the cells that were refined there keep light apart: no weight knows depths or normals.
 
 Symbols: C light of a cell, W/m^2; m 1 where it holds any; w weight; level, row, column (n,) and irradiance (3, n) of
-the list of subsplats; `at` the level at hand.
+the list of subsplats; `at` the level at hand; `top` the coarsest level, `finest` that which is never refined. A test
+against a threshold that is None is not made.
 """
 
 from typing import Any
 
 import numpy as np
 
-from refgi.literal.multires import grid, of_cells
+from refgi.literal.multires import (
+    curvatures,
+    depth_ranges,
+    discontinuities,
+    grid,
+    normal_ranges,
+    of_cells,
+    representatives,
+    slopes,
+    states,
+    subsplats,
+)
+from refgi.literal.multires_lights import detail, lists, points, samples, splits, subsplat_irradiance
 
 TENT = (1, 2, 1)
 
@@ -158,3 +171,60 @@ def hats(pixels: int, texels: int, at: int) -> Any:
     """Return the weights (pixels, texels) of linear interpolation between centres of a level, clamped at the border."""
     place = np.clip((np.arange(pixels) + 0.5) / 2**at - 0.5, 0, texels - 1)
     return np.maximum(0, 1 - np.abs(place[:, None] - np.arange(texels)))
+
+
+def multires(
+    position: Any, normal: Any, depth: Any, triangle_id: Any, camera: Any, light_position: Any, light_normal: Any,
+    flux: Any, lobe_flux: Any = None, lobe_axis: Any = None, lobe_exponent: Any = None, area: Any = None, *, top: int,
+    finest: int, mean: bool, mode: str, filter_all: bool, corner_rule: bool, a: float, **tests: Any,
+) -> Any:
+    """Return E (3, h, w), W/m^2, by one list of subsplats for all lights; `tests` are those of `geometry_list`."""
+    # Sec. 3.2 and 3.3: which cells of the picture are subsplats
+    level, row, column, pixel = geometry_list(position, normal, depth, triangle_id, top=top, finest=finest, **tests)
+    # Sec. 3.4: their light
+    place, up = points(position, normal, triangle_id, level, row, column, pixel, mean)
+    light = subsplat_irradiance(place, up, light_position, light_normal, flux, lobe_flux, lobe_axis, lobe_exponent,
+                                area)
+    # Sec. 3.5: from subsplats to pixels
+    picture = upsample(triangle_id, level, row, column, light, top, mode, filter_all, corner_rule)
+    return detail(picture, position, normal, triangle_id, camera, a)
+
+
+def multires_of_lights(
+    position: Any, normal: Any, triangle_id: Any, camera: Any, light_position: Any, light_normal: Any, flux: Any,
+    lobe_flux: Any = None, lobe_axis: Any = None, lobe_exponent: Any = None, area: Any = None, *, top: int,
+    finest: int, threshold: float, form: str, mode: str, filter_all: bool, corner_rule: bool, a: float,
+) -> Any:
+    """Return E (3, h, w), W/m^2, by a list for each light, refined by its own irradiance (Sec. 3.3.1)."""
+    pixels = representatives(triangle_id, top)
+    sampled = samples(position, normal, pixels, light_position, light_normal, flux, lobe_flux, lobe_axis,
+                      lobe_exponent, area)
+    split = splits(pixels, sampled, finest, threshold, form)
+    listed: tuple[Any, Any, Any, Any, Any] = lists(pixels, sampled, split)
+    picture = sum_of_pictures(triangle_id, *listed, top, mode, filter_all, corner_rule)
+    return detail(picture, position, normal, triangle_id, camera, a)
+
+
+def geometry_list(
+    position: Any, normal: Any, depth: Any, triangle_id: Any, *, top: int, finest: int, rim: int, diagonal: str,
+    depth_threshold: float | None = None, depth_measure: str = "", slope_threshold: float | None = None,
+    slope_measure: str = "", normal_threshold: float | None = None, components: int = 3,
+    curvature_threshold: float | None = None, rate: bool = False,
+) -> tuple[Any, ...]:
+    """Return level, row, column and representative pixel (n,) of the subsplats that geometry asks for (Sec. 3.2)."""
+    tests: dict[str, Any] = {}
+    if depth_threshold is not None:
+        both = depth_ranges(depth, triangle_id, top, rim)
+        tests |= {"depth_least": both[:top], "depth_largest": both[top:], "depth_threshold": depth_threshold,
+                  "depth_measure": depth_measure}
+    if slope_threshold is not None:
+        tests |= {"slope": slopes(depth, triangle_id, top, slope_measure != "absolute"),
+                  "slope_threshold": slope_threshold, "slope_measure": slope_measure}
+    if normal_threshold is not None:
+        both = normal_ranges(normal, triangle_id, top, rim, components)
+        tests |= {"normal_least": both[:top], "normal_largest": both[top:], "normal_threshold": normal_threshold}
+    if curvature_threshold is not None:
+        tests |= {"curvature": curvatures(normal, position, triangle_id, top, rate),
+                  "curvature_threshold": curvature_threshold}
+    marked = discontinuities(top, finest, **tests)
+    return subsplats(triangle_id, states(marked, triangle_id, diagonal), finest)

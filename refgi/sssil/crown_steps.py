@@ -70,8 +70,8 @@ def crown_samples(points: Array, shifts: Array, inner: int, radius: float, densi
     radius: r, texels.
     density: Samples per texel, by the distance from the receiver.
     -> offsets (rows, columns, n, 2) int32: Texels (right, down) from the receiver to the sample, the disc's first.
-    -> weight (rows, columns, n): Texels of this level that a sample stands for; an axis of length 1 where all are
-        alike.
+    -> weight (rows, columns, n): Texels of this level that a sample stands for; (1, 1, n) of density "uniform", whose
+        samples stand for as many at each texel.
     """
     return tile_offsets(points, inner, shifts, radius, density)
 

@@ -14,11 +14,20 @@ import numpy as np
 from refgi.errors import InputError
 from refgi.types import Array
 from refgi.vectors.bounds import MOST_SPARED, distance, large_value
-from refgi.vectors.bugfile import BugEntry, Bugs
 from refgi.vectors.causes import EXPLAINED, Difference, explain, explained, places_of
 from refgi.vectors.judge import Judged, judge, judge_estimate, unlike
 from refgi.vectors.kit import Asked, DamagedError, Kit, fits, places_of_case
-from refgi.vectors.manifest import ArrayVerdict, CaseManifest, Cause, Result, StageEntry, StageVerdict, Verdict
+from refgi.vectors.manifest import (
+    ArrayVerdict,
+    BugEntry,
+    Bugs,
+    CaseManifest,
+    Cause,
+    Result,
+    StageEntry,
+    StageVerdict,
+    Verdict,
+)
 from refgi.vectors.port import IN_ORDER, Got, Port
 from refgi.vectors.report import (
     CAUSES,
@@ -202,7 +211,9 @@ def check_stage(port: Port, step: StageEntry, *, dirty: bool) -> StageVerdict:
     judged = {name: Judged(ArrayVerdict(name=name, verdict="invalid", tier=tiers[name], said=why, damaged=True))
               for name, why in got.damaged.items()}
     judged |= {name: _judged(port, name, got, tiers[name]) for name in got.arrays}
-    verdicts = [judged[name].verdict if name in judged else _not_run(name, tiers[name], bool(judged))
+    absent: dict[str, Any] = {"verdict": "invalid", "said": "missing, though other arrays of the stage are there"} if (
+        judged) else {"verdict": "not-run"}
+    verdicts = [judged[name].verdict if name in judged else ArrayVerdict(name=name, tier=tiers[name], **absent)
                 for name in step.writes]
     kinds = {one.verdict for one in verdicts}
     verdict: Verdict = next(one for one in ORDER if one in kinds)
@@ -210,12 +221,6 @@ def check_stage(port: Port, step: StageEntry, *, dirty: bool) -> StageVerdict:
     upstream = ("dirty" if dirty else "clean") if asked.chained else "isolated"
     return StageVerdict(case=port.case.id, stage=step.name, verdict=verdict, upstream=upstream,  # type: ignore[arg-type]
                         arrays=tuple(verdicts), causes=tuple(causes))
-
-
-def _not_run(name: str, tier: str, others: bool) -> ArrayVerdict:
-    """Return the verdict on an array that is not there: missing where others of its stage are."""
-    return ArrayVerdict(name=name, verdict="invalid" if others else "not-run", tier=tier,
-                        said="missing, though other arrays of the stage are there" if others else "")
 
 
 def stage_of_array(kit: Kit, case: str, name: str, got: Array, tier: str = "T1") -> StageVerdict:
@@ -273,14 +278,10 @@ def _ratios(kit: Kit, case: CaseManifest) -> dict[str, float]:
 
 
 def differences_of(port: Port, step: StageEntry) -> dict[str, Difference]:
-    """Return what is out of the arrays that a port has of one stage, by name.
-
-    Raises
-    ------
-    DamagedError
-        If one cannot be read.
-    """
-    got = port.read_up_to(step)
+    """Return what is out of the arrays that a port has of one stage, by name; DamagedError if one cannot be read."""
+    for one in port.case.stages[: port.case.stages.index(step)]:
+        port.read(one)
+    got = port.read(step)
     for why in got.damaged.values():
         raise DamagedError(why)
     judged = {name: _judged(port, name, got, port.asked.tier_of(step.name, name)) for name in got.arrays}

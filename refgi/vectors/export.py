@@ -10,7 +10,6 @@ import math
 import secrets
 import shutil
 from collections.abc import Callable, Mapping
-from functools import partial
 from importlib import resources
 from pathlib import Path
 
@@ -19,32 +18,35 @@ import numpy as np
 from refgi.errors import InputError, expect
 from refgi.types import Array
 from refgi.vectors.bounds import Bound, Budget, chained_budgets, distance, isolated_bounds, stored_budgets
-from refgi.vectors.bugfile import BUGS, BugEntry, BugWriter, Told
 from refgi.vectors.cases import kit_cases
 from refgi.vectors.manifest import (
+    BUGS,
     CASE,
     KIT,
     SCHEMAS,
     VERSION,
     ArrayEntry,
+    BugEntry,
+    BugWriter,
     CaseManifest,
     KitEntry,
     KitManifest,
     StageEntry,
+    Told,
     Tolerance,
     schema_text,
     text_of,
 )
-from refgi.vectors.scenefile import is_plain, write_scene
 from refgi.vectors.spec import Arrays, Bug, Case, Stage, expected_of, kind_of, outputs_of, stored
-from refgi.vectors.standalone import standalone_text
+from refgi.vectors.standalone import is_plain, standalone_text, write_scene
 from refgi.vectors.wiring import ANOTHER, wirings
 
 SEED = 20090101  # of the changes that bounds are measured by
-TOLD_BY, BESIDE = 96, 32  # elements of a likely bug that are kept: those that tell it, and others
+TOLD_BY, BESIDE = 64, 24  # elements of a likely bug that are kept: those that tell it, and others
 WIRING_TOLD_BY, WIRING_BESIDE = 20, 6  # the same of wrong wirings, of which there are many
 PARTS = 2  # of the bytes of an array that it takes with its bounds
-TOLD_IN = 3  # cases of a method that tell a likely bug: it is tried in no further ones
+TOLD_IN = 3  # stages of a method that tell a likely bug: it is tried in no further ones
+TOLD_AGAIN = 2  # the same where another method tells it already, as the stages do that all begin with
 WIRING_TRIED = 2  # cases of a method in which a wrong wiring is tried; in no further ones once it is told
 Tell = Callable[[str, float], None]
 
@@ -124,7 +126,8 @@ def _write_kit(
         entries, told = [], _Told()
         for number, (name, make) in enumerate(cases.items()):
             share = number / len(cases)
-            manifest = write_case(make(), part, told, partial(_tell_within, tell, name, share, len(cases)))
+            manifest = write_case(make(), part, told, lambda stage, done, name=name, share=share: tell(  # type: ignore[misc]
+                f"{name}: {stage}" if stage else name, share + done / len(cases)))
             text = text_of(manifest)
             (part / "cases" / name / CASE).write_text(text, encoding="utf-8", newline="\n")
             entries.append(KitEntry(id=name, method=manifest.method, what=manifest.what,
@@ -144,17 +147,26 @@ def _write_kit(
     return made
 
 
-def _tell_within(tell: Tell, name: str, begun: float, cases: int, stage: str, share: float) -> None:
-    """Tell of a stage of a case."""
-    tell(f"{name}: {stage}" if stage else name, begun + share / cases)
-
-
 class _Told:
-    """Which likely bugs cases tell from the right stage: a few of each method are enough, of wrong wirings one."""
+    """Which likely bugs cases tell from the right stage: a few of each method are enough, of wrong wirings one.
+
+    And which bounds and masks the kit holds: equal ones are kept once.
+    """
 
     def __init__(self) -> None:
+        self._files: dict[str, Path] = {}
         self._cases: dict[tuple[str, str, str], int] = {}
+        self._first: dict[tuple[str, str], str] = {}  # stage and cause: the method that tells it first
         self._wirings: dict[tuple[str, str, str], int] = {}
+
+    def once(self, home: Path, file: str, array: Array) -> str:
+        """Write an array below a case's folder unless the kit holds it; return its file, as seen from there."""
+        content = _npy(array)
+        known = self._files.setdefault(_sha256(content), home / file)
+        if known == home / file:
+            known.write_bytes(content)
+        return known.relative_to(home).as_posix() if known.is_relative_to(home) else (
+            f"../{known.relative_to(home.parent).as_posix()}")
 
     def wiring(self, method: str, stage: str, cause: str) -> bool:
         """Return whether a wrong wiring is to be tried in a further case, and count it."""
@@ -167,12 +179,15 @@ class _Told:
         self._wirings[_wiring_key(method, stage, cause)] = WIRING_TRIED
 
     def enough(self, method: str, stage: str, cause: str) -> bool:
-        """Return whether enough cases of a method tell a bug."""
-        return self._cases.get((method, kind_of(stage), cause), 0) >= TOLD_IN
+        """Return whether enough stages of a method tell a bug."""
+        first = self._first.get((kind_of(stage), cause), method) == method
+        return self._cases.get((method, kind_of(stage), cause), 0) >= (TOLD_IN if first else TOLD_AGAIN)
 
     def add(self, method: str, stage: str, cause: str, told: bool) -> None:
-        """Count a case that tells a bug, or cannot."""
+        """Count a stage that tells a bug, or cannot."""
         key = method, kind_of(stage), cause
+        if told:
+            self._first.setdefault(key[1:], method)
         self._cases[key] = self._cases.get(key, 0) + told
 
     def expect_none_blind(self) -> None:
@@ -208,7 +223,7 @@ def write_case(case: Case, folder: Path, told: _Told, tell: Tell) -> CaseManifes
             entry = _entry(case, name, known[name], _save(home, f"out/{name}.npy", known[name]))
             arrays[name] = entry.model_copy(update=_tolerances(home, name, entry, bounds[name], {
                 "chained": chained[name], "half": halves[name], "bytes": in_bytes[name],
-                "chained_half": chained_half[name]}))
+                "chained_half": chained_half[name]}, told))
         for bug in step.bugs:
             if not told.enough(case.method, step.name, bug.cause):
                 blind = _keep_bug(bugs, step, known, bounds, bug)
@@ -241,17 +256,18 @@ def _entry(case: Case, name: str, array: Array, saved: tuple[str, str]) -> Array
 
 
 def _tolerances(
-    home: Path, name: str, entry: ArrayEntry, bound: Bound, budgets: Mapping[str, Budget]
+    home: Path, name: str, entry: ArrayEntry, bound: Bound, budgets: Mapping[str, Budget], told: _Told
 ) -> Mapping[str, object]:
     """Return the fields of an array that say how far it may be off."""
     more: dict[str, object] = {}
     for key, budget in budgets.items():
-        file = None if budget.masked is None else _save(home, f"mask/{name}.{key}.npy", budget.masked)[0]
-        more[key] = Tolerance(**budget._replace(masked=None)._asdict() | {"masked": file})
+        file = None if budget.masked is None else told.once(home, f"mask/{name}.{key}.npy", budget.masked)
+        relative, large = (float(f"{one:.6g}") for one in (budget.relative, budget.large))
+        more[key] = Tolerance(relative=relative, large=large, outliers=budget.outliers, masked=file)
     if entry.dtype == "<f4":
-        more |= {"bound": _save(home, f"bound/{name}.npy", bound.limit)[0]}
+        more |= {"bound": told.once(home, f"bound/{name}.npy", bound.limit)}
     if bound.masked.any():
-        more |= {"masked": _save(home, f"mask/{name}.npy", bound.masked)[0],
+        more |= {"masked": told.once(home, f"mask/{name}.npy", bound.masked),
                  "masked_count": int(np.count_nonzero(bound.masked))}
     return more
 
@@ -285,7 +301,7 @@ def _keep_bug(
     if not (blind and wired):
         entry = BugEntry(cause=bug.cause, paper=bug.paper, arrays={}, blind=blind,
                          shapes={name: made[name].shape for name in step.writes})
-        bugs.add(step.name, entry, told, known)
+        bugs.add(step.name, entry, told, known, {name: bound.limit for name, bound in bounds.items()})
     return blind
 
 
@@ -297,11 +313,15 @@ def _spread(indices: Array, count: int) -> Array:
 
 
 def _save(home: Path, file: str, array: Array) -> tuple[str, str]:
-    stream = io.BytesIO()
-    np.lib.format.write_array(stream, array, version=(1, 0), allow_pickle=False)
-    content = stream.getvalue()
+    content = _npy(array)
     (home / file).write_bytes(content)
     return file, _sha256(content)
+
+
+def _npy(array: Array) -> bytes:
+    stream = io.BytesIO()
+    np.lib.format.write_array(stream, array, version=(1, 0), allow_pickle=False)
+    return stream.getvalue()
 
 
 def _sha256(content: bytes) -> str:

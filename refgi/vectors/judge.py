@@ -129,12 +129,8 @@ def _worst(
 def _values(expected: Array, got: Array, allowed: Array, place: tuple[int, ...] | None) -> dict[str, float | None]:
     if place is None:
         return {}
-    return {key: _number(array[place]) for key, array in (("expected", expected), ("got", got), ("bound", allowed))}
-
-
-def _number(value: object) -> float | None:
-    number = float(value)  # type: ignore[arg-type]
-    return number if np.isfinite(number) else None
+    return {key: float(array[place]) if np.isfinite(array[place]) else None
+            for key, array in (("expected", expected), ("got", got), ("bound", allowed))}
 
 
 def _dtype_fault(entry: ArrayEntry, got: Array) -> str:

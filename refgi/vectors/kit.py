@@ -11,8 +11,7 @@ import numpy as np
 
 from refgi.errors import InputError, shortened
 from refgi.types import Array
-from refgi.vectors.bugfile import BUGS, Bugs
-from refgi.vectors.manifest import KIT, CaseManifest, KitManifest, read_model
+from refgi.vectors.manifest import BUGS, KIT, Bugs, CaseManifest, KitManifest, read_model
 from refgi.vectors.storage import Depth
 
 MAGIC = b"\x93NUMPY"
@@ -134,13 +133,7 @@ class Kit:
 
 
 def inside(folder: Path, *names: str) -> Path:
-    """Return a file of a kit.
-
-    Raises
-    ------
-    DamagedError
-        If its name, or a link on the way, leads out of the kit.
-    """
+    """Return a file of a kit; DamagedError if its name, or a link on the way, leads out of the kit."""
     file = folder.joinpath(*names)
     try:
         if all(map(str.isprintable, names)) and file.resolve().is_relative_to(folder.resolve()):
@@ -157,13 +150,7 @@ def _is_name(name: str) -> bool:
 
 
 def read_array(file: Path) -> Array:
-    """Return an .npy file's array.
-
-    Raises
-    ------
-    DamagedError
-        If it is none, or holds fewer or more bytes than its header says.
-    """
+    """Return an .npy file's array; DamagedError if it is none, or not of as many bytes as its header says."""
     try:
         content = io.BytesIO(file.read_bytes())
         if content.read(len(MAGIC)) != MAGIC:

@@ -1,15 +1,27 @@
-"""The files of a kit and of a verdict as data: read, checked and described by JSON Schema with pydantic."""
+"""The files of a kit and of a verdict as data: read, checked and described by JSON Schema with pydantic.
 
+Likely bugs of a case are one packed file, `bugs.npz`, that the checker alone reads. `index` is JSON: by stage the
+cause, where the paper says how it should be, shapes, and of each array that shows it a piece of `places` (flat
+indices) and of `bits` (what the array holds there with the bug, as 4-byte words, changed from the expected ones by
+exclusive or; bits that move a value by less than `UNSEEN` of its bound are 0). Places are steps from the one before,
+and both lie byte by byte, all first bytes before all second ones: most are 0 then and take no room.
+"""
+
+import io
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
+import numpy as np
 import pydantic
 
 from refgi.errors import InputError, shortened
+from refgi.types import Array
 
-VERSION = "2.1.0"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
+VERSION = "2.1.1"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
 # a case, a major changes what an array means or its name
+LONGEST_LINE = 118  # characters of JSON
 KIT, CASE, RESULT = "kit.json", "manifest.json", "result.json"
 
 M = TypeVar("M", bound=pydantic.BaseModel)
@@ -25,7 +37,7 @@ class Tolerance(_Strict):
 
     relative: float
     large: float
-    outliers: float
+    outliers: float = 0.0
     masked: str | None = None  # file of bool: elements that may differ at will, beside those of the array's own mask
 
 
@@ -43,7 +55,7 @@ class ArrayEntry(_Strict):
     paper: str = ""
     tier: Literal["T0", "T1", "T3"]
     index_of: tuple[int, int] | None = None
-    bound: str | None = None  # file of (...) absolute bounds, one an element; None: equal
+    bound: str | None = None  # file of (...) absolute bounds, one an element, maybe another case's; None: equal
     masked: str | None = None  # file of bool: elements that may differ at will
     masked_count: int = 0
     chained: Tolerance | None = None
@@ -182,8 +194,19 @@ def schema_text(model: type[pydantic.BaseModel]) -> str:
 
 
 def text_of(model: pydantic.BaseModel) -> str:
-    """Return a file's text: keys in the order of the class, nothing that is absent."""
-    return json.dumps(model.model_dump(mode="json", exclude_defaults=True), indent=1, ensure_ascii=False) + "\n"
+    """Return a file's text: keys in the order of the class, nothing that is absent, on one line what fits there."""
+    return _lines(model.model_dump(mode="json", exclude_defaults=True), "") + "\n"
+
+
+def _lines(value: Any, indent: str) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    if len(indent) + len(text) <= LONGEST_LINE or not isinstance(value, dict | list):
+        return text
+    deeper = f"{indent} "
+    parts = ([f"{json.dumps(key, ensure_ascii=False)}: {_lines(one, deeper)}" for key, one in value.items()]
+             if isinstance(value, dict) else [_lines(one, deeper) for one in value])
+    inner = ",\n".join(f"{deeper}{one}" for one in parts)
+    return f"{text[0]}\n{inner}\n{indent}{text[-1]}"
 
 
 def read_model(model: type[M], file: Path) -> M:
@@ -196,3 +219,118 @@ def read_model(model: type[M], file: Path) -> M:
         faults = [f"{file}: {shortened('.'.join(map(str, one['loc']))) or 'file'}: {shortened(one['msg'], 200)}"
                   for one in error.errors()[:20]]
         raise InputError("\n".join(faults), file=str(file)) from error
+
+
+BUGS = "bugs.npz"
+UNSEEN = 1 / 16  # of an element's bound
+MANTISSA = 23  # bits of float32
+
+
+class Piece(pydantic.BaseModel):
+    """Where the elements of one array lie in `places` and `bits`."""
+
+    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
+    start: int
+    count: int
+
+
+class BugEntry(pydantic.BaseModel):
+    """A likely bug of a stage."""
+
+    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
+    cause: str
+    paper: str = ""
+    shapes: dict[str, tuple[int, ...]]  # of the arrays with the bug
+    arrays: dict[str, Piece]  # elements of those that show it
+    blind: bool = False  # this case cannot tell it from the right stage
+
+
+class Told(NamedTuple):
+    """What a bug makes of some elements of an array."""
+
+    places: Array  # (n,) flat indices
+    values: Array  # (n,) of the array's type
+
+
+class BugWriter:
+    """Likely bugs of a case, gathered stage by stage."""
+
+    def __init__(self) -> None:
+        self._index: dict[str, list[BugEntry]] = {}
+        self._places: list[Array] = []
+        self._bits: list[Array] = []
+        self._count = 0
+
+    def add(
+        self, stage: str, entry: BugEntry, told: Mapping[str, Told], expected: Mapping[str, Array],
+        limits: Mapping[str, Array],
+    ) -> None:
+        """Keep a bug; the pieces of its entry follow from what it tells. `limits`: bounds of all elements."""
+        pieces = {}
+        for name, (places, values) in told.items():
+            pieces[name] = Piece(start=self._count, count=len(places))
+            self._places.append(places)
+            bits = _words(values) ^ _words(expected[name].reshape(-1)[places])
+            self._bits.append(bits & _seen(values, limits[name].reshape(-1)[places]))
+            self._count += len(places)
+        self._index.setdefault(stage, []).append(entry.model_copy(update={"arrays": pieces}))
+
+    def content(self) -> bytes:
+        """Return the file."""
+        index = {stage: [one.model_dump(mode="json", exclude_defaults=True) for one in entries]
+                 for stage, entries in self._index.items()}
+        text = np.frombuffer(json.dumps(index, ensure_ascii=False).encode(), np.uint8)
+        stream = io.BytesIO()
+        places, bits = (np.concatenate([np.zeros(0, np.int64), *parts]) for parts in (self._places, self._bits))
+        np.savez_compressed(stream, index=text, places=_planes(np.diff(places, prepend=0)), bits=_planes(bits))
+        return stream.getvalue()
+
+
+class Bugs:
+    """Likely bugs of a case, from the bytes of its file; ValueError if it is none."""
+
+    def __init__(self, content: bytes) -> None:
+        try:
+            with np.load(io.BytesIO(content), allow_pickle=False) as file:
+                text, steps, bits = (file[name] for name in ("index", "places", "bits"))
+            self._places, self._bits = np.cumsum(_from_planes(steps).view("<i4")), _from_planes(bits)
+            index = json.loads(text.tobytes().decode())
+            self._of = {stage: [BugEntry.model_validate(one) for one in entries] for stage, entries in index.items()}
+        except Exception as error:  # a damaged archive raises nearly any, a size beyond memory among them
+            raise ValueError(str(error)) from error
+
+    def of(self, stage: str) -> list[BugEntry]:
+        """Return those of a stage."""
+        return self._of.get(stage, [])
+
+    def told(self, bug: BugEntry, name: str, expected: Array) -> Told:
+        """Return what a bug makes of an array whose expected values are given."""
+        piece = slice(bug.arrays[name].start, bug.arrays[name].start + bug.arrays[name].count)
+        places = self._places[piece]
+        right = expected.reshape(-1)[places]
+        words = self._bits[piece] ^ _words(right)
+        return Told(places, words.astype(np.bool_) if right.dtype.kind == "b" else words.view(right.dtype))
+
+
+def _seen(values: Array, limit: Array) -> Array:
+    """Return which bits of floats move them by more than `UNSEEN` of their bounds; all of other numbers."""
+    if values.dtype.kind != "f":
+        return np.full(values.shape, 0xFFFFFFFF, np.uint32)
+    with np.errstate(all="ignore"):  # what a bug makes may be any number
+        unseen = np.floor(np.log2(UNSEEN * limit / np.spacing(np.abs(values)).astype(np.float64)))
+    unseen = np.where(np.isfinite(unseen), np.clip(unseen, 0, MANTISSA), 0).astype(np.uint32)
+    return np.uint32(0xFFFFFFFF) << unseen
+
+
+def _planes(words: Array) -> Array:
+    return np.ascontiguousarray(words.astype("<u4").view(np.uint8).reshape(-1, 4).T)
+
+
+def _from_planes(planes: Array) -> Array:
+    return np.ascontiguousarray(planes.T).reshape(-1).view("<u4")
+
+
+def _words(array: Array) -> Array:
+    """Return the elements of a stored array as 4-byte words."""
+    array = np.ascontiguousarray(array)
+    return array.astype(np.uint32) if array.dtype.kind == "b" else array.view(np.uint32)

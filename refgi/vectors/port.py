@@ -72,12 +72,6 @@ class Port:
                 got.read[name] = f"{got.read[name]}; {IN_ORDER}" if name in got.read else IN_ORDER
         return got
 
-    def read_up_to(self, step: StageEntry) -> Got:
-        """Return what a port has of a stage, those before it having been read."""
-        for one in self.case.stages[: self.case.stages.index(step)]:
-            self.read(one)
-        return self.read(step)
-
     def note_storage(self, step: StageEntry) -> None:
         """Note what storage in few bits does to a stage's arrays."""
         if self.asked.depth or set(self.asked.tiers.values()) & set(PACKED):

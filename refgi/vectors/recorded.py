@@ -9,9 +9,10 @@ arrays that it is handed, everything that is no array (lamps, settings, numbers)
 import dataclasses
 import hashlib
 import inspect
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,12 +23,10 @@ from refgi.methods import find_method, render
 from refgi.scene import Scene
 from refgi.settings import flat
 from refgi.types import Array
-from refgi.vectors.docstrings import field_description, returned, spec_of, summary, taken
+from refgi.vectors.docstrings import field_description, input_spec, returned, spec_of, summary, taken
 from refgi.vectors.forms import described
-from refgi.vectors.forms.beside import MOST_WORK, NO_BUGS, Described
-from refgi.vectors.inputs import input_spec
-from refgi.vectors.recipe import Recipe
-from refgi.vectors.spec import Arrays, Bug, Case, Run, Spec
+from refgi.vectors.forms.beside import MOST_WORK, NO_BUGS, Described, ways
+from refgi.vectors.spec import Arrays, Bug, Case, Recipe, Run, Spec
 
 LEFT_OUT = frozenset({"scene.load", "rays.build", "rsm.resolve", "rsm.rasterize", "rsm.solid_angles", "rays.openness",
                       "rsm.lamp_irradiance", "lights.shares", "lights.map_flux", "cluster.blockers",
@@ -212,15 +211,15 @@ def _add(
 
 def _beside(beside: Described, stage: Run, reads: Mapping[str, str], writes: Mapping[str, str]) -> dict[str, Any]:
     """Return the likely bugs and other ways of a stage by the names that a case has for its arrays."""
-    bugs, variants = tuple[Bug, ...](), tuple[Run, ...]()
+    bugs, variants, makes = tuple[Bug, ...](), tuple[Run, ...](), beside.variants
     if beside.form is not None and beside.work <= MOST_WORK:
         form = beside.form.named(reads, writes)
         rows = (bug for module, name, *most in beside.lists for bug in form.bugs(name, of=module)[:most[0] if most else
                                                                                               None])
         bugs = tuple(bug for bug in rows if not any(word in bug.cause for word in beside.without))
-        variants = (form,)
+        variants, makes = (form,), (*makes, *ways(beside.form))
     return {"bugs": bugs + tuple(bug for make in beside.bugs for bug in make(stage, reads, writes)),
-            "variants": variants + tuple(make(stage, reads, writes) for make in beside.variants)}
+            "variants": variants + tuple(make(stage, reads, writes) for make in makes)}
 
 
 def plain(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -240,16 +239,14 @@ def run_of(
                 return np.ascontiguousarray(new >= 0)
             return np.ascontiguousarray(new, real if array.dtype.kind == "f" else array.dtype)
 
-        changed = {key: np.dtype(real) if _is_float_type(value) else rebuilt(value, key, handed, real)
+        floats = {key for key, value in arguments.items() if isinstance(value, type | np.dtype)
+                  and np.dtype(value).kind == "f"}
+        changed = {key: np.dtype(real) if key in floats else rebuilt(value, key, handed, real)
                    for key, value in arguments.items()}
         made = _named_outputs(function, stages.recorded(function(**changed)))
         return {array: made[leaf] for leaf, array in writes.items()}
 
     return run
-
-
-def _is_float_type(value: Any) -> bool:
-    return isinstance(value, type | np.dtype) and np.dtype(value) in (np.float32, np.float64)
 
 
 def leaves(value: Any, name: str = "") -> Iterator[tuple[str, Array]]:
@@ -291,3 +288,41 @@ def rebuilt(value: Any, name: str, handed: Callable[[str, Array], Array], real: 
     if isinstance(value, list | tuple):
         return type(value)(parts.values())
     return dataclasses.replace(value, **parts)
+
+
+class Timed(NamedTuple):
+    """A stage that ran by its literal form."""
+
+    stage: str
+    literal: float  # s
+    kernel: float  # s, of the stage's own function, compiling included
+
+
+class Literal:
+    """What runs stages: `stages.observe(substitute=Literal())`; afterwards `timed` says which, and how slowly."""
+
+    def __init__(self) -> None:
+        self.timed: list[Timed] = []
+
+    def __call__(
+        self, name: str, function: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[str, Any]
+    ) -> Any:
+        """Return what a stage returns: an object as its own function makes it, with the arrays of its literal form."""
+        bound = inspect.signature(function).bind(*args, **kwargs)
+        bound.apply_defaults()
+        beside = described(name, bound.arguments)
+        started = time.perf_counter()
+        value = function(*args, **kwargs)
+        kernel = time.perf_counter() - started
+        if beside.form is None:
+            return value
+        arrays = {leaf: array for parameter, part in bound.arguments.items() for leaf, array in leaves(part, parameter)}
+        started = time.perf_counter()
+        made = beside.form(arrays, None)
+        self.timed.append(Timed(name, time.perf_counter() - started, kernel))
+
+        def handed(leaf: str, array: Array) -> Array:
+            new = made.get(leaf.removeprefix("."), array)
+            return np.ascontiguousarray(new, array.dtype)
+
+        return rebuilt(value, "", handed, np.float64)

@@ -15,7 +15,7 @@ import dataclasses
 import functools
 import inspect
 import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import resources
 from typing import Any, NamedTuple
@@ -99,15 +99,18 @@ def called_by(function: Any) -> tuple[Function, ...]:
     return tuple(found)
 
 
-def _literal_names(function: Function) -> Iterator[Function]:
-    """Yield the functions of refgi.literal that a function names."""
+@functools.cache
+def _literal_names(function: Function) -> tuple[Function, ...]:
+    """Return the functions of refgi.literal that a function names."""
+    found = []
     for node in ast.walk(ast.parse(code_of(function))):
         known = function.__globals__.get(node.id) if isinstance(node, ast.Name) else None
         value = inspect.unwrap(known) if callable(known) else known  # of functools.cache
         if isinstance(value, Function) and value.__module__.startswith(PACKAGE):
-            yield value
+            found.append(value)
         if isinstance(known, types.ModuleType) and known.__name__.startswith(PACKAGE):
             raise StaleEditError(f"{_name(function)}: expected names of functions, got {known.__name__}")
+    return tuple(found)
 
 
 @functools.cache
@@ -156,7 +159,8 @@ class Form:
         """Return what the stage writes with another function, such as an edited one."""
         if self.double:
             arrays = {name: one.astype(np.float64) if one.dtype.kind == "f" else one for name, one in arrays.items()}
-        read = {name: self.adapt.get(name, _as_it_is)(_read(arrays, array)) for name, array in self.reads.items()}
+        read = {name: _read(arrays, array) for name, array in self.reads.items()}
+        read |= {name: adapt(read[name]) for name, adapt in self.adapt.items() if name in read}
         made = function(**read, **self.numbers)
         made = dict(zip(self.writes, made if isinstance(made, list | tuple) else (made,), strict=True))
         return made | {name: arrays[array] for name, array in self.kept.items()}
@@ -171,10 +175,6 @@ class Form:
         """Return the likely bugs of some lists, in the order of the file; `of`: a literal module that it calls."""
         module = f"{PACKAGE}.{of}" if of else self.function.__module__
         return tuple(Bug(row.cause, _lazily(self, row), row.paper) for row in rows(module) if row.list in lists)
-
-
-def _as_it_is(array: Array) -> Array:
-    return array
 
 
 def _renamed(reads: Mapping[str, str], leaf: Any) -> Any:

@@ -10,7 +10,7 @@ import random
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -48,15 +48,6 @@ class Outcome(NamedTuple):
     digest: bytes  # of its arrays
 
 
-class Found(NamedTuple):
-    """A change that explains a port's arrays."""
-
-    said: str
-    explained: int  # cases
-    tried: int
-    share: float  # of the elements that differ in them, the mean
-
-
 def searched(
     kit: Kit, output: Path, asked: Asked, result: Result, *, seconds: float = 60.0, tell: Tell = lambda *_: None
 ) -> Result:
@@ -80,20 +71,21 @@ def searched(
         f"{first.stage}: {count} changes tried", done))[: CAUSES - len(known)]
     if not found:
         return result
-    common = [CommonCause(cause=one.said, explained=one.explained, tried=one.tried) for one in found]
-    own = [Cause(cause=one.said, share=one.share) for one in found]
+    common, own = zip(*found, strict=True)
     stages = (_told(one, own) if (one.case, one.stage) == first.first else one for one in result.stages)
     finding = first.model_copy(update={"causes": (*known, *common)})
     return result.model_copy(update={"findings": (finding, *result.findings[1:]), "stages": tuple(stages)})
 
 
-def _told(verdict: StageVerdict, found: list[Cause]) -> StageVerdict:
+def _told(verdict: StageVerdict, found: Sequence[Cause]) -> StageVerdict:
     """Return a verdict with more causes, in place of remarks that explain nothing."""
     known = [one for one in verdict.causes if one.share > 0]
     return verdict.model_copy(update={"causes": tuple([*known, *found][:CAUSES])})
 
 
-def _found(trials: list["Trial"], seconds: float, tell: Callable[[float, int], None]) -> list[Found]:
+def _found(
+    trials: list["Trial"], seconds: float, tell: Callable[[float, int], None]
+) -> list[tuple[CommonCause, Cause]]:
     """Return the changes that explain the first case, those that explain most cases first."""
     found = []
     for (function, change), share in islice(_explaining(trials, seconds, tell), MOST_KEPT):
@@ -101,8 +93,9 @@ def _found(trials: list["Trial"], seconds: float, tell: Callable[[float, int], N
         right = [one for one in shares if one >= EXPLAINED]
         file = function.__module__.removeprefix("refgi.").replace(".", "/")
         said = f"{change.said}, as if refgi's {file}.py:{change.line} were changed so in {function.__name__}"
-        found.append(Found(said, len(right), len(shares), sum(right) / len(right)))
-    return sorted(found, key=lambda one: (-one.explained, -round(one.share, 2)))
+        found.append((CommonCause(cause=said, explained=len(right), tried=len(shares)),
+                      Cause(cause=said, share=sum(right) / len(right))))
+    return sorted(found, key=lambda one: (-one[0].explained, -round(one[1].share, 2)))
 
 
 def _explaining(

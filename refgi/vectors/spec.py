@@ -1,9 +1,10 @@
 """What a kit is made of: arrays with axes and units, stages that map arrays to arrays, cases.
 
-Stages run in float64 on arrays as the kit stores them, so that each expected value is the stage's own, to the rounding
-of its storage, for exactly the inputs that a port reads.
+A `Recipe` is a case in the making. Stages run in float64 on arrays as the kit stores them, so that each expected value
+is the stage's own, to the rounding of its storage, for exactly the inputs that a port reads.
 """
 
+import functools
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -76,6 +77,7 @@ def axes_of(axes: str) -> list[str]:
     return [one.strip() for one in re.split(r",(?![^(]*\))", axes)]
 
 
+@functools.cache
 def kind_of(stage: str) -> str:
     """Return a stage's name without the numbers of maps, levels and rounds: rsm.map_surface0 and 1 are one kind."""
     return re.sub(r"\.?\d+", "", stage)
@@ -106,3 +108,61 @@ def outputs_of(step: Stage, known: Arrays, real: Any, run: Run | None = None) ->
     """Return what a stage writes, as stored; by another `run` in its place, such as that of a bug."""
     made = (run or step.run)(as_read(known, step.reads, real), real)
     return {name: stored(made[name]) for name in step.writes}
+
+
+Change = Callable[[Array], Array]
+
+
+class Recipe:
+    """Given arrays and stages of a case, in order; stages read what is given or written before them."""
+
+    def __init__(self, id: str, method: str, what: str) -> None:
+        self.id, self.method, self.what = id, method, what
+        self.scene: Any = None
+        self.given: dict[str, Array] = {}
+        self.specs: dict[str, Spec] = {}
+        self.stages: list[Stage] = []
+        self.facts: dict[str, Any] = {}
+        self.factors: dict[str, float] = {}
+
+    def give(self, name: str, array: Any, spec: Spec) -> None:
+        """Add an input that no stage writes."""
+        self.given[name], self.specs[name] = np.asarray(array), spec
+
+    def add(
+        self, name: str, what: str, run: Run, reads: tuple[str, ...], writes: Mapping[str, Spec], *, paper: str = "",
+        bugs: tuple[Bug, ...] = (), exact: tuple[str, ...] = (),
+        variants: tuple[Run, ...] = (),
+    ) -> None:
+        """Add a stage that writes the arrays named, which are what their specs say; the rest as in `Stage`."""
+        missing = [one for one in reads if one not in self.specs]
+        if missing:
+            raise ValueError(f"{self.id}: stage {name} reads {', '.join(missing)}, which nothing gives or writes")
+        self.stages.append(Stage(name, what, reads, tuple(writes), run, paper, bugs, variants, exact))
+        self.specs.update(writes)
+
+    def case(self) -> Case:
+        """Return the case."""
+        return Case(self.id, self.method, self.what, dict(self.given), dict(self.specs), tuple(self.stages),
+                    dict(self.facts), dict(self.factors), self.scene)
+
+
+def reading(run: Run, **changes: Change) -> Run:
+    """Return a stage that reads some inputs changed; a name's dots are written as two underscores."""
+    named = {name.replace("__", "."): change for name, change in changes.items()}
+
+    def altered(arrays: Arrays, real: Any) -> Arrays:
+        return run({name: named[name](array) if name in named else array for name, array in arrays.items()}, real)
+
+    return altered
+
+
+def writing(run: Run, **changes: Change) -> Run:
+    """Return a stage whose outputs are changed; a name's dots are written as two underscores."""
+    named = {name.replace("__", "."): change for name, change in changes.items()}
+
+    def altered(arrays: Arrays, real: Any) -> Arrays:
+        made = run(arrays, real)
+        return {name: named[name](array) if name in named else array for name, array in made.items()}
+
+    return altered

@@ -7,6 +7,7 @@ at once, and two change places. An input of vectors or colours is read as triple
 are without numbers, so that a bug has one name in all cases, but where a stage reads several of a kind.
 """
 
+import functools
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -94,11 +95,13 @@ def _together(case: Case, step: Stage, known: Arrays, fits: Fits) -> Iterator[tu
             yield cause, {name: known[other] for name, other in taken.items()}
 
 
+@functools.cache
 def _home(name: str) -> str:
     """Return what an array is a field of, or a list of fields: multires.depth_ranges of multires.depth_ranges.low.1."""
     return re.sub(r"\.\d+$", "", name).rpartition(".")[0]
 
 
+@functools.cache
 def _leaf(name: str) -> str:
     return kind_of(name.removeprefix(f"{_home(name)}."))
 

@@ -15,6 +15,7 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights import PixelLights
 from refgi.lights.selection import choose_lights
+from refgi.literal.pairs import pair
 from refgi.literal.val_areas import interleaving
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
@@ -22,7 +23,6 @@ from refgi.rsm import facing_normals
 from refgi.scene import load_scene
 from refgi.settings import of
 from tests.cluster.lights import hard_visibility
-from tests.naive import eq2
 from tests.pairs import sets
 
 ROUNDING = 1e-12  # of sums over some hundred lights in another order, relative to the largest
@@ -88,8 +88,8 @@ def test_every_pixel_sums_its_lights_under_their_visibility(side, count, assignm
     for y, x in np.argwhere(to.covered):
         at, up = to.position[:, y, x], to.normal[:, y, x]
         for i in np.flatnonzero(subset == y % side * side + x % side):
-            pair = eq2.pair(at, up, lights.position[:, i], lights.normal[:, i], lights.flux[:, i])
-            expected[:, y, x] += side**2 * pair * striped(owner[i], at, up)
+            share = pair(at, up, lights.position[:, i], lights.normal[:, i], lights.flux[:, i])
+            expected[:, y, x] += side**2 * share * striped(owner[i], at, up)
     error = np.abs(result - expected).max() / expected.max()
     assert error < ROUNDING
     evidence(f"n = {side}, {count} lights by {assignment}: {error:.1e} off the literal sum")

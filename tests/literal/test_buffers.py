@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from refgi.literal.buffers import image_points, rays, surface, visible_triangles
-from refgi.literal.colours import tint
+from refgi.literal.buffers import image_points, rays, surface, tint, visible_triangles
 from refgi.rays import Tracer
 from refgi.rsm.raster.projection import view_frame
 from refgi.scene import Geometry

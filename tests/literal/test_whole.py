@@ -8,7 +8,7 @@ from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import with_clamp
 from refgi.literal import hssil as literal_hssil
-from refgi.literal import multires_splatting, val_areas
+from refgi.literal import multires_upsample, val_areas
 from refgi.literal import val as literal_val
 from refgi.settings import of
 from refgi.splat import MultiresSettings, multires
@@ -51,14 +51,14 @@ def test_multires_by_geometry_and_by_each_light(frame):
                                      "subsplats.criteria.depth.threshold": 0.4})
     lights, area = lights_of(frame, settings)
     criteria = settings.subsplats.criteria
-    same(multires_splatting.multires(
+    same(multires_upsample.multires(
         *planes, buffer.depth, buffer.triangle_id, camera, *lights, area, mean=False, rim=criteria.rim,
         diagonal=criteria.diagonal, depth_threshold=0.4, depth_measure=criteria.depth.measure,
         normal_threshold=criteria.normal.threshold, components=len(criteria.normal.components), **common),
         multires(frame, settings))
     own = of(MultiresSettings, **{"lights.count": 30, "subsplats": "irradiance", "subsplats.coarsest": 3,
                                 "subsplats.threshold": 0.4, "detail": 0.2})
-    same(multires_splatting.multires_of_lights(
+    same(multires_upsample.multires_of_lights(
         *planes, buffer.triangle_id, camera, *lights, area, threshold=0.4, form=own.subsplats.form,
         **common), multires(frame, own))
 

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from refgi.literal.pairs import pair
 from refgi.literal.sii import ellipsoids
-from tests.naive import eq2, raster
+from tests.naive import raster
 
 
 def peak(flux, norm=1 / math.pi):
@@ -23,7 +24,7 @@ def counts(x, p, axis, exponent, intensity, low):
     return cosine > 0 and intensity * cosine**exponent >= low * r**2
 
 
-def irradiance(position, normal, lights, low, term=eq2.pair):
+def irradiance(position, normal, lights, low, term=pair):
     """Sum the diffuse pairs inside the range, and those outside; also count those inside at each receiver."""
     inside, outside = (np.zeros((3, position.shape[1])) for _ in range(2))
     overdraw = np.zeros(position.shape[1], int)

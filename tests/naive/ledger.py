@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from tests.naive import eq2
+from refgi.literal.pairs import lobe_intensity, pair
 
 
 def corner(x, y):
@@ -53,14 +53,14 @@ def screen(pixels, lights, threshold, least):
 def terms(x, normal, lights, k, least):
     """Return of the diffuse part and of the lobe of light k: plain and clamped E, E on the other side, and B."""
     p, n, flux = lights.position[:, k], lights.normal[:, k], lights.flux[:, k]
-    found = []
+    found, r = [], float(np.linalg.norm(x - p))
+    near = (r / max(r, least)) ** 2 if r else 0.0
     if flux.any():
-        found.append((eq2.pair(x, normal, p, n, flux), eq2.clamped_pair(x, normal, p, n, flux, least=least),
-                      eq2.pair(x, -normal, p, n, flux), bound(x, p, flux.max() / math.pi, n, 1.0)))
+        e = pair(x, normal, p, n, flux)
+        found.append((e, e * near, pair(x, -normal, p, n, flux), bound(x, p, flux.max() / math.pi, n, 1.0)))
     if lights.lobe_flux is not None and lights.lobe_flux[:, k].any():
         axis, exponent, lobe = lights.lobe_axis[:, k], float(lights.lobe_exponent[k]), lights.lobe_flux[:, k]
-        e = eq2.lobe_pair(x, normal, p, n, axis, exponent, lobe)
-        r = np.linalg.norm(x - p)
-        found.append((e, e * r**2 / max(r, least) ** 2, eq2.lobe_pair(x, -normal, p, n, axis, exponent, lobe),
-                      bound(x, p, eq2.lobe_intensity(axis, n, axis, exponent, lobe).max(), axis, exponent)))
+        e, behind = (pair(x, side, p, n, 0 * lobe, (lobe, axis, exponent)) for side in (normal, -normal))
+        peak = lobe.max() * float(lobe_intensity(axis, n, axis, exponent))
+        found.append((e, e * near, behind, bound(x, p, peak, axis, exponent)))
     return found

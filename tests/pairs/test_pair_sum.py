@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from refgi.errors import InputError
 from refgi.jit import threads
+from refgi.literal import pairs as literal
 from refgi.pairs.pair_sum import GROUP, TILE, geometry_term, sum_pairs
 from refgi.pairs.pixel_lights import pack_diffuse
 from refgi.pairs.tiles import block_by_block, bound_tile, lights_in_reach
 from refgi.settings import of
 from refgi.splat import PairSettings, Receivers, irradiance
-from tests.naive import eq2
 from tests.pairs import sets
 
 PLAIN = PairSettings()
@@ -33,9 +33,8 @@ def summed(receivers, lights, settings=PLAIN, footprint=None):
 def test_sum_is_that_of_the_twin(real, evidence):
     rng = np.random.default_rng(1)
     receivers, lights = sets.room(rng, 37, real)
-    args = (part[:, 0].astype(np.float64) for part in receivers[:2])
-    twin = sets.lights(*(part.astype(np.float64) for part in lights[:3]))
-    expected = eq2.irradiance(*args, twin)
+    to, of_lights = ([part.astype(np.float64) for part in parts] for parts in (receivers[:2], lights[:3]))
+    expected = literal.irradiance(*to, np.zeros((1, 37)), *of_lights)[:, 0]
     got = summed(receivers, lights)
     assert not got[expected == 0].any()
     error = np.abs(got - expected)[expected > 0].max() / expected.mean()
@@ -302,7 +301,7 @@ def test_arrays_are_checked():
             irradiance(receivers, lights, of(PairSettings, clamp=clamp))
 
 
-def literal(covered):
+def in_blocks(covered):
     """Blocks of 16 row by row; within one 8 x 8 after 8 x 8, within these 4 x 4 after 4 x 4, row by row."""
     height, width = covered.shape
     places = []
@@ -322,6 +321,6 @@ def literal(covered):
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.999, 1.0])
 def test_pixels_go_block_by_block(shape, share):
     covered = np.random.default_rng(3).random(shape) < share
-    assert block_by_block(covered).tolist() == literal(covered)
+    assert block_by_block(covered).tolist() == in_blocks(covered)
     nth = np.flatnonzero(np.random.default_rng(4).random(int(covered.sum())) < 0.3)  # few of them, or none
-    assert block_by_block(covered, nth).tolist() == [literal(covered)[i] for i in nth]
+    assert block_by_block(covered, nth).tolist() == [in_blocks(covered)[i] for i in nth]

@@ -1,32 +1,24 @@
 """Oracle tests of the kit's buffers and direct light: the literal text that bugs are put into gives what stages do."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
-from refgi.literal.colours import tint
+from refgi.literal.buffers import tint
 from refgi.scene import load_scene
 from refgi.vectors.bounds import distance, isolated_bounds, large_value
-from refgi.vectors.cases import hssil, sii
-from refgi.vectors.scenefile import write_scene
-from refgi.vectors.spec import expected_of, kind_of, outputs_of
+from refgi.vectors.cases.hssil import FULL_PLANS, QUICK_PLANS
+from refgi.vectors.cases.splat import SII
+from refgi.vectors.spec import kind_of, outputs_of
+from refgi.vectors.standalone import write_scene
+from tests.vectors.made import made
 
-CASES = {**sii.QUICK, "sii-smooth": sii.FULL["sii-smooth"], "sii-ramp": {**sii.QUICK, **sii.FULL}.get("sii-ramp"),
-         **{name: {**hssil.QUICK, **hssil.FULL}[name] for name in hssil.VIEWS}}
+CASES = (*SII, "sii-smooth", *QUICK_PLANS, *FULL_PLANS)
 SINGLE = 2.0**-22  # of an array's largest value: what storage in float32 leaves
 FEW = 4.0  # times as much for integrals: refgi's rules of 4 and 8 nodes
 EDGES = 0.004  # share of texels whose centre lies on an edge to rounding, of points at a shadow's edge
 LIMIT = {"gbuffer.ids": 0.0, "rsm.ids": 0.0, "before.ids": 0.0, "shadow": 0.0, "gbuffer.surface": SINGLE,
          "rsm.surface": SINGLE, "before.surface": SINGLE, "rsm.flux": FEW * SINGLE, "direct": SINGLE,
          "rsm.visible_triangles": 0.0, "rsm.reflected_flux": FEW * SINGLE}
-
-
-@cache
-def made(name):
-    """Return a case and all its arrays."""
-    case = {**CASES, **sii.FULL, **hssil.FULL}[name]()
-    return case, expected_of(case)
 
 
 @pytest.mark.parametrize("name", CASES)

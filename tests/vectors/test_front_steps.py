@@ -10,15 +10,14 @@ from refgi.frame import Frame
 from refgi.settings import of
 from refgi.splat import sii
 from refgi.splat.sii.settings import SiiSettings
-from refgi.vectors.cases import sii as cases
-from refgi.vectors.cases import sii_range
 from refgi.vectors.cases.scenes import AWAY, BULB, SPOT, SUN, room
+from refgi.vectors.cases.splat import RANGE, SII, SII_FULL
 from refgi.vectors.recorded import leaves
 from refgi.vectors.rows import Form
-from tests.vectors.splat_ports import made
+from tests.vectors.made import made
 
 SAME = 1e-12  # of the largest value: sums of pairs in another order
-PLANS = (*cases.QUICK_PLANS, *cases.FULL_PLANS, *sii_range.QUICK_PLANS)
+PLANS = (*SII, *SII_FULL, *RANGE)
 INPUTS = re.compile(r"scene\.|materials\.|.*\.(projection|lamp)\.|lights\.(halton_points0?\.shifts|warp\d?\.points)$")
 SETTINGS = ({}, {"seed": 5}, {"filtered": True, "pattern": "grid", "warp": "A"},
             {"warp": "B"}, {"pattern": "grid"}, {"pattern": "grid", "warp": "A"}, {"pattern": "random"},

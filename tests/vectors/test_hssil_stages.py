@@ -9,12 +9,13 @@ from refgi.diagnostics import diagnosing
 from refgi.frame import Frame
 from refgi.sssil.hssil import hssil
 from refgi.stages import observe
-from refgi.vectors.bounds import distance, isolated_bounds, large_value
+from refgi.vectors.bounds import isolated_bounds, large_value
 from refgi.vectors.cases import hssil as cases
 from refgi.vectors.recorded import leaves
-from refgi.vectors.spec import expected_of
+from tests.vectors import made as shared
 
 CASES = {**cases.QUICK, **cases.FULL}
+VIEWS = {**cases.QUICK_PLANS, **cases.FULL_PLANS}
 CHAIN = 2e-5  # of the large values: some 20 stages, each rounded to float32 (6e-8) and some divided by small numbers
 FLIPPED = 0.005  # share of values that rounding decides otherwise in the chain: ties between equally near texels
 MASKED = 0.05  # share of an array that rounding may decide
@@ -26,27 +27,24 @@ STEPS = 1e-12  # of the large values: a stage's sums in another order than its s
 @cache
 def made(name):
     """Return a case, all its arrays and the bounds of what it writes."""
-    case = CASES[name]()
-    known = expected_of(case)
+    case, known = shared.made(name)
     bounds = (isolated_bounds(case, step, known, 1) for step in case.stages)
     return case, known, {key: bound for some in bounds for key, bound in some.items()}
 
 
-def outside(array, expected, bound):
-    """Return which elements of an array lie outside their bounds, those that may differ at will left out."""
-    if np.shape(array) != expected.shape:
-        return np.ones(expected.shape, bool)
-    return (distance(array, expected) > bound.limit) & ~bound.masked
+def picture(plan):
+    """Return what the method makes of a plan."""
+    frame = Frame(plan.scene, width=plan.size[0], height=plan.size[1], dtype=np.float64, shadows=plan.shadows,
+                  rsm_resolution=plan.maps)
+    return hssil(frame, cases.settings_of(plan))
 
 
 @pytest.mark.feature("HSS-02")
 @pytest.mark.filterwarnings("ignore:radius")
-@pytest.mark.parametrize("name", cases.VIEWS)
+@pytest.mark.parametrize("name", VIEWS)
 def test_the_chain_is_the_method(name):
     case, known, _ = made(name)
-    scene, (width, height), shadows = cases.VIEWS[name]
-    frame = Frame(scene, width=width, height=height, dtype=np.float64, shadows=shadows, rsm_resolution=cases.MAPS)
-    expected, found = hssil(frame, cases.SETTINGS[name]), known[case.stages[-1].writes[0]]
+    expected, found = picture(VIEWS[name]()), known[case.stages[-1].writes[0]]
     off = np.abs(found - expected) > CHAIN * (large_value(expected) + np.abs(expected))
     assert off.mean() <= FLIPPED
     assert expected.any() == (name != "hssil-dark")
@@ -68,14 +66,12 @@ def test_the_blend_is_that_of_a_sequence(name):
 
 @pytest.mark.feature("HSS-05")
 @pytest.mark.filterwarnings("ignore:radius")
-@pytest.mark.parametrize("name", [*cases.VIEWS, *cases.TEMPORAL])
+@pytest.mark.parametrize("name", [*VIEWS, *cases.TEMPORAL])
 def test_steps_make_what_their_stage_makes(name):
     """Levels and sums of the fused stages, with samples that float32 shifts do not move to another texel."""
     with observe(record=True, steps=True) as log, diagnosing(False):
-        if name in cases.VIEWS:
-            scene, (width, height), shadows = cases.VIEWS[name]
-            hssil(Frame(scene, width=width, height=height, dtype=np.float64, shadows=shadows,
-                        rsm_resolution=cases.MAPS), cases.SETTINGS[name])
+        if name in VIEWS:
+            picture(VIEWS[name]())
         else:
             list(cases.sequence(name, cases.frames_of(name)))
     compared = set()
@@ -110,13 +106,13 @@ def test_the_literal_text_is_the_stages(name):
 
 @pytest.mark.parametrize("name", CASES)
 def test_only_scene_views_and_random_numbers_are_given(name):
-    case = CASES[name]()
+    case = made(name)[0]
     own = {one for one in case.given if one.startswith("sssil.") and ".projection." not in one}
     before = {f"sssil.reprojection.{key}" for key in ("irradiance", "frames")} | (
         {"sssil.motion.before", "sssil.reprojection.depth", "sssil.reprojection.normal_before"}
         if name == "hssil-moving" else set())
     assert all(one.endswith((".start", ".shifts")) for one in own - before)
-    assert own & before == set() if name in cases.VIEWS else "sssil.reprojection.irradiance" in own
+    assert own & before == set() if name in VIEWS else "sssil.reprojection.irradiance" in own
 
 
 def same(array, expected):

@@ -10,9 +10,9 @@ import pytest
 from click.testing import CliRunner
 
 from refgi.cli.group import VerbGroup
-from refgi.vectors.bugfile import BugWriter
 from refgi.vectors.check import Asked, DamagedError, Kit, check_output
 from refgi.vectors.kit import read_array
+from refgi.vectors.manifest import BugWriter
 
 VALUES = np.arange(6, dtype=np.float32).reshape(2, 3)
 

@@ -1,8 +1,11 @@
 """Legal variants of a port raise no alarm: float64, float32, reordered and fused sums, tiles, half floats in T2."""
 
+from itertools import permutations, product
+
 import numpy as np
 import pytest
 
+from refgi.literal.pairs import lobe_norm
 from refgi.vectors.cases import kit_cases
 from refgi.vectors.check import ALL_WITHIN, Asked, check_output
 from refgi.vectors.spec import as_read
@@ -91,6 +94,46 @@ def test_sums_in_any_order(kit, tmp_path, kind, order):
     np.save(tmp_path / case.id / "pairs.sum.npy", total)
     result = check_output(kit, tmp_path, Asked(stages=("pairs.sum",), cases=("sii-halton",)))
     assert result.exit_code == ALL_WITHIN
+
+
+def dot(a, b, order, fused):
+    """Return a dot product in float32, summed in an order of components; fused: each step is rounded once."""
+    first, *rest = order
+    total = a[first] * b[first]
+    for k in rest:
+        total = single(a[k].astype(np.float64) * b[k] + total) if fused else total + a[k] * b[k]
+    return total
+
+
+@pytest.mark.parametrize("name", ["sii-three-lamps", "sii-warp-b"])
+def test_fused_and_reordered_dot_products_of_lobes(kit, name):
+    """What an exponent magnifies: coincident lights, cosines of lobes, by the inverse of a length or a division."""
+    case = next(one for one in kit.cases(Asked(cases=(name,))))
+    known = {one: kit.array(case, one) for one in case.arrays}
+    light = {key: known[f"lights.pixel_lights.{key}"] for key in (
+        "position", "normal", "flux", "lobe_flux", "lobe_axis", "lobe_exponent")}
+    x, n = (known[f"rsm.surface.{key}"][:, None] for key in ("position", "normal"))
+    p, m, axis = (light[key][:, :, None, None] for key in ("position", "normal", "lobe_axis"))
+    exponent = light["lobe_exponent"][:, None, None]
+    norm = single(lobe_norm((light["normal"] * light["lobe_axis"]).sum(axis=0).astype(float), light["lobe_exponent"]))
+    limit, expected = kit.extra(case, case.arrays["pairs.sum"].bound), known["pairs.sum"]
+    worst = 0.0
+    for order, fused, inverse, fused_sum in product(permutations(range(3)), *[(False, True)] * 3):
+        d = x - p
+        square = dot(d, d, order, fused)
+        length = np.sqrt(np.maximum(square, single(1e-30)))
+        w = d * (single(1) / length) if inverse else d / length
+        fall = np.maximum(0, -dot(n, w, order, fused)) / (square if fused else length * length)
+        sent = np.maximum(0, dot(m, w, order, fused))
+        lobe = np.where(sent > 0, np.maximum(0, dot(axis, w, order, fused)) ** exponent, 0) * norm[:, None, None] * fall
+        total = np.zeros(expected.shape, np.float32)
+        for k in range(len(exponent)):
+            for key, part in (("flux", sent[k] * fall[k] / single(np.pi)), ("lobe_flux", single(lobe[k]))):
+                added = light[key][:, k, None, None]
+                total = single(added.astype(np.float64) * part + total) if fused_sum else total + added * part
+        off = np.where(known["rsm.visible_triangles"] >= 0, np.abs(total.astype(float) - expected), 0)
+        worst = max(worst, float((off / limit).max()))
+    assert 0.05 < worst < 1
 
 
 @pytest.mark.parametrize("tier", ["T2", "T2B"])

@@ -54,7 +54,7 @@ def verdicts(kit, case, tier, chained):
 
 
 @pytest.mark.parametrize("size", ["quick", pytest.param("full", marks=pytest.mark.slow)])
-def test_noise_in_any_array_is_out_or_not_judged(size):
+def test_noise_in_any_array_is_out_or_not_judged(size, evidence):
     kit = Cached(kit_folder(size))
     found = {mode: {} for mode in (*MODES, *PACKED)}
     for case in kit.cases(Asked()):
@@ -64,4 +64,7 @@ def test_noise_in_any_array_is_out_or_not_judged(size):
               if seen & {"exact", "within"}}
     assert passed == {}
     idle = {mode: [name for name, seen in found[mode].items() if "not-judged" in seen] for mode in MODES}
+    shares = ", ".join(f"{tier}{' chained' if chained else ''} {len(names)} of {len(found[tier, chained])}"
+                       for (tier, chained), names in idle.items())
+    evidence(f"{size} kit, arrays not judged: {shares}; all others out")
     assert {mode: names for mode, names in idle.items() if len(names) > MOST_NOT_JUDGED * len(found[mode])} == {}

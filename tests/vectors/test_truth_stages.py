@@ -1,7 +1,5 @@
 """Statistical and oracle tests of the kit's path-traced truth: another estimate agrees, likely bugs do not."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
@@ -9,27 +7,21 @@ from refgi.frame import Frame
 from refgi.settings import of
 from refgi.truth.settings import TruthSettings
 from refgi.truth.truth import trace_truth
-from refgi.vectors.cases import truth as cases
-from refgi.vectors.spec import expected_of
+from refgi.vectors.cases.visibility import TRUTH, TRUTH_FULL, truth_settings
 from tests.naive.truth import one_bounce
+from tests.vectors.made import made
 
 NAMES = tuple(f"truth.path_traced.{one}" for one in ("mean", "variance_of_mean", "samples"))
-CASES = {**cases.QUICK, **cases.FULL}
+PLANS = {name: plan() for name, plan in {**TRUTH, **TRUTH_FULL}.items()}
 AGREE = 2.0  # mean square of standardised differences: 1; to 1.7 where lobes are met by chance, which has heavy tails
 DIFFER = 5.0  # a bug stands out
 SAME = 0.1  # the same random numbers: paths differ by the rounding of receivers alone
 CELLS, QUADRATURE = 32, 0.03  # of the light's cone along a side; what their midpoint rule is off by, of the mean
 
 
-@cache
-def made(name):
-    case = CASES[name]()
-    return case, expected_of(case)
-
-
 def frame_of(name):
-    width, height = cases.SIZE
-    return Frame(cases.VIEWS[name][0], width=width, height=height, dtype=np.float64, shadows="exact")
+    plan, (width, height) = PLANS[name], PLANS[name].size
+    return Frame(plan.scene, width=width, height=height, dtype=np.float64, shadows="exact")
 
 
 def against(known, result):
@@ -49,20 +41,20 @@ def deviation(mean, variance, other_mean, other_variance):
 
 
 @pytest.mark.slow("truth-two-bounces")
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", PLANS)
 def test_the_chain_is_the_method(name):
-    known, settings = made(name)[1], cases.VIEWS[name][1]
+    known, settings = made(name)[1], truth_settings(PLANS[name])
     assert against(known, trace_truth(frame_of(name), settings)) < SAME
     assert known[NAMES[0]].mean() > 0
     assert (known[NAMES[2]] == settings.samples * (known["rsm.visible_triangles"] >= 0)).all()
 
 
 @pytest.mark.slow("truth-visible")
-@pytest.mark.parametrize("name", [name if name in cases.QUICK else pytest.param(name, marks=pytest.mark.slow)
-                                  for name in CASES])
+@pytest.mark.parametrize("name", [name if name in TRUTH else pytest.param(name, marks=pytest.mark.slow)
+                                  for name in PLANS])
 def test_another_estimator_agrees(name):
     """Vertices of light paths and directions of the hemisphere, combined, with other random numbers."""
-    known, settings = made(name)[1], cases.VIEWS[name][1]
+    known, settings = made(name)[1], truth_settings(PLANS[name])
     other = of(TruthSettings, seed=9, samples=768, bounces=settings.bounces, visibility=settings.visibility,
                emitters=settings.emitters, light_grid=16, interleave=1)
     assert 0.5 < against(known, trace_truth(frame_of(name), other)) < AGREE
@@ -72,7 +64,7 @@ def test_another_estimator_agrees(name):
 def test_a_sum_over_the_light_s_cone_agrees():
     """The twin: a midpoint rule over directions of the lamp, each ray against every triangle."""
     known = made("truth-matte")[1]
-    light = cases.VIEWS["truth-matte"][0].lights[0]
+    light = PLANS["truth-matte"].scene.lights[0]
     arrays = {key: array.astype(float) if array.dtype.kind == "f" else array for key, array in known.items()}
     albedo = arrays["materials.diffuse"][arrays["scene.material_of_face"]]
     pixels = np.argwhere(arrays["rsm.visible_triangles"] >= 0)[3::30]

@@ -1,7 +1,6 @@
 """Stages of clustered visibility: as the method, as their literal forms, and blind to no bug."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -10,15 +9,16 @@ from refgi.cluster import val
 from refgi.frame import Frame
 from refgi.stages import observe
 from refgi.vectors.bounds import distance, isolated_bounds
-from refgi.vectors.cases.val import FULL, FULL_PLANS, PLANS, QUICK, settings_of
+from refgi.vectors.cases.visibility import VAL, VAL_FULL, val_settings
 from refgi.vectors.recorded import leaves
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import expected_of, kind_of, outputs_of
-from tests.vectors.splat_ports import named_as_given
+from refgi.vectors.spec import kind_of, outputs_of
+from tests.vectors import made as shared
+from tests.vectors.made import named_as_given
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
-ALL = PLANS | FULL_PLANS
+ALL = VAL | VAL_FULL
 STORED = 1e-5  # of the brightest: float32 between some thirty stages, where one over 1 - V >= 0.02 magnifies it
 RANDOM = {"cluster.sampled_pixels.shifts", "lights.halton_points0.shifts"}
 MASKED = 0.01  # of an array's elements, at most
@@ -27,11 +27,10 @@ OWN = ("cluster.", "rsm.facing", "rsm.visible_extent", "rsm.illuminated_extent")
 WITHOUT_FORM = {"cluster.traced_share"}  # what Embree answers
 
 
-@cache
 def made(name):
     """Return a case, its arrays, and the stages of `val` itself."""
-    case = (QUICK | FULL)[name]()
-    return case, expected_of(case), [step for step in case.stages if step.name.startswith(OWN)]
+    case, known = shared.made(name)
+    return case, known, [step for step in case.stages if step.name.startswith(OWN)]
 
 
 def frame_of(plan):
@@ -54,7 +53,7 @@ def is_off(got, expected, bound):
 def test_the_last_stage_is_the_method(name):
     """Oracle: `val` on a frame of the same scene, in float64."""
     plan = ALL[name]()
-    settings = settings_of(plan)
+    settings = val_settings(plan)
     case, known, steps = made(name)
     picture = val(frame_of(plan), settings)
     last = steps[-1].writes[0]
@@ -70,7 +69,7 @@ def test_steps_make_what_their_stage_makes(name):
     """Oracle: the method's own fused stages. Maps on which there is nothing are dropped there."""
     plan, compared = ALL[name](), set()
     with observe(record=True, steps=True) as log:
-        val(frame_of(plan), settings_of(plan))
+        val(frame_of(plan), val_settings(plan))
     for run in log.runs:
         steps, whole = dict(leaves(run.steps)), dict(leaves(run.output))
         for leaf in steps.keys() & whole.keys():
@@ -82,7 +81,7 @@ def test_steps_make_what_their_stage_makes(name):
             np.testing.assert_allclose(got, expected, rtol=0, atol=STEPS * large, err_msg=f"{run.name} {leaf}")
     assert compared >= {"frame.visible_extent", "frame.illuminated_extent", "cluster.kmeans", "cluster.area_lights",
                         "cluster.irradiance"} | (
-        set() if settings_of(plan).visibility is None or name == "val-rays" else {"cluster.shadow_maps"})
+        set() if val_settings(plan).visibility is None or name == "val-rays" else {"cluster.shadow_maps"})
 
 
 @pytest.mark.parametrize("name", ALL)

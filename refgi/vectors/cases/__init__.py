@@ -1,13 +1,13 @@
 """The cases of the kits, by id. Ids are stable: a case that changes its meaning gets another id."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from importlib import import_module
 
 from refgi.errors import InputError
 from refgi.vectors.spec import Case
 
 # each with QUICK and FULL: functions without arguments that make a case, by its id
-MODULES = ("pairs", "sii", "sii_range", "multires", "gather", "vpl", "val", "hssil", "truth")
+MODULES = ("splat", "multires", "visibility", "hssil")
 
 
 def kit_cases(kit: str) -> dict[str, Callable[[], Case]]:
@@ -17,10 +17,5 @@ def kit_cases(kit: str) -> dict[str, Callable[[], Case]]:
     """
     if kit not in ("quick", "full"):
         raise InputError(f"kit: expected 'quick' or 'full', got {kit!r}", key="kit")
-    return dict(_of(("QUICK",) if kit == "quick" else ("QUICK", "FULL")))
-
-
-def _of(names: tuple[str, ...]) -> Iterator[tuple[str, Callable[[], Case]]]:
-    for module in MODULES:
-        for name in names:
-            yield from getattr(import_module(f"refgi.vectors.cases.{module}"), name).items()
+    return {id: make for module in MODULES for name in ("QUICK", "FULL")[: 1 + (kit == "full")]
+            for id, make in getattr(import_module(f"refgi.vectors.cases.{module}"), name).items()}

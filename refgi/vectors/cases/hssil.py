@@ -2,13 +2,13 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from refgi.diagnostics import diagnosing
-from refgi.frame import Frame, Shadows
+from refgi.frame import Frame
 from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Scene, SpotLight
 from refgi.settings import of, replaced
@@ -23,14 +23,14 @@ from refgi.vectors.cases.scenes import (
     SPOT,
     VIEW,
     Plan,
+    Plans,
+    cases_of,
     coloured,
-    recorded_plan,
     room,
     stored_scene,
 )
-from refgi.vectors.recipe import Recipe, reading
 from refgi.vectors.recorded import record
-from refgi.vectors.spec import Arrays, Bug, Case, Run, expected_of, kind_of
+from refgi.vectors.spec import Arrays, Bug, Case, Recipe, Run, expected_of, kind_of, reading
 
 LEVELS = "HSS Sec. 3.2: sums of disjoint crowns"
 WARP = "HSS Sec. 3.3: depth and normal decide whether it is the same surface (E-HSS-11)"
@@ -39,38 +39,6 @@ AWAY = SpotLight((0.5, 1.5, 0.625), (0.3, 1.0, 0.2), 0.3, 0.6, (4.0, 2.6, 1.3)) 
 NARROW = math.radians(38)  # the room fills the picture: points enter at its edges
 BOX = slice(16, 20)  # vertices of the lid in the room
 CLOSEST = of(HssilSettings, downsample="closest", disc_share=1.0)  # what the stages here are of
-SETTINGS = {
-    "hssil-default": replaced(CLOSEST, {"samples": 12, "radius": 2.0, "seed": 3}),
-    "hssil-paper": replaced(PRESETS["paper"], {"sampling.samples": 12, "sampling.radius": 2.0}),
-    "hssil-odd": replaced(CLOSEST, {"samples": 9, "radius": None, "levels": 5, "start": "full", "seed": 1,
-                                    "blur.size": 3, "plane_tolerance": 0.1, "cosine": 0.5}),
-    "hssil-pole": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "seed": 5}),
-    "hssil-dark": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "start": "quarter"}),
-    "hssil-average": replaced(CLOSEST, {"samples": 7, "radius": 2.0, "levels": 3, "seed": 6, "downsample": "average",
-                                        "pattern": "pixel", "density": "uniform"}),
-    "hssil-radiance": replaced(CLOSEST, {"samples": 10, "radius": 2.5, "levels": 3, "seed": 2,
-                                         "downsample": "closest_average", "pattern": "fixed"}),
-    "hssil-all": replaced(CLOSEST, {"radius": 2.0, "levels": 3, "pattern": "all"}),
-    "hssil-ramp": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "seed": 4}),
-    "hssil-colours": replaced(CLOSEST, {"samples": 8, "radius": 2.0, "levels": 2, "seed": 8}),
-    "hssil-resampled": of(HssilSettings, samples=8, radius=2.0, levels=3, seed=9),
-    "hssil-share": of(HssilSettings, samples=60, radius=2.0, levels=2, seed=10, downsample="closest"),
-}
-# scene, columns and rows of the picture, shadows of direct light
-VIEWS: dict[str, tuple[Scene, tuple[int, int], Shadows]] = {
-    "hssil-default": (room(SPOT, BULB), (40, 28), "map"),
-    "hssil-paper": (room(SPOT, matte=True), (40, 28), "map"),
-    "hssil-odd": (room(SPOT, matte=True), (13, 11), "exact"),
-    "hssil-pole": (room(DOWN, camera=POLE), (21, 14), "exact"),
-    "hssil-dark": (room(AWAY, matte=True), (18, 13), "exact"),
-    "hssil-average": (room(SPOT, BULB), (27, 19), "exact"),
-    "hssil-radiance": (room(SPOT, BULB, matte=True, smooth=True), (30, 21), "exact"),
-    "hssil-all": (room(BULB, matte=True), (18, 14), "exact"),
-    "hssil-ramp": (room(RAMP, SPOT, matte=True), (17, 13), "exact"),
-    "hssil-colours": (coloured(room(SPOT, BULB, matte=True)), (20, 15), "exact"),
-    "hssil-resampled": (room(SPOT, BULB, matte=True), (20, 15), "exact"),
-    "hssil-share": (room(SPOT, matte=True), (14, 11), "exact"),
-}
 TEMPORAL = {
     "hssil-temporal": of(TemporalSettings),
     "hssil-entering": of(TemporalSettings, warm_up=False, entering_speed=6.0, clamp=1.0, clamp_radius=2,
@@ -81,10 +49,11 @@ STEPS = {"hssil-temporal": (0.1, 0.15, -0.2), "hssil-entering": (-0.2, 0.1, 0.2)
 FRAMES, TEMPORAL_SIZE = 4, (32, 24)
 
 
-def screen_space(id: str, what: str) -> Case:
-    """Return hssil on a scene."""
-    scene, size, shadows = VIEWS[id]
-    return with_other_light(recorded_plan(id, Plan(what, scene, size, MAPS, shadows=shadows), "hssil", SETTINGS[id]))
+def settings_of(plan: Plan) -> HssilSettings:
+    """Return the settings of a plan: the nearest senders and whole discs unless it, or its preset, says otherwise."""
+    choices = dict(plan.choices)
+    base = {"": CLOSEST, "default": HssilSettings(), **PRESETS}[choices.pop("preset", "")]
+    return replaced(base, choices)
 
 
 def with_other_light(case: Case) -> Case:
@@ -186,33 +155,63 @@ def sequence(id: str, scenes: list[Scene]) -> Sequence:
     return Sequence(scenes, settings, TEMPORAL[id], width=width, height=height, dtype=np.float64, rsm_resolution=MAPS)
 
 
-def _quick(id: str, what: str) -> Any:
-    return lambda: screen_space(id, what)
-
-
-QUICK = {
-    "hssil-default": _quick("hssil-default", "interleaved samples, two lamps, 4 levels from half resolution, void "
-                            "around the room; the nearest senders and whole discs, where the method's default draws "
-                            "senders and lets discs cover a quarter"),
-    "hssil-paper": _quick("hssil-paper", "the paper's settings: rows share samples, uniform density, no blur"),
-    "hssil-odd": _quick("hssil-odd", "13 x 11 pixels from full resolution down to one texel"),
-    "hssil-pole": _quick("hssil-pole", "a camera that looks straight down: surfaces of one depth; a lamp above a "
-                         "purely glossy shelf"),
-    "hssil-ramp": _quick("hssil-ramp", "a spot of a squared ramp beside one of the smoothstep"),
+QUICK_PLANS: Plans = {
+    "hssil-default": lambda: Plan(
+        "interleaved samples, two lamps, 4 levels from half resolution, void around the room; the nearest senders and "
+        "whole discs, where the method's default draws senders and lets discs cover a quarter",
+        room(SPOT, BULB), (40, 28), MAPS, choices={"samples": 12, "radius": 2.0, "seed": 3}, shadows="map"),
+    "hssil-paper": lambda: Plan(
+        "the paper's settings: rows share samples, uniform density, no blur", room(SPOT, matte=True), (40, 28), MAPS,
+        choices={"preset": "paper", "sampling.samples": 12, "sampling.radius": 2.0}, shadows="map"),
+    "hssil-odd": lambda: Plan(
+        "13 x 11 pixels from full resolution down to one texel", room(SPOT, matte=True), (13, 11), MAPS, choices={
+            "samples": 9, "radius": None, "levels": 5, "start": "full", "seed": 1, "blur.size": 3,
+            "plane_tolerance": 0.1, "cosine": 0.5}, shadows="exact"),
+    "hssil-pole": lambda: Plan(
+        "a camera that looks straight down: surfaces of one depth; a lamp above a purely glossy shelf",
+        room(DOWN, camera=POLE), (21, 14), MAPS, choices={"samples": 8, "radius": 2.0, "levels": 2, "seed": 5},
+        shadows="exact"),
+    "hssil-ramp": lambda: Plan(
+        "a spot of a squared ramp beside one of the smoothstep", room(RAMP, SPOT, matte=True), (17, 13), MAPS,
+        choices={"samples": 8, "radius": 2.0, "levels": 2, "seed": 4}, shadows="exact"),
+}
+FULL_PLANS: Plans = {
+    "hssil-dark": lambda: Plan(
+        "no direct light: all is 0", room(AWAY, matte=True), (18, 13), MAPS,
+        choices={"samples": 8, "radius": 2.0, "levels": 2, "start": "quarter"}, shadows="exact"),
+    "hssil-average": lambda: Plan(
+        "levels of means by area; each texel has samples of its own", room(SPOT, BULB), (27, 19), MAPS, choices={
+            "samples": 7, "radius": 2.0, "levels": 3, "seed": 6, "downsample": "average", "pattern": "pixel",
+            "density": "uniform"}, shadows="exact"),
+    "hssil-radiance": lambda: Plan(
+        "the closest texels with the mean radiance of all; one mirror-symmetric set of samples, no blur",
+        room(SPOT, BULB, matte=True, smooth=True), (30, 21), MAPS, choices={
+            "samples": 10, "radius": 2.5, "levels": 3, "seed": 2, "downsample": "closest_average",
+            "pattern": "fixed"}, shadows="exact"),
+    "hssil-all": lambda: Plan(
+        "every texel of disc and crown is a sample, no blur", room(BULB, matte=True), (18, 14), MAPS,
+        choices={"radius": 2.0, "levels": 3, "pattern": "all"}, shadows="exact"),
+    "hssil-colours": lambda: Plan(
+        "vertex colours multiply the albedo, and so the light that senders send",
+        coloured(room(SPOT, BULB, matte=True)), (20, 15), MAPS,
+        choices={"samples": 8, "radius": 2.0, "levels": 2, "seed": 8}, shadows="exact"),
+    "hssil-resampled": lambda: Plan(
+        "the method's defaults: senders drawn in proportion to flux, discs that cover a quarter of what a sample "
+        "stands for", room(SPOT, BULB, matte=True), (20, 15), MAPS,
+        choices={"preset": "default", "samples": 8, "radius": 2.0, "levels": 3, "seed": 9}, shadows="exact"),
+    "hssil-share": lambda: Plan(
+        "samples that stand for less than a texel, whose discs cover all of it", room(SPOT, matte=True), (14, 11), MAPS,
+        choices={"preset": "default", "samples": 60, "radius": 2.0, "levels": 2, "seed": 10, "downsample": "closest"},
+        shadows="exact"),
+}
+QUICK: dict[str, Callable[[], Case]] = {
+    **cases_of(QUICK_PLANS, "hssil", settings_of, finish=with_other_light),
     "hssil-temporal": lambda: coherent("hssil-temporal", "a camera that moves: fourth frame, surfaces found in 1 to 3 "
                                        "frames before, disoccluded ones"),
     "hssil-entering": lambda: coherent("hssil-entering", "a camera that turns: entering pixels, clamped light of the "
                                        "nearest texel"),
 }
-FULL: dict[str, Any] = {
-    "hssil-dark": _quick("hssil-dark", "no direct light: all is 0"),
-    "hssil-average": _quick("hssil-average", "levels of means by area; each texel has samples of its own"),
-    "hssil-radiance": _quick("hssil-radiance", "the closest texels with the mean radiance of all; one mirror-symmetric "
-                             "set of samples, no blur"),
-    "hssil-all": _quick("hssil-all", "every texel of disc and crown is a sample, no blur"),
-    "hssil-colours": _quick("hssil-colours", "vertex colours multiply the albedo, and so the light that senders send"),
-    "hssil-resampled": _quick("hssil-resampled", "the method's defaults: senders drawn in proportion to flux, discs "
-                              "that cover a quarter of what a sample stands for"),
-    "hssil-share": _quick("hssil-share", "samples that stand for less than a texel, whose discs cover all of it"),
+FULL: dict[str, Callable[[], Case]] = {
+    **cases_of(FULL_PLANS, "hssil", settings_of, finish=with_other_light),
     "hssil-moving": lambda: coherent("hssil-moving", "a surface that moves by itself before a camera that moves too"),
 }

@@ -17,11 +17,9 @@ from refgi.vectors.cases.scenes import (
     Plans,
     cases_of,
     quad,
-    recorded_plan,
     room,
     stored_scene,
 )
-from refgi.vectors.spec import Case
 
 CLOSE = Camera((1.0, 1.05, 0.95), (-0.4, 0.35, -0.5), (0.1, 1.0, 0.0), math.radians(65))  # fills the picture
 AT_WALL = Camera((0.2, 1.4, 0.8), (0.1, 1.4, -1.0), (0.0, 1.0, 0.0), math.radians(30))  # the back wall alone
@@ -31,11 +29,6 @@ def settings_of(plan: Plan) -> MultiresSettings:
     """Return the settings of a plan, whose lights lie on a grid; few cells on the coarsest level."""
     coarsest = {} if "subsplats" in plan.choices else {"coarsest": 5}
     return of(MultiresSettings, **{"lights": plan.lights * len(plan.scene.lights), **coarsest, **plan.choices})
-
-
-def multiresolution(id: str, plan: Plan) -> Case:
-    """Return `multires` as planned."""
-    return recorded_plan(id, plan, "multires", settings_of(plan))
 
 
 def pole(*lights: Any) -> Scene:
@@ -100,4 +93,4 @@ FULL_PLANS: Plans = {
 }
 
 
-QUICK, FULL = cases_of(QUICK_PLANS, multiresolution), cases_of(FULL_PLANS, multiresolution)
+QUICK, FULL = (cases_of(plans, "multires", settings_of) for plans in (QUICK_PLANS, FULL_PLANS))

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from functools import partial
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -31,19 +31,27 @@ class Plan(NamedTuple):
 Plans = Mapping[str, Callable[[], Plan]]
 
 
-def cases_of(plans: Plans, make: Callable[[str, Plan], Case]) -> dict[str, Callable[[], Case]]:
-    """Return what makes the planned cases, by id; a scene is built when its case is."""
-    def made(id: str) -> Case:
-        return make(id, plans[id]())
+@dataclass(frozen=True)
+class Planned:
+    """What makes a case: a method as planned, from the scene to the indirect irradiance."""
 
-    return {id: partial(made, id) for id in plans}
+    id: str
+    method: str
+    plan: Callable[[], Plan]  # its scene is built when the case is
+    settings: Callable[[Plan], Any]
+    finish: Callable[[Case], Case] = lambda case: case
+
+    def __call__(self) -> Case:
+        """Return the case."""
+        plan = self.plan()
+        return self.finish(recorded_case(
+            self.id, plan.scene, self.method, self.settings(plan), what=plan.what, indirect=True, width=plan.size[0],
+            height=plan.size[1], rsm_resolution=plan.maps, shadows=plan.shadows))
 
 
-def recorded_plan(id: str, plan: Plan, method: str, settings: Any) -> Case:
-    """Return what a method does as planned, from the scene to the indirect irradiance."""
-    return recorded_case(id, plan.scene, method, settings, what=plan.what, indirect=True, width=plan.size[0],
-                         height=plan.size[1], rsm_resolution=plan.maps,
-                         shadows=plan.shadows)
+def cases_of(plans: Plans, method: str, settings: Callable[[Plan], Any], **more: Any) -> dict[str, Planned]:
+    """Return what makes the planned cases of a method, by id."""
+    return {id: Planned(id, method, plan, settings, **more) for id, plan in plans.items()}
 
 
 # strongest and weakest differ by a factor of 8 and in hue, so that neither order nor channel can be mistaken

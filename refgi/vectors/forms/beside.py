@@ -10,16 +10,19 @@ from typing import Any
 import numpy as np
 
 from refgi.types import Array
-from refgi.vectors.rows import Edits, Form, edited
+from refgi.vectors.rows import Edits, Form, called_by, code_of, edited
 from refgi.vectors.spec import Arrays, Bug, Run
 
 Arguments = Mapping[str, Any]
 Names = Mapping[str, str]  # leaf of a stage's parameters or output: the case's name of that array
 
-
-# a unit direction by the inverse of its length, as many machines divide
-BY_INVERSE = (("w = np.divide(d, r, out=np.zeros_like(d), where=r > 0)",
-               "w = d * np.divide(1, r, out=np.zeros_like(r), where=r > 0)"),)
+# a unit direction, by the inverse of its length, as many machines divide, and with components that are some roundings
+# off at random, those of all lights at a receiver alike: as far as dot products are that are fused or summed in another
+# order, where lights coincide and a lobe's exponent magnifies it
+DIRECTION = "w = np.divide(d, r, out=np.zeros_like(d), where=r > 0)"
+DIRECTIONS = ("w = d * np.divide(1, r, out=np.zeros_like(r), where=r > 0)", *(
+    f"{DIRECTION}; size = w.shape[:1] + (1,) * (w.ndim - 2) + w.shape[-1:]; "
+    f"w = w * (1 + 2.0**-23 * np.random.default_rng({seed}).uniform(-1, 1, size))" for seed in range(3)))
 NO_BUGS = "likely bugs"  # fact of a stage that has none, and why
 MOST_WORK = 10_000_000  # a second and 600 MB for each likely bug
 
@@ -69,11 +72,13 @@ def form_of(
 
 def alone(
     function: Callable[..., Any], writes: tuple[str, ...] = ("",), exact: tuple[str, ...] = (), *,
-    lists: tuple[str, ...] | None = None, others: Mapping[str, Any] = {}, **more: Any,
+    lists: tuple[str, ...] | None = None, others: Mapping[str, Any] = {},
+    adapt: Mapping[str, Callable[[Array], Array]] | None = None, **more: Any,
 ) -> Callable[[Arguments], Described]:
     """Return what describes a stage by its literal function alone, with the rows of that function's name."""
     rows = (function.__name__,) if lists is None else lists
-    return lambda arguments: Described(form_of(function, arguments, writes, others), own(*rows), exact, **more)
+    return lambda arguments: Described(
+        form_of(function, arguments, writes, others, adapt=adapt), own(*rows), exact, **more)
 
 
 def written(form: Form, *ways: Edits) -> tuple[Callable[[Run, Names, Names], Run], ...]:
@@ -89,6 +94,12 @@ def written(form: Form, *ways: Edits) -> tuple[Callable[[Run, Names, Names], Run
         return run
 
     return tuple(partial(variant, one) for one in ways)
+
+
+def ways(form: Form) -> tuple[Callable[[Run, Names, Names], Run], ...]:
+    """Return other ways in which ports write a form that follows unit directions from lights to receivers."""
+    follows = any(DIRECTION in code_of(one) for one in called_by(form.function))
+    return written(form, *(((DIRECTION, other),) for other in DIRECTIONS)) if follows else ()
 
 
 def own(*lists: str) -> tuple[tuple[str, str], ...]:

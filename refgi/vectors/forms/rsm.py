@@ -12,9 +12,8 @@ from refgi.scene.light import Lamp
 from refgi.scene.model import Light
 from refgi.vectors.bounds import ROUNDING
 from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, ids, own, written
-from refgi.vectors.recipe import writing
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Arrays, Run
+from refgi.vectors.spec import Arrays, Run, writing
 
 KINDS = "perspective", "parallel", "paraboloid"  # of maps, in names of lists
 QUADRATURE = 8.0  # roundings that a float32 sum over a texel's nodes gathers; the bound is SAFETY times as wide
@@ -59,8 +58,7 @@ def snapped(columns: int, rows: int, parallel: bool) -> tuple[Callable[[Run, Nam
     return tuple(partial(variant, side) for side in ((1, 1), (1, -1), (-1, 1), (-1, -1)))
 
 
-def visible_triangles(arguments: Arguments) -> Described:
-    """Return the nearest triangles of a view of planes."""
+def _visible_triangles(arguments: Arguments) -> Described:
     maps = arguments["projection"]
     facts = {"projection": KINDS[maps.kind], "maps": maps.maps, "rows": maps.height, "columns": maps.width}
     if maps.kind == PARABOLOID or arguments["geometry"].cut_outs is not None:
@@ -72,23 +70,21 @@ def visible_triangles(arguments: Arguments) -> Described:
                      variants=snapped(maps.width, maps.height, maps.kind == ORTHOGRAPHIC))
 
 
-def surface(arguments: Arguments) -> Described:
-    """Return what a view of planes sees, where no texture colours it."""
+def _surface(arguments: Arguments) -> Described:
     maps, geometry = arguments["projection"], arguments["geometry"]
     if unknown(arguments):
         return Described()
     form = form_of(buffers.surface, {**arguments, **sizes(maps)}, ("depth", "position", "normal", "albedo"), {
         **MESH, **VIEW, **attributes(arguments), "diffuse": "materials.diffuse"}, double=True)
     if geometry.colours is not None:
-        return Described(form, (("colours", "tint"), ("", "surface/colours")), variants=written(form, *RAYS))
+        return Described(form, (("buffers", "tint"), ("", "surface/colours")), variants=written(form, *RAYS))
     return Described(form, own("surface/side", "surface", f"surface/{KINDS[maps.kind]}", *VIEWS, "surface/albedo",
                                *(("surface/smooth",) if geometry.vertex_normals is not None else ()),
                                *(("view/cube", "view/cube down", "view/cube rows") if maps.maps > 1 else ())),
                      variants=written(form, *RAYS))
 
 
-def reflected_flux(arguments: Arguments) -> Described:
-    """Return the flux of a lamp's map of planes that looks along it, where there are neither textures nor glass."""
+def _reflected_flux(arguments: Arguments) -> Described:
     maps, geometry, lamp, materials = (arguments[one] for one in ("projection", "geometry", "lamp", "materials"))
     facts = {"lamp": lamp.kind, **({"falloff": lamp.falloff} if lamp.kind == "spot" else {})}
     glossy, cube, spot = bool(materials.specular.any()), maps.maps > 1, lamp.kind == "spot"
@@ -101,7 +97,7 @@ def reflected_flux(arguments: Arguments) -> Described:
         **({"half_angles": "lamp.half_angles"} if spot else {}),
         **{key: f"materials.{key}" for key in ("diffuse", "specular", "exponent")}}, double=True)
     if geometry.colours is not None:
-        lists = (("colours", "tint"), ("", "flux/colours"), *own(*(("flux/glossy colours",) if glossy else ())))
+        lists = (("buffers", "tint"), ("", "flux/colours"), *own(*(("flux/glossy colours",) if glossy else ())))
     else:
         lists = (*own("flux", f"flux/{KINDS[maps.kind]}", *(("flux/spot",) if spot else ()), *falloff_lists([lamp]),
                       *(("flux/cube",) if cube else ()), *(("flux/glossy",) if glossy else ()),
@@ -136,16 +132,14 @@ def sizes(maps: Projection) -> dict[str, object]:
     return {"rows": maps.height, "columns": maps.width, "parallel": maps.kind == ORTHOGRAPHIC}
 
 
-def facing(arguments: Arguments) -> Described:
-    """Return the normals of the triangles that pixels see."""
+def _facing(arguments: Arguments) -> Described:
     smooth = arguments["geometry"].vertex_normals is not None
     form = form_of(val_areas.facing, arguments, others=MESH if smooth else {})
     return Described(form, own("facing/smooth" if smooth else "facing/flat"),
                      paper="E-VAL-14; docs/conventions: which normal serves what")
 
 
-def shadow_map(arguments: Arguments) -> Described:
-    """Return the test of receivers' planes by a map of planes."""
+def _shadow_map(arguments: Arguments) -> Described:
     maps, lamp, smooth = (arguments[one] for one in ("projection", "lamp", "interpolated"))
     if maps.kind == PARABOLOID or arguments["bias"] is not None:
         return Described()
@@ -156,8 +150,7 @@ def shadow_map(arguments: Arguments) -> Described:
                      ("position", "normal", "depth", "map_position"))
 
 
-def shadow_rays(arguments: Arguments) -> Described:
-    """Return the test of receivers by rays, without cut-outs."""
+def _shadow_rays(arguments: Arguments) -> Described:
     key = place_of(arguments["lamp"])
     if arguments["geometry"].cut_outs is not None:
         return Described()
@@ -171,8 +164,7 @@ def place_of(lamp: Lamp) -> str:
     return "direction" if lamp.place is None else "place"
 
 
-def direct_light(arguments: Arguments) -> Described:
-    """Return the direct irradiance of all lamps."""
+def _direct_light(arguments: Arguments) -> Described:
     lamps = arguments["lamps"]
     reads = {"position": "position", "normal": "normal", "triangle_id": "covered",
              "visible": tuple(f"visible.{k}" for k in range(len(lamps))),
@@ -188,8 +180,7 @@ def direct_light(arguments: Arguments) -> Described:
                      facts={"lamps": [lamp.kind for lamp in lamps], "falloff": [lamp.falloff for lamp in lamps]})
 
 
-def leaving_radiance(arguments: Arguments) -> Described:
-    """Return what the camera receives."""
+def _leaving_radiance(arguments: Arguments) -> Described:
     lists = (one for one in ("extra", "emission") if arguments[one] is not None)
     return Described(form_of(direct.leaving_radiance, arguments), own("leaving", *(f"leaving/{one}" for one in lists)))
 
@@ -201,8 +192,8 @@ def falloff_lists(lamps: Sequence[Light | Lamp]) -> tuple[str, ...]:
             *(("falloff/squared",) if "squared_ramp" in kinds else ()))
 
 
-FORMS = {"rsm.visible_triangles": visible_triangles, "rsm.surface": surface, "rsm.map_triangles": visible_triangles,
-         "rsm.map_surface": surface, "rsm.reflected_flux": reflected_flux,
-         "rsm.facing": facing, "rsm.shadow_map": shadow_map, "rays.shadow_rays": shadow_rays,
-         "rsm.direct_irradiance": direct_light, "rsm.leaving_radiance": leaving_radiance,
+FORMS = {"rsm.visible_triangles": _visible_triangles, "rsm.surface": _surface, "rsm.map_triangles": _visible_triangles,
+         "rsm.map_surface": _surface, "rsm.reflected_flux": _reflected_flux,
+         "rsm.facing": _facing, "rsm.shadow_map": _shadow_map, "rays.shadow_rays": _shadow_rays,
+         "rsm.direct_irradiance": _direct_light, "rsm.leaving_radiance": _leaving_radiance,
          "rsm.emission": alone(direct.emission, lists=())}

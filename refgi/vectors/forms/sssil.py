@@ -1,15 +1,14 @@
-"""Literal forms of stages of screen-space light: levels, samples, sums, blur, upsampling."""
+"""Literal forms of stages of screen-space light: levels, samples, sums, blur, upsampling, earlier frames."""
 
 import numpy as np
 
-from refgi.literal import hssil_crown, hssil_levels, upsampling
+from refgi.literal import hssil_crown, hssil_levels, temporal, upsampling
 from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.sssil.settings import Bilateral
 from refgi.types import Array
-from refgi.vectors.forms.beside import Arguments, Described, Names, form_of, own
-from refgi.vectors.recipe import reading, writing
+from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, own
 from refgi.vectors.rows import Form
-from refgi.vectors.spec import Arrays, Bug, Run
+from refgi.vectors.spec import Arrays, Bug, Run, reading, writing
 
 EYE = "positions are relative to the eye, z times the ray of depth 1 through the pixel's centre (E-HSS-10)"
 AREA = "E-HSS-06"
@@ -22,8 +21,7 @@ POINTS = {"axes": "sample, (u, cos 2 pi v, sin 2 pi v)", "space": ""}
 SHIFTS = {"axes": "row of the tile, column of the tile, uv"}
 
 
-def first_level(arguments: Arguments) -> Described:
-    """Return the closest of the pixels of each texel."""
+def _first_level(arguments: Arguments) -> Described:
     number, shape = arguments["number"], arguments["depth"].shape
     if arguments["as_published"]:
         return _kept(None, (), shape)
@@ -54,8 +52,7 @@ def in_world(stage: Run, reads: Names, writes: Names) -> tuple[Bug, ...]:
     return Bug(cause, with_area, EYE), Bug(cause, run, EYE)
 
 
-def coarser_level(arguments: Arguments) -> Described:
-    """Return the closest of four texels."""
+def _coarser_level(arguments: Arguments) -> Described:
     number, size = arguments["number"], arguments["size"]
     cut = {name: one % (1 << number) > 0 for name, one in zip(("rows", "columns"), size, strict=True)}
     form = form_of(hssil_levels.coarser_level, arguments, PLANES, {"place": "position"})
@@ -63,26 +60,22 @@ def coarser_level(arguments: Arguments) -> Described:
                            *(f"coarser_level/cut {name}" for name, one in cut.items() if one)), size)
 
 
-def first_mean(arguments: Arguments) -> Described:
-    """Return means of pixels by area."""
+def _first_mean(arguments: Arguments) -> Described:
     form = form_of(hssil_levels.first_mean, arguments, PLANES[:5], CAMERA)
     return Described(form, own("level_of_means"), ("depth",)) if not arguments["as_published"] else Described()
 
 
-def level_of_means(arguments: Arguments) -> Described:
-    """Return means of texels by area."""
+def _level_of_means(arguments: Arguments) -> Described:
     form = form_of(hssil_levels.level_of_means, {**arguments, "side": 2}, PLANES[:5], {"place": "position"})
     return Described(form, own("level_of_means"), ("depth",))
 
 
-def first_mean_radiance(arguments: Arguments) -> Described:
-    """Return the closest pixels with the mean radiance of all."""
+def _first_mean_radiance(arguments: Arguments) -> Described:
     form = form_of(hssil_levels.first_mean_radiance, arguments, (*PLANES, "count"), CAMERA)
     return _kept(form, own("mean_radiance"), arguments["depth"].shape) if not arguments["as_published"] else Described()
 
 
-def coarser_mean_radiance(arguments: Arguments) -> Described:
-    """Return the closest texels with the mean radiance of all."""
+def _coarser_mean_radiance(arguments: Arguments) -> Described:
     form = form_of(hssil_levels.coarser_mean_radiance, arguments, (*PLANES, "count"), {"place": "position"})
     return _kept(form, own("mean_radiance"), arguments["size"])
 
@@ -92,8 +85,7 @@ def _kept(form: Form | None, lists: tuple[tuple[str, str], ...], size: tuple[int
     return Described(form, lists, ("depth",), {"pixel": {"index_of": size}}, **others)  # type: ignore[arg-type]
 
 
-def points_and_shifts(arguments: Arguments) -> Described:
-    """Return points and the shifts of a tile."""
+def _points_and_shifts(arguments: Arguments) -> Described:
     lists = ("sample_points", "tile_shifts", "points_and_shifts",
              *(("sample_points/disc", "tile_shifts/disc") if arguments["inner"] else ()),
              *(("tile_shifts/oblong",) if arguments["rows"] != arguments["columns"] else ()))
@@ -102,37 +94,32 @@ def points_and_shifts(arguments: Arguments) -> Described:
                      facts={"steps": [FIRST_STEP, SECOND_STEP]})
 
 
-def sample_points(arguments: Arguments) -> Described:
-    """Return points alone."""
+def _sample_points(arguments: Arguments) -> Described:
     lists = ("sample_points", "sample_points/alone", *(("sample_points/disc",) if arguments["inner"] else ()))
     return Described(form_of(hssil_crown.sample_points, arguments), own(*lists), specs={"": POINTS},
                      facts={"steps": [FIRST_STEP, SECOND_STEP]})
 
 
-def crown_samples(arguments: Arguments) -> Described:
-    """Return the samples of the texels of a tile."""
+def _crown_samples(arguments: Arguments) -> Described:
     density, inner = arguments["density"], arguments["inner"]
     kinds = ("", f"/{density}", *(("/disc", f"/{density} disc") if inner else ()))
     form = form_of(hssil_crown.crown_samples, arguments, ("offsets", "weight"))
     return Described(form, own(*(f"crown_samples{one}" for one in kinds)), specs={"offsets": OFFSETS, "weight": WEIGHT})
 
 
-def mirrored_samples(arguments: Arguments) -> Described:
-    """Return a mirror-symmetric set."""
+def _mirrored_samples(arguments: Arguments) -> Described:
     form = form_of(hssil_crown.mirrored_samples, arguments, ("offsets", "weight"))
     return Described(form, own("mirrored_samples", f"mirrored_samples/{arguments['density']}"), ("start",),
                      {"offsets": OFFSETS, "weight": WEIGHT})
 
 
-def every_texel(arguments: Arguments) -> Described:
-    """Return all texels within reach."""
+def _every_texel(arguments: Arguments) -> Described:
     form = form_of(hssil_crown.every_texel, arguments, ("offsets", "weight"))
     return Described(form, own("every_texel", *(("every_texel/ring",) if arguments["low"] else ())),
                      specs={"offsets": OFFSETS, "weight": WEIGHT})
 
 
-def gather_samples(arguments: Arguments) -> Described:
-    """Return the sum over samples, of discs of all that they stand for or of a share."""
+def _gather_samples(arguments: Arguments) -> Described:
     share, offsets, index = arguments["share"], arguments["offsets"], arguments["index"]
     if arguments["form_factor"] != "disc" or arguments["factor"] != 1:
         return Described()
@@ -165,14 +152,12 @@ def scaled_again(stage: Run, index: int, reads: Names, writes: Names) -> tuple[B
                 reading(stage, **{area: lambda a: a / 4.0**index}), AREA))
 
 
-def blur(arguments: Arguments) -> Described:
-    """Return the mean over windows of a level's texels."""
+def _blur(arguments: Arguments) -> Described:
     lists = ("blur", *(("blur/even",) if arguments["size"] % 2 == 0 else ()))
     return Described(form_of(upsampling.blur, arguments), own(*lists), ("position", "normal", "depth"))
 
 
-def level_upsampling(arguments: Arguments) -> Described:
-    """Return joint bilateral upsampling, and the sum with a level's own light."""
+def _level_upsampling(arguments: Arguments) -> Described:
     settings, guide, coarse = arguments["settings"], arguments["guide"], arguments["coarse"]
     weights, adds = settings.upsampling, arguments["added"] is not None
     factor = next(2**k for k in range(1, 6) if -(-guide.depth.shape[0] // 2**k) <= coarse.shape[1])
@@ -190,9 +175,31 @@ def level_upsampling(arguments: Arguments) -> Described:
         "depth_of_a_texel": "mean, at its centre" if mean else "nearest, at its corner along the slope"})
 
 
-FORMS = {"sssil.first_level": first_level, "sssil.coarser_level": coarser_level, "sssil.first_mean": first_mean,
-         "sssil.level_of_means": level_of_means, "sssil.first_mean_radiance": first_mean_radiance,
-         "sssil.coarser_mean_radiance": coarser_mean_radiance, "sssil.points_and_shifts": points_and_shifts,
-         "sssil.sample_points": sample_points, "sssil.crown_samples": crown_samples,
-         "sssil.mirrored_samples": mirrored_samples, "sssil.every_texel": every_texel,
-         "sssil.gather_samples": gather_samples, "sssil.blur": blur, "sssil.upsample": level_upsampling}
+VIEW = {key: f"projection.{key}" for key in ("origin", "frame", "half")}
+
+
+def _reprojection(arguments: Arguments) -> Described:
+    counted = ("count",) if arguments["frames"] is not None else ()
+    form = form_of(temporal.reprojection, arguments, ("light", "weight", *counted), VIEW)
+    return Described(form, own("reprojection", f"reprojection/{arguments['fetch']}"),
+                     ("position", "projection.origin", "depth"))
+
+
+def _blend(arguments: Arguments) -> Described:
+    counted = arguments["frames"] is not None
+    form = form_of(temporal.blend, arguments, ("irradiance", "share", *(("count",) if counted else ())))
+    kinds = (("counted", "frames"), ("entering", "entering_share"), ("moving", "speed"))
+    return Described(form, own("blend", *(f"blend/{kind}" for kind, name in kinds if arguments[name] is not None)))
+
+
+FORMS = {"sssil.first_level": _first_level, "sssil.coarser_level": _coarser_level, "sssil.first_mean": _first_mean,
+         "sssil.level_of_means": _level_of_means, "sssil.first_mean_radiance": _first_mean_radiance,
+         "sssil.coarser_mean_radiance": _coarser_mean_radiance, "sssil.points_and_shifts": _points_and_shifts,
+         "sssil.sample_points": _sample_points, "sssil.crown_samples": _crown_samples,
+         "sssil.mirrored_samples": _mirrored_samples, "sssil.every_texel": _every_texel,
+         "sssil.gather_samples": _gather_samples, "sssil.blur": _blur, "sssil.upsample": _level_upsampling,
+         "sssil.motion": alone(temporal.motion, ("position", "normal", "speed"), ("vertices", "before", "position"),
+                               others=VIEW, specs={"speed": {"unit": "pixels"}}),
+         "sssil.reprojection": _reprojection,
+         "sssil.entering": alone(temporal.entering, ("made", "share"), ("position", "projection.origin"), others=VIEW),
+         "sssil.clamp": alone(temporal.clamp), "sssil.blend": _blend}

@@ -1,22 +1,24 @@
-"""Likely bugs of the ground truth: an estimate that has no literal form, traced again with each of them."""
+"""Literal forms of stages of pixel lights with visibility, and likely bugs of the ground truth.
+
+That is an estimate without a literal form: it is traced again with each of them.
+"""
 
 import functools
 from typing import Any
 
 import numpy as np
 
+from refgi.literal import imperfect, vpl
 from refgi.settings import flat, replaced
 from refgi.types import Array
-from refgi.vectors.forms.beside import Arguments, Described, Names
-from refgi.vectors.recipe import Change, reading, writing
-from refgi.vectors.spec import Arrays, Bug, Run
+from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, own
+from refgi.vectors.spec import Arrays, Bug, Change, Run, reading, writing
 
 RADIOMETRY = "docs/radiometry: E = integral of L cos over the hemisphere, L = albedo/pi of the direct irradiance there"
 ESTIMATE = {"tier": "T3", "paper": RADIOMETRY}
 
 
-def path_traced(arguments: Arguments) -> Described:
-    """Return the path-traced irradiance."""
+def _path_traced(arguments: Arguments) -> Described:
     facts = {key: value for key, value in flat(arguments["settings"]).items()
              if isinstance(value, bool | int | float | str)}
     return Described(exact=("scene.geometry.vertices", "position"), paper=RADIOMETRY, facts=facts,
@@ -87,4 +89,48 @@ def _direct(arguments: Arguments) -> Array:
     return Frame(arguments["scene"], width=columns, height=rows, dtype=np.float64, shadows="exact").direct
 
 
-FORMS = {"truth.path_traced": path_traced}
+LIFT = 1e-3  # m: ports lift the ends of their rays off the surfaces by up to that; what it decides is masked
+MAPS = "Ritschel et al. 2008, Sec. 3"
+MESH = {"vertices": "geometry.vertices", "faces": "geometry.faces"}
+LIMITS = {"least cosine at the light": 1e-3, "farther by, and still of one surface": 0.1,
+          "least cosine of the bias's slope": 0.05}
+# what shows only where surfaces block the light, or never in these cases
+SHADOWED = ("clamped", "absolute", "at least", "largest light", "first half", "horizon")
+
+
+def _visible(arguments: Arguments) -> Described:
+    form = form_of(vpl.visible, arguments, others=MESH)
+    return Described(form, own("visible"), paper="SII Eq. 2 with V", facts={"largest_lift_of_ray_ends": LIFT},
+                     variants=(functools.partial(lifted, "position"),))
+
+
+def lifted(receiver: str, stage: Run, reads: Names, _: Names) -> Run:
+    """Return the stage with rays whose ends, at receivers and lights, are lifted as ports do."""
+    ends = ((receiver, "face_normal"), ("light_position", "light_normal"))
+
+    def run(arrays: Arrays, real: Any) -> Arrays:
+        return stage({**arrays, **{reads[end]: arrays[reads[end]] + real(LIFT) * arrays[reads[normal]]
+                                   for end, normal in ends}}, real)
+
+    return run
+
+
+def _shadowed_sum(arguments: Arguments) -> Described:
+    if arguments["seen"] is None:
+        return Described()
+    glossy, form = arguments["lobe_flux"] is not None, form_of(vpl.shadowed_sum, arguments)
+    pairs = ("pair/free", *(("pair/glossy", "pair/glossy free") if glossy else ()))
+    return Described(form, (*(("pairs", one) for one in pairs), *own("sum")), ("position", "light_position"),
+                     factors={"number of lights": float(arguments["flux"].shape[1])}, without=SHADOWED)
+
+
+FORMS = {
+    "truth.path_traced": _path_traced,
+    "vpl.facing": alone(vpl.facing, exact=("vertices",)), "vpl.visible": _visible, "vpl.shadowed_sum": _shadowed_sum,
+    "vpl.scattered_points": alone(imperfect.scattered_points, ("point", "point_face", "radius"), ("shift",),
+                                  lists=("points",), paper=MAPS),
+    "vpl.map_frames": alone(imperfect.map_frames, exact=("normal",), lists=("frames",), paper="Duff et al. 2017",
+                            specs={"": {"axes": "light, (right, down, forward), xyz"}}),
+    "vpl.depth_maps": alone(imperfect.depth_maps, exact=("vertices",), lists=("depth",), paper=MAPS, facts=LIMITS),
+    "vpl.filled": alone(imperfect.filled, paper=MAPS, facts=LIMITS),
+    "vpl.looked_up": alone(imperfect.looked_up, exact=("depth",), lists=("looked up",), paper=MAPS, facts=LIMITS)}

@@ -4,7 +4,7 @@ import numpy as np
 
 from refgi.literal import gather as literal
 from refgi.literal.lights import halton_points
-from refgi.vectors.forms.gather import KINDS
+from refgi.vectors.forms.splat import KINDS
 from tests.naive.draws import draw
 
 

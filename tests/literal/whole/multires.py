@@ -10,8 +10,7 @@ import numpy as np
 
 from refgi.literal.multires import grid, representatives
 from refgi.literal.multires_lights import detail, lists, points, splits
-from refgi.literal.multires_splatting import geometry_list
-from refgi.literal.multires_upsample import sum_of_pictures, upsample
+from refgi.literal.multires_upsample import geometry_list, sum_of_pictures, upsample
 from tests.literal.whole.pairs import irradiance_of
 from tests.naive.crossings import LIFT, corners_of, free
 

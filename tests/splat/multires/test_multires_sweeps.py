@@ -10,6 +10,7 @@ import pytest
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.lights.shares import with_equal_solid_angles
+from refgi.literal.pairs import pair
 from refgi.rsm.buffers.solid_angle import texel_solid_angles
 from refgi.rsm.raster.projection import PERSPECTIVE, Projection, spot_projection
 from refgi.scene import PointLight, SpotLight, load_scene
@@ -19,7 +20,6 @@ from refgi.splat.multires.settings import MultiresSettings
 from refgi.stages import observe
 from tests.literal.whole import multires as literal
 from tests.literal.whole.pairs import irradiance_of
-from tests.naive import eq2
 from tests.splat.multires.choices import frame_of, relative_error
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # reported: tests/pairs/test_loss
@@ -191,8 +191,8 @@ def test_pairs_are_subsplats_times_lights(atrium, evidence):
             some = np.linspace(0, len(points) - 1, 50).astype(int)
             least = settings.pairs.clamp.value
             expected = np.array([sum(
-                eq2.clamped_pair(points[i], normals[i], *pair, least=least) for pair in zip(
-                    lights.position.T, lights.normal.T, lights.flux.T, strict=True)) for i in some])
+                pair(points[i], normals[i], p, n, flux) * min(1, np.linalg.norm(points[i] - p) / least) ** 2
+                for p, n, flux in zip(lights.position.T, lights.normal.T, lights.flux.T, strict=True)) for i in some])
             np.testing.assert_allclose(run.output[:, some].T, expected, rtol=PAIR_SUM, atol=PAIR_SUM * expected.max())
             reported.append((len(points) * lights.flux.shape[1], 1e3 * run.seconds))
     evidence("million pairs and ms: "

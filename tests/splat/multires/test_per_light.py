@@ -9,6 +9,7 @@ from refgi.error_target.grid import level_shape, top_level
 from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights import choose_pixel_lights
+from refgi.literal.pairs import pair
 from refgi.scene import load_scene
 from refgi.settings import replaced
 from refgi.splat import irradiance
@@ -20,7 +21,6 @@ from refgi.splat.multires.refine import refine
 from refgi.splat.multires.settings import Criteria
 from refgi.splat.multires.upsample import upsample
 from tests.literal.whole.multires import upsampled
-from tests.naive import eq2
 from tests.naive import per_light as naive
 from tests.pairs import sets
 from tests.splat.multires.choices import FakeBuffer, by_irradiance, full_sum, relative_error, unclamped
@@ -86,8 +86,8 @@ def by_hand(buffer, lights, settings, threshold, shared=None):
 
         def irradiance_at(pixel, one=one, k=k):
             x, n = buffer.position[:, *pixel], buffer.normal[:, *pixel]
-            return (eq2.pair(x, n, *one[:3])
-                    + eq2.lobe_pair(x, n, *one[:2], one[3], lights.lobe_exponent[k], one[4], widening=WIDENING))
+            exponent = lights.lobe_exponent[k] * min(1, np.linalg.norm(x - one[0]) / WIDENING)
+            return pair(x, n, *one[:3], (one[4], one[3], exponent))
 
         cells = naive.subsplats(covered, irradiance_at, top, settings.subsplats.finest, threshold, shared)
         for level, _, _ in cells:

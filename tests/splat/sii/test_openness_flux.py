@@ -11,13 +11,13 @@ import pytest
 
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
+from refgi.literal.pairs import irradiance
 from refgi.scene import Camera, DirectionalLight, Scene, merge
 from refgi.settings import of, replaced
 from refgi.splat import Receivers, SiiSettings, sii
 from refgi.splat.sii.approximations import sii_ledger
 from refgi.splat.sii.fragments import fragments
 from tests.form_factors import polygon_form_factor
-from tests.naive import eq2
 from tests.truth.scenes import rectangle
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
@@ -100,7 +100,8 @@ def test_the_picture_is_that_of_the_scaled_fluxes(wedge, hidden, evidence):
     uncut, buffer = replaced(SCALED, {"cut": "none", "clamp": "none"}), wedge.gbuffer
     lights = choose_lights(wedge, SETTINGS.lights)
     scaled = lights._replace(flux=lights.flux * hidden)
-    expected = eq2.irradiance(buffer.position[:, buffer.covered], buffer.normal[:, buffer.covered], scaled)
+    expected = irradiance(buffer.position, buffer.normal, np.where(buffer.covered, 0, -1), *scaled[:3])
+    expected = expected[:, buffer.covered]
     off = np.abs(sii(wedge, uncut)[:, buffer.covered] - expected).max() / expected.max()
     assert off < ONE_LIGHT
     evidence(f"sii against Eq. 2 with Phi F: {off:.0e} of the brightest pixel off")

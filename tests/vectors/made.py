@@ -1,4 +1,4 @@
-"""What the tests of the kit's stages of splatting share: cases, bounds, and a port's arrays judged by them."""
+"""What the tests of the kit's stages share: cases, bounds, and a port's arrays judged by them."""
 
 from functools import cache
 
@@ -9,6 +9,7 @@ from refgi.vectors.cases import kit_cases
 from refgi.vectors.rows import Form
 from refgi.vectors.spec import expected_of, outputs_of, stored
 
+CASES = kit_cases("full")
 SAME = 2e-6  # of an element and of its array's largest: places in float32, whose rounding near lights magnify
 DECIDED = 2e-3  # share of an array's elements that the rounding of float64 decides: rays along edges
 LARGEST_MASK = 0.05  # share of an array's elements that rounding may decide
@@ -17,7 +18,7 @@ LARGEST_MASK = 0.05  # share of an array's elements that rounding may decide
 @cache
 def made(id):
     """Return a case of the full kit and its arrays."""
-    case = kit_cases("full")[id]()
+    case = CASES[id]()
     return case, expected_of(case)
 
 
@@ -41,21 +42,12 @@ def named_as_given(name):
     return name.startswith(("scene.", "materials.")) or ".projection." in name or ".lamp." in name
 
 
-def off(id, name, got):
-    """Return the names of a stage's arrays that a port has out of bounds."""
-    known, bounds = made(id)[1], bounds_of(id, name)
-    return [array for array, bound in bounds.items() if out_of_bounds(known[array], stored(got[array]), bound)]
-
-
-def out_of_bounds(expected, got, bound):
-    if got.shape != expected.shape:
-        return True
-    return bool((distance(got, expected) > bound.limit)[~bound.masked].any())
-
-
 def expect_within(id, name, got):
-    wrong = off(id, name, got)
-    assert not wrong, f"{id}, {name}: {wrong}"
+    known = made(id)[1]
+    for array, bound in bounds_of(id, name).items():
+        assert got[array].shape == known[array].shape
+        out = (distance(stored(got[array]), known[array]) > bound.limit)[~bound.masked]
+        assert not out.any(), f"{id}, {name}: {array}"
 
 
 def masked_shares(id, start):
@@ -67,7 +59,8 @@ def masked_shares(id, start):
 def expect_literal(id, name):
     """Expect that the literal text of a stage makes what the stage does."""
     known, step = made(id)[1], stage_of(id, name)
-    form = next(one for one in step.variants if isinstance(one, Form))
+    form = next((one for one in step.variants if isinstance(one, Form)), None)
+    assert form is not None, (id, name)
     for array, got in outputs_of(step, known, np.float64, form).items():
         expected = known[array]
         assert got.shape == expected.shape, (id, array)

@@ -1,4 +1,4 @@
-"""Clustered visibility, from the buffers to the blurred sum."""
+"""Light with visibility: clusters of area lights, pixel lights with rays or maps, the path-traced truth."""
 
 import math
 from collections.abc import Callable
@@ -7,14 +7,44 @@ from typing import Any
 from refgi.cluster.settings import ValSettings
 from refgi.scene import Camera, Scene, SpotLight
 from refgi.settings import of
-from refgi.vectors.cases.scenes import BULB, SPOT, Plan, Plans, cases_of, far_away, kerbs, recorded_plan, room, stacked
-from refgi.vectors.spec import Case
+from refgi.truth.settings import TruthSettings
+from refgi.truth.vpl import VplSettings
+from refgi.vectors.cases.scenes import (
+    AWAY,
+    BULB,
+    DOWN,
+    SPOT,
+    SUN,
+    Plan,
+    Plans,
+    cases_of,
+    far_away,
+    kerbs,
+    room,
+    stacked,
+)
 
 SEED = 1  # of the lights' shifts: without one, points lie on the borders of texels
 CLOSE = Camera((1.0, 1.05, 0.95), (-0.4, 0.35, -0.5), (0.1, 1.0, 0.0), math.radians(65))  # rolled, fills the picture
 ABOVE = Camera((0.2, 2.5, 0.1), (0.15, 0.0, 0.1), (0.0, 0.0, -1.0), math.radians(34))  # sees no wall
 BESIDE = Camera((1.5, 0.8, 1.6), (-0.1, 0.3, -0.3), (0.1, 1.0, 0.0), math.radians(50))  # sees what is below the table
 FLOOR_LAMP = SpotLight((0.3, 1.6, 0.35), (-0.2, -1.0, -0.25), 0.2, 0.42, (4.0, 2.6, 1.3))
+
+
+def vpl_settings(plan: Plan) -> VplSettings:
+    """Return the settings of a plan: so many lights of each map."""
+    return of(VplSettings, **{"lights": plan.lights * len(plan.scene.lights), **plan.choices})
+
+
+def val_settings(plan: Plan) -> ValSettings:
+    """Return the settings of a plan."""
+    return of(ValSettings, **plan.choices)
+
+
+def truth_settings(plan: Plan) -> TruthSettings:
+    """Return the settings of a plan, as a port would first write it."""
+    return of(TruthSettings, **{"estimator": "hemisphere", "directions": 64, "samples": 2048, "seed": 1,
+                                **plan.choices})
 
 
 def plan(
@@ -25,17 +55,31 @@ def plan(
     return lambda: Plan(what, scene(), size, maps, lights, plain | choices)
 
 
-def settings_of(plan: Plan) -> ValSettings:
-    """Return the settings of a plan."""
-    return of(ValSettings, **plan.choices)
+def traced(what: str, *lamps: Any, smooth: bool = False, matte: bool = False, **choices: Any) -> Callable[[], Plan]:
+    """Return a plan of the truth of a room; `choices` by their keys."""
+    return lambda: Plan(what, room(*lamps, smooth=smooth, matte=matte), (20, 14), 1, choices=choices, shadows="exact")
 
 
-def case(id: str, plan: Plan) -> Case:
-    """Return a case."""
-    return recorded_plan(id, plan, "val", settings_of(plan))
-
-
-PLANS: Plans = {
+VPL: Plans = {
+    "vpl-spot": lambda: Plan("one spot, no lobes; shadows of a shelf and a lid", room(SPOT, matte=True), (24, 18), 13,
+                             32),
+    "vpl-smooth": lambda: Plan("interpolated normals on a ball: pixels that face lights below their triangle; lobes",
+                               room(SPOT, smooth=True), (26, 20), 13, 24),
+    "vpl-sun": lambda: Plan("spot and directional lamp, purely glossy surfaces", room(DOWN, SUN), (19, 13), 11, 14),
+    "vpl-no-flux": lambda: Plan("a lamp that meets no surface: no light, a picture of 0", room(AWAY, matte=True),
+                                (12, 9), 7, 5),
+    "vpl-maps": lambda: Plan("a map of 96 points for each light; holes pulled and pushed over two levels",
+                             room(SPOT, matte=True), (16, 12), 13, 12, {
+                                 "maps": "imperfect", "maps.points": 96, "maps.resolution": 16, "maps.splat": 0.6,
+                                 "maps.levels": 2, "maps.bias": 1.0}),
+}
+VPL_FULL: Plans = {
+    "vpl-large": lambda: Plan("48 x 36 pixels, 2 x 64 lights", room(SPOT, DOWN), (48, 36), 23, 64),
+    "vpl-maps-bare": lambda: Plan("maps of 512 points for lights of two lamps, boxes as wide as discs, no filled holes",
+                                  room(SPOT, SUN, smooth=True), (26, 20), 13, 12, {
+                                      "maps": "imperfect", "maps.points": 512, "maps.resolution": 32}),
+}
+VAL: Plans = {
     "val-csm": plan("convolution shadow maps by the defaults, maps of an odd side; two lamps, a cluster of one light, "
                     "an area light that nothing occludes", lambda: room(SPOT, BULB, matte=True, camera=CLOSE),
                     (17, 13), 16, 64, clusters=8, clamp="disc"),
@@ -54,7 +98,7 @@ PLANS: Plans = {
     "val-rim": plan("kerbs beside the lights, down to their plane: maps with geometry at the rim of the disc",
                     lambda: kerbs(FLOOR_LAMP, camera=CLOSE), (15, 11), 9, 12, clusters=3),
 }
-FULL_PLANS: Plans = {
+VAL_FULL: Plans = {
     "val-published": plan("the printed forms: raw distances, squares of alpha / pi, the search by solid angle; blocks "
                           "of 4 x 4 pixels, lights by cluster, blur without missing subsets",
                           lambda: room(SPOT, BULB, camera=CLOSE), (18, 14), 16, 64, clusters=6, interleaving=4,
@@ -90,5 +134,18 @@ FULL_PLANS: Plans = {
                           lambda: kerbs(FLOOR_LAMP, camera=CLOSE), (15, 11), 13, 18, clusters=3,
                           visibility="back_projection"),
 }
-QUICK = cases_of(PLANS, case)
-FULL = cases_of(FULL_PLANS, case)
+TRUTH: Plans = {
+    "truth-one-bounce": traced("light of three lamps after one bounce, glossy and purely glossy surfaces", SPOT, BULB,
+                               SUN),
+    "truth-matte": traced("diffuse surfaces alone, one lamp", SPOT, matte=True),
+    "truth-visible": traced("only what the camera sees emits and nothing blocks: what a screen-space method can find",
+                            SPOT, BULB, matte=True, emitters="visible", visibility=False),
+}
+TRUTH_FULL: Plans = {
+    "truth-two-bounces": traced("light after one and two bounces", SPOT, BULB, bounces=2),
+    "truth-smooth": traced("a ball with interpolated normals", SPOT, BULB, smooth=True),
+}
+QUICK = {**cases_of(VPL, "vpl", vpl_settings), **cases_of(VAL, "val", val_settings),
+         **cases_of(TRUTH, "truth", truth_settings)}
+FULL = {**cases_of(VPL_FULL, "vpl", vpl_settings), **cases_of(VAL_FULL, "val", val_settings),
+        **cases_of(TRUTH_FULL, "truth", truth_settings)}

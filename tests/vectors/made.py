@@ -56,8 +56,8 @@ def masked_shares(id, start):
             for array, bound in bounds_of(id, name).items() if bound.masked.size}
 
 
-def expect_literal(id, name):
-    """Expect that the literal text of a stage makes what the stage does."""
+def expect_literal(id, name, same=SAME, decided=DECIDED):
+    """Expect that the literal text of a stage makes what the stage does, but for a share of elements."""
     known, step = made(id)[1], stage_of(id, name)
     form = next((one for one in step.variants if isinstance(one, Form)), None)
     assert form is not None, (id, name)
@@ -66,5 +66,5 @@ def expect_literal(id, name):
         assert got.shape == expected.shape, (id, array)
         finite = np.isfinite(expected)
         large = np.abs(expected[finite].astype(float)).max(initial=0)
-        same = np.isclose(got.astype(float), expected.astype(float), rtol=SAME, atol=SAME * large)
-        assert np.count_nonzero(~same) <= DECIDED * same.size, (id, array, np.mean(~same))
+        near = np.isclose(got.astype(float), expected.astype(float), rtol=same, atol=same * large)
+        assert np.count_nonzero(~near) <= decided * near.size, (id, array, np.mean(~near))

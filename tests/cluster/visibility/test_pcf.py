@@ -146,7 +146,8 @@ EVERY_KIND = [
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("how", EVERY_KIND, ids=lambda how: f"{how | {'as_published': sorted(how.get('as_published', []))}}")
+@pytest.mark.parametrize("how", EVERY_KIND,
+                         ids=lambda how: str(how | {"as_published": sorted(how.get("as_published", []))}))
 def test_any_receiver_sees_a_share(how, dtype):
     """Property: 0 to 1 wherever it is, 1 behind the light, by itself in any order."""
     rng, settings = np.random.default_rng(5), of(ValSettings, **how)

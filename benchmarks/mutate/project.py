@@ -62,7 +62,6 @@ REFGI = Project(
 
 
 LEFT = (".*", "__pycache__", "out", "_build", "*.egg-info")
-KERNELS = "*.kernel"
 PREFIX = "copy-"
 
 
@@ -75,48 +74,33 @@ class Edited(Protocol):
 
 
 class Scratch:
-    """A copy of a project, with kernels of its own that start as those of all copies.
+    """A copy of a project; copies share compiled kernels, which are known by what they were compiled from.
 
     Compiled modules of the copy are told by their contents, not by their time: a fault may change no size and come
     within the same second.
     """
 
-    def __init__(self, project: Project, folder: Path, kernels: Path, shared: bool = False) -> None:
-        """Make a copy in a folder; `shared` where it holds no faults, so that its kernels are those of all copies."""
+    def __init__(self, project: Project, folder: Path, kernels: Path) -> None:
         self.project, self.folder, self._kernels = project, Path(tempfile.mkdtemp(prefix=PREFIX, dir=folder)), kernels
-        self.tree, self._cache = self.folder / "tree", kernels if shared else self.folder / "cache"
+        self.tree = self.folder / "tree"
         shutil.copytree(project.root, self.tree, ignore=_ignoring(folder))
-        for place in (kernels, self._cache):
-            place.mkdir(parents=True, exist_ok=True)
+        kernels.mkdir(parents=True, exist_ok=True)
         compileall.compile_dir(self.tree / project.package, quiet=2, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
 
     @contextlib.contextmanager
     def with_fault(self, fault: Edited) -> Iterator[None]:
-        """Put a fault into the copy while the block runs, with the kernels of sources without faults."""
+        """Put a fault into the copy while the block runs."""
         file = self.tree / fault.file
         whole = file.read_text()
-        shutil.rmtree(self._cache)
-        self._cache.mkdir()
-        self.share_kernels()
         file.write_text(fault.put_into(whole))
         try:
             yield
         finally:
             file.write_text(whole)
 
-    def share_kernels(self) -> None:
-        """Give the copy the kernels that were compiled from sources without faults."""
-        for kernel in self._kernels.glob(KERNELS):
-            with contextlib.suppress(FileExistsError):
-                os.link(kernel, self._cache / kernel.name)
-
-    def compiled(self) -> int:
-        """Return how many kernels the copy has."""
-        return len(list(self._cache.glob(KERNELS)))
-
     def environment(self) -> Mapping[str, str]:
         """Return the environment of programs that run in the copy."""
-        return os.environ | {"PYTHONPATH": str(self.tree), "REFGI_CACHE_DIR": str(self._cache),
+        return os.environ | {"PYTHONPATH": str(self.tree), "REFGI_CACHE_DIR": str(self._kernels),
                              "PYTHONDONTWRITEBYTECODE": "1"}
 
     def python(self, *arguments: str | Path) -> list[str]:

@@ -25,7 +25,7 @@ from benchmarks.mutate.faults import KINDS, Fault, all_faults, drawn, is_fault
 from benchmarks.mutate.project import DIFFERENT, REFGI, Programs, Project, Scratch, remove_copies
 from benchmarks.mutate.results import Result, Results, as_text, state_of, survivors
 from benchmarks.mutate.selection import tests_of
-from benchmarks.mutate.trial import INVALID, SAME, SURVIVED, Baseline, run_pictures, run_tests
+from benchmarks.mutate.trial import INVALID, SAME, SURVIVED, Baseline, Run, run_pictures, run_tests
 from refgi.cli.session import DONE, FAILED, INTERRUPTED, progress, say
 from refgi.errors import InputError, RefgiError
 
@@ -52,11 +52,9 @@ class Campaign:
 
     def run(self, jobs: int = 1) -> None:
         """Fill `results`, in no order, with what became of each fault; `jobs` of them at once."""
-        unknown = [fault for fault in self._ahead if self._known.of(fault) is None]
         with _locked(self._folder), ThreadPoolExecutor(jobs) as pool:
             try:
                 remove_copies(self._folder)
-                self._baseline.measure((test for fault in unknown for test in self._tests_of(fault.file)), self._say)
                 workers = [pool.submit(self._work) for _ in range(jobs)]
                 for worker in wait(workers, return_when=FIRST_EXCEPTION).done:
                     worker.result()
@@ -87,21 +85,28 @@ class Campaign:
 
     def _judged(self, fault: Fault, scratch: Scratch) -> Result:
         tests = self._tests_of(fault.file)
-        self._baseline.measure(tests, self._say)
         outcome, by, seconds = SURVIVED, "", 0.0
         with scratch.with_fault(fault):
             if tests:
-                run = run_tests(scratch, self._programs, self._baseline.ordered(tests), self._baseline.limit(tests))
+                run = self._tested(scratch, tests)
                 (outcome, by), seconds = run.verdict(), run.seconds
             if outcome == SURVIVED:
                 outcome, by, more = self._compared(fault, scratch)
                 seconds += more
         return Result(fault, outcome, by, seconds)
 
+    def _tested(self, scratch: Scratch, tests: Sequence[str]) -> Run:
+        """Run tests with a fault; what a failing one says counts if it passes without, and time by what that takes."""
+        while True:
+            run = run_tests(scratch, self._programs, self._baseline.ordered(tests), self._baseline.limit(tests))
+            failed = [failure.test.partition("::")[0] for failure in run.failures]
+            judging = tests if run.code is None else [test for test in failed if test in tests]
+            if not self._baseline.measure(judging, self._say) or run.code is not None:
+                return run
+
     def _compared(self, fault: Fault, scratch: Scratch) -> tuple[str, str, float]:
         """Return whether a fault that no test noticed changes a picture, the first one that differs, and seconds."""
         limit = self._baseline.measure_pictures(self._say)
-        scratch.share_kernels()
         file = scratch.folder / "pictures.json"
         ended = run_pictures(scratch, self._programs, file, "--against", self._baseline.pictures,
                              "--first", self._project.method_of(fault.file), limit=limit)

@@ -97,10 +97,14 @@ def whole_lines(file: Path) -> list[str]:
 
 # a fault may take this many times as long as no fault, and as long as it takes to compile its kernels
 TIMES, COMPILING = 4.0, 120.0  # s
+PER_BYTE = 3e-3  # s that a test file may take whose time is not known
 
 
 class Baseline:
-    """Measured once for given sources and tests, in a copy without a fault, and kept in a file."""
+    """Measured once for given sources and tests, in a copy without a fault, and kept in a file.
+
+    Test files are run without a fault once one of them has failed with one, or all have taken too long.
+    """
 
     def __init__(self, project: Project, folder: Path, programs: Programs, state: str) -> None:
         self._project, self._folder, self._programs, self._state = project, folder, programs, state
@@ -114,23 +118,30 @@ class Baseline:
 
     @property
     def kernels(self) -> Path:
-        """The folder of compiled kernels of the sources without a fault."""
+        """The folder of compiled kernels, told by their content."""
         return self._folder / "kernels"
 
-    def measure(self, tests: Iterable[str], tell: Callable[[str], None] = lambda _: None) -> None:
-        """Run those test files that have not been run without a fault; raise `InputError` if one fails."""
+    def measure(self, tests: Iterable[str], tell: Callable[[str], None] = lambda _: None) -> bool:
+        """Run those test files that have not been run without a fault, and say whether there were any.
+
+        Raises `InputError` if one fails.
+        """
         with self._lock:
             if missing := sorted(set(tests) - self._seconds.keys()):
                 tell(f"{len(missing)} test files without a fault")
                 self._run(missing)
+            return bool(missing)
 
     def ordered(self, tests: Sequence[str]) -> list[str]:
         """Return test files, the fastest first."""
-        return sorted(tests, key=lambda test: self._seconds[test])
+        return sorted(tests, key=self._time)
 
     def limit(self, tests: Sequence[str]) -> float:
         """Return how many seconds a fault may take over some test files."""
-        return COMPILING + TIMES * sum(self._seconds[test] for test in tests)
+        return COMPILING + TIMES * sum(map(self._time, tests))
+
+    def _time(self, test: str) -> float:
+        return self._seconds.get(test, PER_BYTE * (self._project.root / test).stat().st_size)
 
     def measure_pictures(self, tell: Callable[[str], None] = lambda _: None) -> float:
         """Hash all pictures unless that was done, and return how many seconds a fault may take over them."""
@@ -147,10 +158,7 @@ class Baseline:
 
     def _run(self, tests: Sequence[str]) -> None:
         scratch = self._copy()
-        before = scratch.compiled()
         run = run_tests(scratch, self._programs, tests, first=False)
-        if run.code == 0 and scratch.compiled() > before:  # again without compiling
-            run = run_tests(scratch, self._programs, tests, first=False)
         if run.code != 0:
             failed = ", ".join(failure.test for failure in run.failures[:5]) or f"pytest ended with {run.code}"
             raise InputError(f"tests fail without a fault: {failed}; {scratch.folder}/pytest.txt tells more")
@@ -161,7 +169,7 @@ class Baseline:
 
     def _copy(self) -> Scratch:
         if self._scratch is None:
-            self._scratch = Scratch(self._project, self._folder, self.kernels, shared=True)
+            self._scratch = Scratch(self._project, self._folder, self.kernels)
         return self._scratch
 
     def _write(self) -> None:

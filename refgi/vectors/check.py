@@ -5,6 +5,7 @@ chained, from its own outputs, and the bounds are those of a chain.
 """
 
 import itertools
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -398,14 +399,16 @@ def _causes(
         other_shape = any(case.arrays[name].shape != shape for name, shape in bug.shapes.items() if name in shapes)
         share = min(shares, default=0.0) if len(shares) == len(differing) else 0.0
         share = 1.0 if other_shape and not differing else share
-        if bug.wired and all(_alike(one.values) for one in told.values()):
+        if bug.wired and told and all(_alike(one.values) for one in told.values()):
             share = min(share, SEEN)  # all dark, say: many wirings lead there
         if share >= EXPLAINED:
             found.append(Cause(cause=bug.cause, share=share, paper=bug.paper))
     factors = {**case.factors, **_ratios(kit, case)} if differing else {}
-    for one in differing.values():
-        found += explain(one, factors, {name: kit.array(case, name) for name in case.arrays
-                                              if case.arrays[name].shape == one.expected.shape})
+    own = [explain(one, factors, {name: kit.array(case, name) for name in case.arrays
+                                  if case.arrays[name].shape == one.expected.shape}) for one in differing.values()]
+    arrays_of = Counter(cause.cause for causes in own for cause in causes)
+    found += [cause if arrays_of[cause.cause] == len(own) else cause.model_copy(
+        update={"share": min(cause.share, SEEN)}) for causes in own for cause in causes]  # of some arrays alone
     if not found and not differing:
         found = [Cause(cause="no known cause fits this shape", share=0.0)]
     found = found or [cause for one in differing.values() for cause in places_of(one)]

@@ -90,7 +90,7 @@ def _together(case: Case, step: Stage, known: Arrays, fits: Fits) -> Iterator[tu
         wrong += [(f"{kind_of(one[0])} and {_leaf(two[0])} are exchanged",
                    dict(zip([*one, *two], [*two, *one], strict=True)))
                   for one, two in combinations(fields.values(), 2) if len(one) == len(two)]
-        wrong += [(f"{kind_of(one[0])} is bound to {kind_of(two[0])}", dict(zip(one, two, strict=True)))
+        wrong += [(f"{kind_of(one[0])} is bound to {kind_of(two[0])}, all of them", dict(zip(one, two, strict=True)))
                   for one, two in permutations(fields.values(), 2) if 1 < len(one) == len(two)]
         wrong += [(f"{kind_of(names[0])} is that of the first for all", dict.fromkeys(names[1:], names[0]))
                   for names in fields.values() if len(names) > 2]
@@ -108,7 +108,7 @@ def _of_another(step: Stage, known: Arrays) -> Iterator[tuple[str, dict[str, str
     kinds: dict[str, list[str]] = {}
     for name in filter(NUMBER.search, step.reads):
         kinds.setdefault(kind_of(_home(name)), []).append(name)
-    sets = [(f"{kind} is all bound to {ANOTHER}", names) for kind, names in kinds.items()]
+    sets = [(f"{kind} is all bound to {ANOTHER}", names) for kind, names in kinds.items() if "." in kind]
     sets += [(f"all inputs are bound to {ANOTHER}", [*chain(*kinds.values())])] if len(kinds) > 1 else []
     for cause, names in sets:
         for number in sorted({found.group() for name in known if (found := NUMBER.search(name))}):

@@ -94,7 +94,7 @@ def fault_of(error: BaseException, *, debug: bool = False) -> Fault:
         return Fault(USAGE, str(error), *_place(error))
     if isinstance(error, MemoryError):
         return Fault(USAGE, f"out of memory: {_one_line(str(error)) or 'try a smaller --size'}")
-    hint = "" if debug else " (a fault of refgi; --debug shows where)"
+    hint = "" if debug else " (a fault of refgi; REFGI_DEBUG=1 shows where)"
     return Fault(FAILED, f"unexpected {type(error).__name__}: {_one_line(str(error))}{hint}")
 
 

@@ -55,7 +55,7 @@ def explain(
     found = told_at_once(difference)
     if not found:
         guesses = [*_factors(difference, factors), *_axes(difference), *_coded(difference), *_indices(difference),
-                   *_taken_for(difference, others)]
+                   *_taken_for(difference, others), *_running_sums(difference), *_depth_buffer(difference)]
         found = [Cause(cause=cause, share=share) for cause, predicted in guesses
                  if (share := explained(difference, predicted)) >= EXPLAINED]
         found = found or [*_at_one_place(difference, factors)] or [*_order(difference), *_slight(difference)]
@@ -362,6 +362,33 @@ def _taken_for(difference: Difference, others: Mapping[str, Array]) -> Iterator[
     for name, array in others.items():
         if name != difference.name and array.shape == difference.expected.shape and array.any():
             yield f"it holds {name}", array
+
+
+def _running_sums(difference: Difference) -> Iterator[tuple[str, Array]]:
+    """Yield sums that are not cleared between the elements of a plane; one that is skipped stays 0."""
+    expected, names = difference.expected, axes_of(difference.entry.axes)
+    if expected.dtype.kind != "f" or len(names) != expected.ndim or not np.isfinite(expected).all():
+        return
+    planes = int(names[0] in ("xyz", "rgb") and expected.ndim > 1)
+
+    for order in ("", ", column by column")[: expected.ndim - planes]:
+        along = np.swapaxes(expected, -1, -2) if order else expected
+        sums = np.cumsum(along.reshape(*along.shape[:planes], -1), axis=-1, dtype=np.float64).reshape(along.shape)
+        yield (f"values are running sums{order}: the accumulator is not cleared between elements",
+               np.where(difference.got == 0, 0.0, np.swapaxes(sums, -1, -2) if order else sums))
+
+
+def _depth_buffer(difference: Difference) -> Iterator[tuple[str, Array]]:
+    """Yield numbers of a depth buffer, a + b / z, fitted to what is there, in place of depth in m."""
+    z, got = (one.astype(np.float64) for one in (difference.expected, difference.got))
+    usable = difference.out & np.isfinite(z) & (z > 0) & np.isfinite(got)
+    if not difference.name.endswith("depth") or np.count_nonzero(usable) < 2 * FEWEST:
+        return
+    (a, b), *_ = np.linalg.lstsq(np.stack([np.ones(np.count_nonzero(usable)), 1 / z[usable]], 1), got[usable])
+    if a and b:
+        yield ("a depth buffer's numbers (clip space) in place of linear depth, m: "
+               f"{a:.4g} {'+' if b > 0 else '-'} {abs(b):.4g} / z; --depth takes them",
+               np.where(np.isfinite(z) & (z > 0), a + b / np.where(z > 0, z, 1), z))
 
 
 def _slight(difference: Difference) -> Iterator[Cause]:

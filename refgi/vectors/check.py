@@ -5,6 +5,7 @@ chained, from its own outputs, and the bounds are those of a chain.
 """
 
 import itertools
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import numpy as np
 from refgi.errors import InputError
 from refgi.types import Array
 from refgi.vectors.bounds import MOST_SPARED, distance, large_value
-from refgi.vectors.causes import EXPLAINED, Difference, explain, explained, places_of
+from refgi.vectors.causes import EXPLAINED, SEEN, Difference, explain, explained, places_of
 from refgi.vectors.judge import Judged, judge, judge_estimate, unlike
 from refgi.vectors.kit import Asked, DamagedError, Kit, fits, places_of_case
 from refgi.vectors.manifest import (
@@ -26,6 +27,7 @@ from refgi.vectors.manifest import (
     Result,
     StageEntry,
     StageVerdict,
+    Tolerance,
     Verdict,
 )
 from refgi.vectors.port import IN_ORDER, Got, Port
@@ -331,17 +333,26 @@ def _of_array(port: Port, name: str, arrays: Mapping[str, Array], tier: str) -> 
     tolerance = entry.chained if asked.chained else None
     masks = {entry.masked, None if tolerance is None else tolerance.masked}
     if name in port.halved:
-        tolerance = entry.chained_half
-        masks.add(None if tolerance is None else tolerance.masked)
+        tolerance = _wider(entry.chained_half, entry.half)
+        masks |= {one.masked for one in (entry.chained_half, entry.half) if one is not None}
     few_bits = {"T2": None if asked.chained else entry.half, "T2B": entry.bytes}.get(tier)
     if few_bits is not None:
         outliers = max(few_bits.outliers, 0.0 if tolerance is None else tolerance.outliers)
         tolerance = few_bits.model_copy(update={"outliers": outliers})
         masks.add(few_bits.masked)
-    limit = kit.extra(case, entry.bound) if entry.bound is not None else None
+    alone = entry.bound is None or few_bits is not None
+    limit = None if alone else kit.extra(case, entry.bound)  # type: ignore[arg-type]
     masked = [kit.extra(case, file) for file in sorted(file for file in masks if file is not None)]
     return judge(name, expected, got, "T0" if entry.tier == "T0" else tier, limit,
                  np.logical_or.reduce(masked) if masked else None, tolerance, port.few.get(name))
+
+
+def _wider(one: Tolerance | None, other: Tolerance | None) -> Tolerance | None:
+    """Return the larger of two tolerances, field by field."""
+    if one is None or other is None:
+        return one or other
+    return one.model_copy(update={key: max(getattr(one, key), getattr(other, key))
+                                  for key in ("relative", "large", "outliers")})
 
 
 def _judged_estimate(kit: Kit, case: CaseManifest, name: str, arrays: Mapping[str, Array], expected: Array) -> Judged:
@@ -364,6 +375,12 @@ def _refutes(kit: Kit, case: CaseManifest, bugs: Bugs, bug: BugEntry, name: str,
     return bool(np.mean(off > judged.limit.reshape(-1)[told.places]) > MOST_SPARED)
 
 
+def _alike(values: Array) -> bool:
+    """Return whether nearly all values are one."""
+    counts = np.unique(values, return_counts=True)[1]
+    return len(values) > 1 and int(counts.max()) >= EXPLAINED * len(values)
+
+
 def _causes(
     port: Port, step: StageEntry, judged: Mapping[str, Judged], arrays: Mapping[str, Array]
 ) -> list[Cause]:
@@ -382,12 +399,16 @@ def _causes(
         other_shape = any(case.arrays[name].shape != shape for name, shape in bug.shapes.items() if name in shapes)
         share = min(shares, default=0.0) if len(shares) == len(differing) else 0.0
         share = 1.0 if other_shape and not differing else share
+        if bug.wired and told and all(_alike(one.values) for one in told.values()):
+            share = min(share, SEEN)  # all dark, say: many wirings lead there
         if share >= EXPLAINED:
             found.append(Cause(cause=bug.cause, share=share, paper=bug.paper))
     factors = {**case.factors, **_ratios(kit, case)} if differing else {}
-    for one in differing.values():
-        found += explain(one, factors, {name: kit.array(case, name) for name in case.arrays
-                                              if case.arrays[name].shape == one.expected.shape})
+    own = [explain(one, factors, {name: kit.array(case, name) for name in case.arrays
+                                  if case.arrays[name].shape == one.expected.shape}) for one in differing.values()]
+    arrays_of = Counter(cause.cause for causes in own for cause in causes)
+    found += [cause if arrays_of[cause.cause] == len(own) else cause.model_copy(
+        update={"share": min(cause.share, SEEN)}) for causes in own for cause in causes]  # of some arrays alone
     if not found and not differing:
         found = [Cause(cause="no known cause fits this shape", share=0.0)]
     found = found or [cause for one in differing.values() for cause in places_of(one)]

@@ -19,6 +19,7 @@ from refgi.errors import InputError, expect
 from refgi.types import Array
 from refgi.vectors.bounds import Bound, Budget, chained_budgets, distance, isolated_bounds, stored_budgets
 from refgi.vectors.cases import kit_cases
+from refgi.vectors.causes import FEWEST
 from refgi.vectors.manifest import (
     BUGS,
     CASE,
@@ -44,6 +45,7 @@ from refgi.vectors.wiring import ANOTHER, wirings
 SEED = 20090101  # of the changes that bounds are measured by
 TOLD_BY, BESIDE = 64, 24  # elements of a likely bug that are kept: those that tell it, and others
 WIRING_TOLD_BY, WIRING_BESIDE = 20, 6  # the same of wrong wirings, of which there are many
+SMALL = 16  # elements: of fewer, fewer than FEWEST differing ones do not tell a wrong wiring
 PARTS = 2  # of the bytes of an array that it takes with its bounds
 TOLD_IN = 3  # stages of a method that tell a likely bug: it is tried in no further ones
 TOLD_AGAIN = 2  # the same where another method tells it already, as the stages do that all begin with
@@ -277,7 +279,8 @@ def _keep_bug(
 ) -> bool:
     """Run a stage with a likely bug and keep elements that tell it; return whether none does.
 
-    `wired`: a wrong wiring, of which fewer elements are kept, and none where none tells it.
+    `wired`: a wrong wiring, of which fewer elements are kept, and none where none tells it, or a few numbers alone,
+    which nearly any array can lead to.
     """
     try:
         made = outputs_of(step, known, np.float64, bug.run)
@@ -285,7 +288,7 @@ def _keep_bug(
         if wired:
             return True
         raise
-    told, blind = {}, True
+    told, blind, elements, differing = {}, True, 0, 0
     counts = (WIRING_TOLD_BY, WIRING_BESIDE) if wired else (TOLD_BY, BESIDE)
     for name in step.writes:
         array, expected = made[name], known[name]
@@ -293,13 +296,15 @@ def _keep_bug(
             blind = False
             continue
         off = (distance(array, expected) > bounds[name].limit) & ~bounds[name].masked
+        elements, differing = elements + off.size, differing + int(np.count_nonzero(off))
         if off.any():
             blind = False
             places = np.concatenate([_spread(np.flatnonzero(one), count) for one, count in zip((off, ~off), counts,
                                                                                                strict=True)])
             told[name] = Told(places, array.reshape(-1)[places])
+    blind = blind or (wired and differing < FEWEST and 0 < elements < SMALL)
     if not (blind and wired):
-        entry = BugEntry(cause=bug.cause, paper=bug.paper, arrays={}, blind=blind,
+        entry = BugEntry(cause=bug.cause, paper=bug.paper, arrays={}, blind=blind, wired=wired,
                          shapes={name: made[name].shape for name in step.writes})
         bugs.add(step.name, entry, told, known, {name: bound.limit for name, bound in bounds.items()})
     return blind

@@ -37,17 +37,17 @@ def judge(
 ) -> Judged:
     """Compare an array with what is expected, of one shape, element by element; equal in tier "T0", else within bounds.
 
-    `limit` bounds each element, or `tolerance` the whole array, with a share of outliers; `few` is what storage in few
-    bits allows beside either; `masked` elements may differ at will. Not judged where more than MOST_SPARED are beyond,
-    but allowed to be. The worst element is the farthest beyond its bound; one that is not finite where a finite number
-    is expected is beyond any.
+    `limit` bounds each element, or `tolerance` the whole array, with a share of outliers; with both, errors of stages
+    before and of this one are independent: their squares add. `few` is what storage in few bits allows beside; `masked`
+    elements may differ at will. Not judged where more than MOST_SPARED are beyond, but allowed to be. The worst element
+    is the farthest beyond its bound; one that is not finite where a finite number is expected is beyond any.
     """
     off = distance(got, expected)
     if tier == "T0" or expected.dtype.kind != "f":
         allowed = np.zeros(expected.shape)
     elif tolerance is not None:
         size = np.where(np.isfinite(expected), np.abs(expected), 0.0) + tolerance.large
-        allowed = tolerance.relative * size + FLUSHED
+        allowed = np.hypot(tolerance.relative * size + FLUSHED, 0.0 if limit is None else limit)
     else:
         allowed = np.zeros(expected.shape) if limit is None else limit.astype(np.float64)
     outliers = 0.0 if tolerance is None else tolerance.outliers

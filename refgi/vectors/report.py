@@ -133,8 +133,11 @@ def _common(wrong: list[StageVerdict], tried: list[set[str]]) -> tuple[CommonCau
     likely = set().union(*tried)
     told = []
     for name, own in fits.items():
-        knowing = sum(name in known for known in tried) if name in likely else len(wrong)
-        told.append((-len(own) / (knowing + 1), -round(sum(one.share for one in own) / len(own), 2), CommonCause(
+        knowing = len(wrong) if name not in likely else len(own) + sum(
+            name in known and all(cause.cause != name for cause in one.causes)
+            for one, known in zip(wrong, tried, strict=True))
+        share = round(sum(one.share for one in own) / len(own), 3)
+        told.append((-len(own) / (knowing + 1) * share**2, -share, CommonCause(
             cause=name, paper=own[0].paper, explained=len(own), tried=knowing)))
     remarks = [CommonCause(cause=one.cause, explained=0, tried=len(wrong)) for one in wrong[0].causes]
     best = [one for *_, one in sorted(told, key=lambda one: one[:2])]

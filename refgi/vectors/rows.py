@@ -15,6 +15,7 @@ import dataclasses
 import functools
 import inspect
 import types
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import resources
@@ -70,7 +71,9 @@ def compiled(
                 raise StaleEditError(f"{what}: two functions that {_name(function)} runs know another {name}")
     for one, text in _reached(parts).items():
         try:
-            exec(compile(text, one.__code__.co_filename, "exec"), scope)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", SyntaxWarning)  # of a change, such as a number that is called
+                exec(compile(text, one.__code__.co_filename, "exec"), scope)
         except SyntaxError as error:
             raise StaleEditError(f"{_name(one)}: {what}: no program is left: {error}") from error
     return scope[function.__name__]  # type: ignore[no-any-return]

@@ -21,7 +21,7 @@ import numpy as np
 from refgi.types import Array
 from refgi.vectors.bounds import distance
 from refgi.vectors.cases import kit_cases
-from refgi.vectors.causes import EXPLAINED, explained
+from refgi.vectors.causes import EXPLAINED, SEEN, explained
 from refgi.vectors.changes import Change, changes_of
 from refgi.vectors.check import differences_of
 from refgi.vectors.kit import Asked, Kit
@@ -60,20 +60,24 @@ def searched(
         return result
     first = result.findings[0]
     known = [one for one in first.causes if one.explained]
+    shares = {cause.cause: cause.share for one in result.stages if (one.case, one.stage) == first.first
+              for cause in one.causes}
+    sure = [one for one in known if shares.get(one.cause, 1.0) > SEEN]
     wrong: dict[str, str] = {}  # the first wrong stage of that kind in each case
     for one in result.stages:
         if one.verdict == "out" and one.upstream != "dirty" and kind_of(one.stage) == first.stage:
             wrong.setdefault(one.case, one.stage)
-    if len(known) >= CAUSES or not wrong:
+    if len(sure) >= CAUSES or not wrong:
         return result
     trials = [Trial(kit, asked, output, case, stage) for case, stage in islice(wrong.items(), MOST_CASES)]
     found = _found([one for one in trials if one.usable], seconds, lambda done, count: tell(
-        f"{first.stage}: {count} changes tried", done))[: CAUSES - len(known)]
+        f"{first.stage}: {count} changes tried", done))[: CAUSES - len(sure)]
     if not found:
         return result
     common, own = zip(*found, strict=True)
     stages = (_told(one, own) if (one.case, one.stage) == first.first else one for one in result.stages)
-    finding = first.model_copy(update={"causes": (*known, *common)})
+    causes = (*sure, *common, *(one for one in known if one not in sure))
+    finding = first.model_copy(update={"causes": causes[:CAUSES]})
     return result.model_copy(update={"findings": (finding, *result.findings[1:]), "stages": tuple(stages)})
 
 
@@ -136,7 +140,7 @@ class Trial:
         begun = time.monotonic()
         made = form.by(form.function, self._read)
         self._seconds = max(LEAST_SECONDS, SLOWER * (time.monotonic() - begun))
-        return all(self._is_within(name, stored(array)).all() for name, array in made.items())
+        return all(self._is_within(name, stored(made[name])).all() for name in self._expected)
 
     def _is_within(self, name: str, array: Array) -> Array:
         if array.shape != self._expected[name].shape:
@@ -165,7 +169,8 @@ class Trial:
             change.take_back()
         try:
             with limited(self._seconds), np.errstate(all="ignore"):
-                made = {name: stored(array) for name, array in self._form.by(changed, self._read).items()}
+                made = self._form.by(changed, self._read)
+                made = {name: stored(made[name]) for name in self._expected}
         except Exception:  # whatever a change leads to
             return Outcome(0.0, b"")
         shares = [explained(one, made[name]) if made[name].shape == one.expected.shape else 0.0

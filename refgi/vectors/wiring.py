@@ -3,8 +3,9 @@
 Each input of a stage gives way to each array of its shape and type that is given or written before the stage, and to
 its own of another lamp, level or round, written when it may be; to larger ones of its own name, such as those of a
 finer level, read by rows of its own size; all fields of an input, such as both corners of a box, give way to another's
-at once, and two change places. An input of vectors or colours is read as triples side by side as well. Names in causes
-are without numbers, so that a bug has one name in all cases, but where a stage reads several of a kind.
+at once, and two change places; all inputs of another lamp, level or round give way to that one's. An input of vectors
+or colours is read as triples side by side as well. Names in causes are without numbers, so that a bug has one name in
+all cases, but where a stage reads several of a kind.
 """
 
 import functools
@@ -12,7 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
-from itertools import chain, combinations
+from itertools import chain, combinations, permutations
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from refgi.vectors.spec import Arrays, Bug, Case, Run, Stage, axes_of, kind_of
 Layout = Callable[[Array], Array]
 Fits = Callable[[str, Array], bool]  # whether a stage runs with an array in the place of an input
 ANOTHER = "that of another lamp, level or round"
+NUMBER = re.compile(r"\d+(?=(\.[a-z_]\w*)*$)")  # of a lamp, level or round in the name of an array
 
 
 def wirings(case: Case, step: Stage, known: Arrays) -> Iterator[Bug]:
@@ -88,11 +90,31 @@ def _together(case: Case, step: Stage, known: Arrays, fits: Fits) -> Iterator[tu
         wrong += [(f"{kind_of(one[0])} and {_leaf(two[0])} are exchanged",
                    dict(zip([*one, *two], [*two, *one], strict=True)))
                   for one, two in combinations(fields.values(), 2) if len(one) == len(two)]
+        wrong += [(f"{kind_of(one[0])} is bound to {kind_of(two[0])}, all of them", dict(zip(one, two, strict=True)))
+                  for one, two in permutations(fields.values(), 2) if 1 < len(one) == len(two)]
         wrong += [(f"{kind_of(names[0])} is that of the first for all", dict.fromkeys(names[1:], names[0]))
                   for names in fields.values() if len(names) > 2]
+    wrong += _of_another(step, known)
     for cause, taken in wrong:
-        if all(other in known and fits(name, known[other]) for name, other in taken.items()):
-            yield cause, {name: known[other] for name, other in taken.items()}
+        differing = {name: other for name, other in taken.items()
+                     if other in known and not np.array_equal(known[name], known[other])}
+        if {*taken.values()} <= known.keys() and differing and all(
+                fits(name, known[other]) for name, other in differing.items()):
+            yield cause, {name: known[other] for name, other in differing.items()}
+
+
+def _of_another(step: Stage, known: Arrays) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield all fields of an input, and all inputs, that have another lamp, level or round, of the same one."""
+    kinds: dict[str, list[str]] = {}
+    for name in filter(NUMBER.search, step.reads):
+        kinds.setdefault(kind_of(_home(name)), []).append(name)
+    sets = [(f"{kind} is all bound to {ANOTHER}", names) for kind, names in kinds.items() if "." in kind]
+    sets += [(f"all inputs are bound to {ANOTHER}", [*chain(*kinds.values())])] if len(kinds) > 1 else []
+    for cause, names in sets:
+        for number in sorted({found.group() for name in known if (found := NUMBER.search(name))}):
+            taken = {name: other for name in names if (other := NUMBER.sub(number, name)) in known and other != name}
+            if len(taken) > 1:
+                yield cause, taken
 
 
 @functools.cache

@@ -114,7 +114,7 @@ def test_an_unexpected_error_is_one_line_and_debug_shows_the_traceback(monkeypat
     plain, debug = run("scenes"), run("scenes", "--debug")
     assert plain.exit_code == debug.exit_code == 1
     assert plain.stderr == ("refgi: unexpected ZeroDivisionError: division by zero"
-                            " (a fault of refgi; --debug shows where)\n")
+                            " (a fault of refgi; REFGI_DEBUG=1 shows where)\n")
     assert "Traceback" in debug.stderr
     assert plain.stdout == debug.stdout == ""
 

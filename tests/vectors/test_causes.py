@@ -11,6 +11,12 @@ def srgb(a):
     return np.where(a <= 0.0031308, 12.92 * a, 1.055 * np.maximum(a, 0) ** (1 / 2.4) - 0.055)
 
 
+def running(a):
+    """Return sums over the pixels of a picture, row by row; dark ones are skipped."""
+    sums = np.cumsum(a.reshape(3, -1).astype(float), axis=1).reshape(a.shape)
+    return np.where(a.any(axis=0), sums, 0)
+
+
 FLUX = "rsm.reflected_flux0.flux"
 BUGS = [
     (FLUX, lambda a: a * np.pi, "pi times"),
@@ -57,6 +63,10 @@ BUGS = [
     ("lights.pixel_lights.map_index", lambda a: np.where(a == 0, 2, a), "every 0 is 2"),
     ("rsm.surface.depth", lambda a: np.where(np.isinf(a), 0, a), "0 in place of infinity"),
     ("lights.pixel_lights.lobe_exponent", lambda a: a[::-1], "lights are in reverse order"),
+    ("pairs.sum", lambda a: running(a), "values are running sums: the accumulator is not cleared"),
+    ("pairs.sum", lambda a: np.swapaxes(running(np.swapaxes(a, 1, 2)), 1, 2), "running sums, column by column"),
+    ("rsm.surface.depth", lambda a: np.where(np.isinf(a), a, (100 - 10 / a) / 99.9),
+     "a depth buffer's numbers (clip space) in place of linear depth, m: 1.001 - 0.1001 / z"),
     (FLUX, lambda a: np.stack([a[0], 1.7 * a[1], a[2]]), "at rgb 1 alone: every element is 1.7 times"),
     ("rsm.map_surface0.position", lambda a: a[[0, 1, 1]], "at xyz 2 alone: it holds xyz 1"),
     ("rsm.surface.albedo", lambda a: np.stack([a[0], a[1], srgb(a[2])]), "at rgb 2 alone: encoded as sRGB"),

@@ -1,5 +1,6 @@
 """Findings over all cases: kinds of stages in order, causes that explain most of them first."""
 
+from refgi.vectors.causes import SEEN
 from refgi.vectors.manifest import Cause, StageVerdict
 from refgi.vectors.report import findings as found_in
 from refgi.vectors.spec import kind_of
@@ -44,6 +45,20 @@ def test_a_bug_counts_where_a_case_knows_it():
     assert [(one.cause, one.explained, one.tried) for one in found[0].causes] == [("bug", 2, 2), ("remark", 3, 5)]
     once = findings(wrong, lambda _: {"bug"})
     assert [one.cause for one in once[0].causes] == ["remark", "bug"]
+
+
+def test_no_more_are_explained_than_were_tried():
+    """One that a case does not know as a likely bug, and that holds for any array as well."""
+    found = findings([verdict(case, "pairs.sum", ("upside down", 1.0)) for case in "abc"],
+                     lambda one: {"upside down"} if one.case == "a" else set())
+    assert [(one.explained, one.tried) for one in found[0].causes] == [(3, 3)]
+
+
+def test_what_is_seen_without_a_hypothesis_stands_behind_a_bug_that_fits():
+    wrong = [verdict(case, "pairs.sum", ("all elements are 0", SEEN), *[("bug", 1.0)] * (case in "abc"))
+             for case in "abcde"]
+    found = findings(wrong, lambda one: {"bug"} if one.case in "abc" else set())
+    assert [one.cause for one in found[0].causes] == ["bug", "all elements are 0"]
 
 
 def test_what_is_made_from_wrong_inputs_is_not_blamed():

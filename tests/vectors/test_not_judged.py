@@ -40,6 +40,23 @@ def unsure(kit, tmp_path):
     return port, masked
 
 
+@pytest.mark.parametrize("case", ["pairs-diffuse", "pairs-glossy"])
+def test_chained_half_floats_are_judged_no_more_narrowly_than_isolated_ones(kit, tmp_path, case):
+    port = Port(kit, case, tmp_path)
+    half, right = port.case.arrays[PAIRS].half, port.arrays[PAIRS].astype(float)
+    port.write(PAIRS, (right + 0.9 * half.relative * (np.abs(right) + half.large)).astype(np.float32))
+    for chained in (False, True):
+        assert {one.verdict for one in port.check(tiers=T2, chained=chained).stages} <= {"within", "not-judged"}
+
+
+def test_a_chained_bound_holds_the_isolated_one():
+    """An element that rounding of its own stage moves by 0.3, of an array that a chain moves by 0.1."""
+    tolerance = Tolerance(relative=0.1, large=0.0, outliers=0.0)
+    one = judged(at(3, value=0.3), limit=0.3, tolerance=tolerance)
+    assert (one.verdict.verdict, one.limit.min()) == ("within", pytest.approx(np.hypot(0.1, 0.3)))
+    assert judged(at(3, value=0.4), limit=0.3, tolerance=tolerance).verdict.verdict == "out"
+
+
 @pytest.mark.parametrize("asked", [{}, {"chained": True}, {"tiers": T2}, {"tiers": {"": "T2B"}}])
 def test_masked_elements_are_spared_in_every_mode_and_tier(kit, tmp_path, asked):
     port = Port(kit, "hssil-pole", tmp_path)

@@ -10,11 +10,13 @@ from click.testing import CliRunner
 
 from refgi.cli.group import VerbGroup
 from refgi.literal import pairs as literal
+from refgi.vectors.causes import EXPLAINED
 from refgi.vectors.changes import changes_of
 from refgi.vectors.check import Asked, check_output
 from refgi.vectors.manifest import CommonCause, Result
 from refgi.vectors.search import TooSlowError, Trial, limited, searched
 from refgi.vectors.spec import stored
+from tests.vectors.port import Port
 
 FUNCTION = '''
 def area(values, i, scale, *, offset=1):
@@ -152,6 +154,18 @@ def test_known_causes_come_first_and_time_ends_a_search(kit, wrong):
     assert "pairs.py" in second.cause
     assert searched(kit, output, Asked(), having(3)) == having(3)
     assert searched(kit, output, Asked(), result, seconds=1e-9) == result
+
+
+def test_a_case_without_lobes_is_searched(kit, tmp_path):
+    """The literal form makes fluxes of lobes too, which the stage of such a case does not write."""
+    port = Port(kit, "hssil-paper", tmp_path)
+    name = "rsm.reflected_flux0.flux"
+    assert "rsm.reflected_flux0.lobe_flux" not in port.arrays
+    port.write(name, port.arrays[name] ** 1.5)
+    trial = Trial(kit, Asked(), port.folder, "hssil-paper", "rsm.reflected_flux0")
+    assert trial.usable
+    function, change = trial.changes()[0]
+    assert trial.tried(function, change).share < EXPLAINED
 
 
 def test_nothing_is_searched_where_nothing_is_wrong(kit, tmp_path):

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from refgi.vectors.cases import kit_cases
+from refgi.vectors.causes import FEWEST
+from refgi.vectors.kit import Asked
 from refgi.vectors.spec import kind_of, outputs_of
 from tests.vectors.port import Port
 
@@ -44,11 +46,12 @@ def test_a_layout_or_format_is_named(kit, tmp_path, array, bug, said):
 
 
 def causes_told(kit, tmp_path, case, stage, right, wrong):
-    """Return the causes told of a stage that is rightly computed with `wrong` in the place of its input `right`."""
+    """Return the causes told of a stage that is rightly computed with `wrong` in the place of its inputs `right`."""
+    pairs = [(right, wrong)] if isinstance(right, str) else zip(right, wrong, strict=True)
     port = Port(kit, case, tmp_path)
     step = next(one for one in kit_cases("quick")[case]().stages if one.name == stage)
     known = {name: kit.array(port.case, name) for name in port.case.arrays}
-    for name, array in outputs_of(step, known | {right: known[wrong]}, np.float32).items():
+    for name, array in outputs_of(step, known | {one: known[other] for one, other in pairs}, np.float32).items():
         port.write(name, array)
     return [one.cause for one in port.first().causes]
 
@@ -75,6 +78,28 @@ def test_one_of_several_of_a_kind_is_named(kit, tmp_path, case, stage, right, wr
     causes = causes_told(kit, tmp_path, case, stage, right, wrong)
     said = (f"{right} is bound to {wrong}", f"{kind_of(right)} is bound to that of another")
     assert any(one.startswith(said) for one in causes), causes
+
+
+def test_all_fields_of_another_level_are_named(kit, tmp_path):
+    right, wrong = ([f"sssil.crown_samples{level}.{one}" for one in ("offsets", "weight")] for level in (1, 0))
+    causes = causes_told(kit, tmp_path, "hssil-default", "sssil.gather_samples1", right, wrong)
+    assert "sssil.crown_samples is all bound to that of another lamp, level or round" in causes
+
+
+def test_no_wiring_is_told_from_a_single_number(kit):
+    for case in kit.cases(Asked()):
+        bugs = kit.bugs(case)
+        for step in case.stages:
+            elements = sum(int(np.prod(case.arrays[name].shape)) for name in step.writes)
+            assert elements >= FEWEST or not any(bug.wired for bug in bugs.of(step.name)), (case.id, step.name)
+
+
+def test_wirings_to_darkness_stand_behind_the_bug_that_makes_it(kit, tmp_path):
+    """A bias of the wrong sign: each surface hides itself, as many wrong buffers would make it."""
+    port = Port(kit, "vpl-maps", tmp_path)
+    port.write("vpl.looked_up", np.zeros_like(port.arrays["vpl.looked_up"]))
+    first, *_ = port.first().causes
+    assert first.cause.startswith("the bias has the wrong sign")
 
 
 def test_an_array_of_the_stage_that_is_right_refutes_what_would_change_it(kit, tmp_path):

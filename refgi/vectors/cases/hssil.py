@@ -21,6 +21,7 @@ from refgi.vectors.cases.scenes import (
     POLE,
     RAMP,
     SPOT,
+    UNDER,
     VIEW,
     Plan,
     Plans,
@@ -164,7 +165,8 @@ QUICK_PLANS: Plans = {
         "the paper's settings: rows share samples, uniform density, no blur", room(SPOT, matte=True), (40, 28), MAPS,
         choices={"preset": "paper", "sampling.samples": 12, "sampling.radius": 2.0}, shadows="map"),
     "hssil-odd": lambda: Plan(
-        "13 x 11 pixels from full resolution down to one texel", room(SPOT, matte=True), (13, 11), MAPS, choices={
+        "13 x 11 pixels from full resolution down to one texel; a lamp below the shelf", room(
+            SPOT, UNDER, matte=True), (13, 11), MAPS, choices={
             "samples": 9, "radius": None, "levels": 5, "start": "full", "seed": 1, "blur.size": 3,
             "plane_tolerance": 0.1, "cosine": 0.5}, shadows="exact"),
     "hssil-pole": lambda: Plan(

@@ -62,6 +62,7 @@ DOWN = SpotLight((0.1, 1.7, 0.2), (0.0, -1.0, 0.0), 0.3, 0.7, (3.0, 1.0, 2.0))  
 VIEW = Camera((1.7, 1.4, 1.5), (-0.4, 0.35, -0.5), (0.1, 1.0, 0.0), math.radians(70))  # rolled
 RAMP = SpotLight((-0.1, 1.6, 0.3), (0.2, -1.0, -0.5), 0.1, 0.8, (1.5, 3.0, 2.0), "squared_ramp")  # glTF's falloff
 BEHIND = SpotLight((-0.9, 1.1, -0.7), (0.9, -0.35, 0.8), 0.5, 0.9, (4.0, 0.0, 1.3))  # no green, half void
+UNDER = SpotLight((0.1, 0.45, -0.3), (0.3, -0.6, 0.7), 0.4, 1.0, (0.5, 1.0, 0.3))  # the shelf is behind it
 AWAY = SpotLight((1.5, 1.5, 0.5), (1.0, 0.2, 0.1), 0.2, 0.5, (4.0, 2.0, 1.0))  # into the void
 POLE = Camera((0.2, 2.5, 0.1), (0.2, 0.0, 0.1), (0.0, 0.0, -1.0), math.radians(50))  # straight down
 

@@ -23,6 +23,10 @@ DIRECTION = "w = np.divide(d, r, out=np.zeros_like(d), where=r > 0)"
 DIRECTIONS = ("w = d * np.divide(1, r, out=np.zeros_like(r), where=r > 0)", *(
     f"{DIRECTION}; size = w.shape[:1] + (1,) * (w.ndim - 2) + w.shape[-1:]; "
     f"w = w * (1 + 2.0**-23 * np.random.default_rng({seed}).uniform(-1, 1, size))" for seed in range(3)))
+# the falloff as the square of that inverse
+FALL = "fall = np.divide(1, square, out=np.zeros_like(square), where=r > 0)"
+INVERSE = ((DIRECTION, DIRECTIONS[0]), (FALL, f"{FALL}; inverse = np.divide(1, r, out=np.zeros_like(r), where=r > 0); "
+                                        "fall = np.where(np.asarray(area) > 0, fall, inverse * inverse)"))
 NO_BUGS = "likely bugs"  # fact of a stage that has none, and why
 MOST_WORK = 10_000_000  # a second and 600 MB for each likely bug
 
@@ -98,8 +102,10 @@ def written(form: Form, *ways: Edits) -> tuple[Callable[[Run, Names, Names], Run
 
 def ways(form: Form) -> tuple[Callable[[Run, Names, Names], Run], ...]:
     """Return other ways in which ports write a form that follows unit directions from lights to receivers."""
-    follows = any(DIRECTION in code_of(one) for one in called_by(form.function))
-    return written(form, *(((DIRECTION, other),) for other in DIRECTIONS)) if follows else ()
+    texts = [code_of(one) for one in called_by(form.function)]
+    follows = any(DIRECTION in one for one in texts)
+    inverse = (INVERSE,) if any(DIRECTION in one and FALL in one for one in texts) else ()
+    return written(form, *(((DIRECTION, other),) for other in DIRECTIONS), *inverse) if follows else ()
 
 
 def own(*lists: str) -> tuple[tuple[str, str], ...]:

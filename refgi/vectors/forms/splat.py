@@ -73,7 +73,7 @@ def _range_sum(arguments: Arguments) -> Described:
              **({"area": "footprint"} if arguments["footprint"] is not None else {})}
     form = Form(sii.range_sum, reads, ("",), {} if len(fields) > 1 else {"glossy_kept": None},
                 adapt={"triangle_id": ids})
-    return Described(form, lists, POINTS)
+    return Described(form, (*lists, *(own("sum/disc") if "area" in reads else ())), POINTS)
 
 
 def _stored_lights(arguments: Arguments) -> Described:

@@ -9,7 +9,7 @@ from click.core import ParameterSource
 
 from refgi.cli.options import SEEN, Asked, verb
 from refgi.cli.session import Session, progress, say, table
-from refgi.vectors.report import OPTIONS
+from refgi.vectors.options import OPTIONS
 
 if TYPE_CHECKING:
     from refgi.vectors.manifest import KitManifest

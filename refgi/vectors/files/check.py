@@ -14,7 +14,8 @@ from refgi.errors import InputError
 from refgi.vectors.check import DAMAGED, asked_from, check_output
 from refgi.vectors.kit import DamagedError, Kit
 from refgi.vectors.manifest import text_of
-from refgi.vectors.report import OPTIONS, github, report, write_junit
+from refgi.vectors.options import OPTIONS
+from refgi.vectors.report import github, report, write_junit
 
 
 def main(arguments: list[str] | None = None) -> int:

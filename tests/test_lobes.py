@@ -126,4 +126,4 @@ def test_sampled_directions_have_the_density_of_the_lobe(exponent):
 def test_nobody_else_norms_a_lobe():
     home = Path(refgi.__file__).parent
     users = {str(p.relative_to(home)) for p in home.rglob("*.py") if "lobe_fraction" in p.read_text(encoding="utf-8")}
-    assert users == {"radiometry.py", "ledger/account.py"}  # the ledger asks what is lost below
+    assert users == {"radiometry.py", "ledger.py"}  # the ledger asks what is lost below

@@ -165,7 +165,7 @@ def test_samples_of_the_error_target_of_val(seed, monkeypatch):
     frame = Frame(load_scene("cornell_box"), width=64, height=48)
     lights = choose_pixel_lights(frame.rsms, count=16, pattern="halton")
     monkeypatch.setattr(adaptive, "SAMPLES", 100)
-    monkeypatch.setattr(adaptive, "_by_rays", lambda *_: np.zeros((3, 100), np.float32))
+    monkeypatch.setattr(adaptive, "clustered_irradiance", lambda *_: np.zeros((3, 1, 100), np.float32))
     settings = of(ValSettings, seed=seed, clusters="adaptive", target_error=0.1)
     position = adaptive._samples(frame, lights, settings).receivers.position
     surface = np.flatnonzero(frame.gbuffer.covered)

@@ -184,6 +184,7 @@ def areas(
 ) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
     """Bound each cluster's lights by a rectangle in its plane (VAL Sec. 6, E-VAL-10).
 
+    position (3, light): Places of the lights, m.
     center (3, cluster): Centres, m.
     normal (3, cluster): Their unit normals.
     of (light,) int: C(i): cluster of each light.

@@ -46,7 +46,9 @@ def openness(
     InputError
         If shapes do not fit or a number is out of range.
 
-    Notes ----- The same point, index and seed give the same value whatever other points are passed, for any number of
+    Notes
+    -----
+    The same point, index and seed give the same value whatever other points are passed, for any number of
     threads. Near a wall at distance d the exact value is 1 - (acos t - t sqrt(1 - t^2)) / pi, t = d / radius.
     """
     expect(position.ndim >= 1 and position.shape[0] == 3, "position", "shape (3, ...)", position.shape)

@@ -116,8 +116,9 @@ LISTED_RAY_BYTES = 48  # of a sample of one receiver
 def level_bytes(settings: HssilSettings, pixels: int, float_bytes: int) -> int:
     """Return the bytes of the levels of one picture: n from full resolution on are (4 - 4^(1 - n)) / 3 times the first.
 
-    >>> from refgi.sssil.settings import SamplingSettings >>> level_bytes(HssilSettings(SamplingSettings(start="full",
-    levels=1)), 100, 4) 4800
+    >>> from refgi.sssil.settings import SamplingSettings
+    >>> level_bytes(HssilSettings(SamplingSettings(start="full", levels=1)), 100, 4)
+    4800
     """
     sampling, downsample = settings.sampling, settings.senders.downsample
     floats = FLOATS + (downsample == "closest_average")

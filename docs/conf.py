@@ -46,6 +46,12 @@ def sections(app: Any, what: str, name: str, thing: Any, options: Any, lines: li
     lines[:] = "\n\n".join([first, *rest[:heading], *made, *rest[heading:], ""]).split("\n")
 
 
+def without_twins(app: Any, what: str, name: str, thing: Any, skip: bool, options: Any) -> bool:  # noqa: ARG001
+    """Leave out functions by another name, such as a stage's without observation."""
+    return skip or (inspect.isfunction(thing) and thing.__name__ != name)
+
+
 def setup(app: Any) -> None:
     """Let stages' docstrings be read before numpydoc reads them."""
     app.connect("autodoc-process-docstring", sections, priority=400)
+    app.connect("autodoc-skip-member", without_twins)

@@ -4,7 +4,7 @@
 vectors again when read, flux 8 bits a channel, as shares of the largest of all lights and parts.
 
 `half_resolution` (SII Table 3; no filter in the paper): a pixel takes the bilinear mean of the four blocks around it,
-each times a = max(0, n . n_k)^8 (1 - |n . (x_k - x)| / |x_k - x|)^2, x, n and x_k, n_k positions and normals of the
+each times ``a = max(0, n . n_k)^8 (1 - |n . (x_k - x)| / |x_k - x|)^2``, x, n and x_k, n_k positions and normals of the
 pixel and of a block's: the first factor for edges, the second for depth. A pixel that no block resembles is evaluated.
 
 `compensation` (Novak, Engelhardt and Dachsbacher 2011): with the geometry term bounded to b lights lack the integral of

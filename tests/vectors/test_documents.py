@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from refgi.cli.group import VerbGroup
-from refgi.vectors.report import OPTIONS
+from refgi.vectors.options import OPTIONS
 from tests.vectors.port import Port
 
 ROOT = Path(__file__).parents[2]

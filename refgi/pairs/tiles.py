@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from refgi.jit import kernel
+from refgi.jit import kernel, prange
 from refgi.rsm.pool import plane
 from refgi.skips import left_out
 from refgi.types import Array
 
 BLOCK = 16  # BLOCK^2 pixels fill one tile of the kernels
+AT_ONCE = 1 << 12  # pixels that a thread copies at once
 ROUNDING = 32.0  # units of rounding of |d| that a cosine computed from d may be off; about 6 are possible
 
 
@@ -33,29 +34,71 @@ def clear(picture: Array, covered: Array, receiving: Array) -> None:
 
 def block_by_block(covered: Array, nth: Array | slice = slice(None)) -> Array:
     """Return the flat indices of covered pixels (h, w), block by block, (n,) int64; only the `nth` ones where given."""
-    height, width = covered.shape
-    down, across = -(-height // BLOCK), -(-width // BLOCK)
-    whole = np.zeros((down * BLOCK, across * BLOCK), np.bool_)
-    whole[:height, :width] = covered
-    fours = whole.view(np.uint32).reshape(down, 2, 2, 4, across, 2, 2).transpose(0, 4, 1, 5, 2, 6, 3)
-    index = np.flatnonzero(fours.reshape(-1).view(np.bool_))[nth]
-    corner = np.add.outer(np.arange(down) * (BLOCK * width), np.arange(across) * BLOCK).reshape(-1)
-    row, column = np.divmod(np.arange(BLOCK * BLOCK), BLOCK)
-    inside = (row * width + column).reshape(2, 2, 4, 2, 2, 4).transpose(0, 3, 1, 4, 2, 5).reshape(-1)
-    places: Array = corner[index // BLOCK**2] + inside[index % BLOCK**2]
-    return places
+    counts = np.add.reduceat(np.count_nonzero(covered, axis=1), np.arange(0, len(covered), BLOCK))
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    index = np.arange(BLOCK * BLOCK).reshape(2, 2, 4, 2, 2, 4).transpose(0, 3, 1, 4, 2, 5).reshape(-1)
+    places = plane((int(starts[-1]),), np.int64)
+    _fill_strips(covered, np.stack([index // BLOCK, index % BLOCK]), starts, places)
+    return places[nth]
 
 
 def taken(values: Array, places: Array) -> Array:
     """Return the values of three channels (3, h, w) at pixels of flat indices (n,), (3, n)."""
     some = plane((3, len(places)), values.dtype)
-    return np.take(values.reshape(3, -1), places, axis=1, out=some, mode="clip")
+    _take(np.ascontiguousarray(values).reshape(3, -1), places, some)
+    return some
 
 
 def put(picture: Array, places: Array, values: Array) -> None:
     """Store the values (3, n) of three channels at pixels of distinct flat indices (n,) of a contiguous picture."""
-    for channel, part in zip(picture.reshape(3, -1), values, strict=True):
-        channel[places] = part
+    _put(values, places, picture.reshape(3, -1))
+
+
+@kernel(parallel=True)
+def _fill_strips(covered: Array, path: Array, starts: Array, places: Array) -> None:
+    height, width = covered.shape
+    for strip in prange(len(starts) - 1):
+        top, count = strip * BLOCK, starts[strip]
+        for left in range(0, width, BLOCK):
+            first = top * width + left
+            if _is_full(covered, top, left):
+                for i in range(BLOCK * BLOCK):
+                    places[count + i] = first + path[0, i] * width + path[1, i]
+                count += BLOCK * BLOCK
+                continue
+            for i in range(BLOCK * BLOCK):
+                row, column = top + path[0, i], left + path[1, i]
+                if row < height and column < width and covered[row, column]:
+                    places[count] = row * width + column
+                    count += 1
+
+
+@kernel
+def _is_full(covered: Array, top: int, left: int) -> bool:
+    """Return whether a whole block lies on the picture and shows surfaces alone."""
+    if top + BLOCK > covered.shape[0] or left + BLOCK > covered.shape[1]:
+        return False
+    full = True
+    for row in range(top, top + BLOCK):
+        for column in range(left, left + BLOCK):
+            full &= covered[row, column]
+    return full
+
+
+@kernel(parallel=True)
+def _take(values: Array, places: Array, some: Array) -> None:
+    for part in prange(-(-len(places) // AT_ONCE)):
+        for c in range(3):
+            for i in range(part * AT_ONCE, min((part + 1) * AT_ONCE, len(places))):
+                some[c, i] = values[c, places[i]]
+
+
+@kernel(parallel=True)
+def _put(some: Array, places: Array, values: Array) -> None:
+    for part in prange(-(-len(places) // AT_ONCE)):
+        for c in range(3):
+            for i in range(part * AT_ONCE, min((part + 1) * AT_ONCE, len(places))):
+                values[c, places[i]] = some[c, i]
 
 
 @kernel

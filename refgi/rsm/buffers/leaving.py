@@ -47,7 +47,7 @@ def leaving_radiance(irradiance: Array, extra: Array | None, buffer: GBuffer, ma
     radiance = plane(irradiance.shape, irradiance.dtype if extra is None else np.result_type(irradiance, extra))
     emits = bool(materials.emission.any())
     material_id = buffer.material_id if emits else NONE
-    _reflect(irradiance, extra, buffer.albedo, radiance)
+    _reflect(irradiance, irradiance if extra is None else extra, extra is not None, buffer.albedo, radiance)
     if emits and materials.emissive is None:
         _emit(materials.emission, material_id, radiance)
     elif emits:
@@ -78,7 +78,7 @@ def radiance_of(irradiance: Array, extra: Array | None, albedo: Array, emission:
     -> (3, h, w): Radiance, W/m^2/sr, linear RGB; 0 without surface.
     """
     radiance = np.empty_like(irradiance)
-    _reflect(irradiance, extra, albedo, radiance)
+    _reflect(irradiance, irradiance if extra is None else extra, extra is not None, albedo, radiance)
     return radiance if emission is None else radiance + emission
 
 
@@ -91,11 +91,17 @@ def leaving_steps(direct: Array, indirect: Array | None, buffer: GBuffer, materi
     return radiance_of(direct, indirect, buffer.albedo, emission)
 
 
-def _reflect(irradiance: Array, extra: Array | None, albedo: Array, radiance: Array) -> None:
-    """Fill radiance with L = albedo/pi E, of the BRDF of a diffuse surface."""
-    arriving = irradiance if extra is None else np.add(irradiance, extra, out=radiance)
-    np.multiply(arriving, albedo, out=radiance)
-    radiance /= irradiance.dtype.type(np.pi)
+@kernel(parallel=True)
+def _reflect(irradiance: Array, extra: Array, both: bool, albedo: Array, radiance: Array) -> None:
+    pi = irradiance.dtype.type(np.pi)
+    for row in prange(radiance.shape[1]):
+        for channel in range(3):
+            for x in range(radiance.shape[2]):
+                arriving = irradiance[channel, row, x]
+                if both:
+                    arriving = arriving + extra[channel, row, x]
+                # L = albedo/pi E, the BRDF of a diffuse surface
+                radiance[channel, row, x] = arriving * albedo[channel, row, x] / pi
 
 
 @kernel(parallel=True)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.scene.material import as_senders
-from refgi.scene.model import LightTable, MaterialTable, Scene, light_table, material_table
+from refgi.scene.model import DirectionalLight, LightTable, MaterialTable, Scene, light_table, material_table
 from refgi.scene.motion import near_origin
 from refgi.scene.values import is_count
 from refgi.skips import left_out
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from refgi.rsm import GBuffer, Rsm
     from refgi.rsm.buffers.extent import Extent
     from refgi.rsm.buffers.leaving import GlossyPoints
+    from refgi.rsm.buffers.light_projection import MapShape
 Shadows = Literal["map", "exact"]
 
 BUFFERS = ("gbuffer", "rsms", "tracer")  # of a frame, the dear ones
@@ -86,6 +87,7 @@ class Frame:
         expect(len(scene.lights) > 0, f"scene {scene.name!r}", "at least one light", "none")
         self.scene, self.origin = near_origin(scene)
         self._visible: dict[int, Array] = {}  # where each light arrives, of a frame with glossy receivers
+        self._shaped: dict[MapShape, tuple[Rsm, ...]] = {}  # maps of other shapes than the usual
 
     @cached_property
     def materials(self) -> MaterialTable:
@@ -120,12 +122,22 @@ class Frame:
     @cached_property
     def rsms(self) -> "tuple[Rsm, ...]":
         """One reflective shadow map a light."""
+        return self._drawn_maps("auto")
+
+    def rsms_as(self, shape: "MapShape") -> "tuple[Rsm, ...]":
+        """Return one map a light, that of a spot or point light of a shape; "auto": `rsms`, which shadows read too."""
+        if shape == "auto":
+            return self.rsms
+        if shape not in self._shaped:
+            self._shaped[shape] = self._drawn_maps(shape)
+        return self._shaped[shape]
+
+    def _drawn_maps(self, shape: "MapShape") -> "tuple[Rsm, ...]":
         from refgi.rsm import reflective_shadow_map
 
-        return tuple(
-            reflective_shadow_map(self.scene.geometry, self.senders, light, self.rsm_resolution, self.dtype)
-            for light in self.scene.lights
-        )
+        return tuple(reflective_shadow_map(
+            self.scene.geometry, self.senders, light, self.rsm_resolution, self.dtype,
+            "auto" if isinstance(light, DirectionalLight) else shape) for light in self.scene.lights)
 
     @cached_property
     def visible_extent(self) -> "Extent":

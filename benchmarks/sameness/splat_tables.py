@@ -62,6 +62,7 @@ PAIRS: list[Row] = [
 
 LIGHTS: list[Row] = [
     vary("lights", 64, 200, on=LAMPS),
+    vary("projection", "cube", "paraboloid", on=LAMPS),
     vary("pattern", "grid", "halton", "all", "random", on=LAMPS),
     vary("filtered", True, on=LAMPS),
     vary("filtered", True, pattern="random"),

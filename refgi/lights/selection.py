@@ -135,8 +135,8 @@ def choose_lights(frame: "Frame", settings: LightSettings) -> "PixelLights":
 
 
 def light_maps(frame: "Frame", settings: MapLights) -> "tuple[Rsm, ...]":
-    """Return the maps that lights are taken from, one a lamp: those of the frame, with what glass lets through."""
-    rsms = frame.rsms
+    """Return the maps that lights are taken from, one a lamp of the shape asked for, with what glass lets through."""
+    rsms = frame.rsms_as(settings.projection)
     if settings.refraction is not None:
         mode: Any = settings.refraction.name()
         traced = mode == "two_interface" and frame.materials.ior.any()

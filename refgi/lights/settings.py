@@ -70,6 +70,8 @@ class MapLights(Settings):
     NAME = "rsm"
     SWITCHES: ClassVar[frozenset[str]] = frozenset({"sii_no_tn", "equal_solid_angle", "sii_peak"})
 
+    projection: Literal["auto", "cube", "paraboloid"] = setting(
+        "auto", "maps of spots and point lights: those of shadows, or a cube or one or two paraboloids (SII Sec. 3.6)")
     pattern: Pattern = setting("halton", "where they lie in a map; all: every texel, whatever the count")
     filtered: bool = setting(False, "flux is averaged over each light's cell (SII Sec. 4)")
     warp: WarpA | WarpB | None = setting(None, "importance warping (SII Sec. 3.5)")
@@ -153,6 +155,7 @@ def most_lights(lights: LightSettings, maps: int, texels: int) -> int:
     """Return how many pixel lights there may be at most, by shadow maps of all lamps and texels of a map."""
     if isinstance(lights.source, PathLights):
         return lights.count * lights.source.bounces
+    maps *= 6 if lights.source.projection == "cube" else 1  # a spot's one becomes six
     if lights.source.pattern == "all":
         return maps * texels
     # a grid has a cell on each face at least, and at most 4 of 2.5 that are its share

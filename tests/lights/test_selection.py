@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError
+from refgi.frame import Frame
 from refgi.lights import Warp, choose_pixel_lights, importance
 from refgi.lights.selection import choose_lights, roulette, scale_flux
 from refgi.lights.settings import LightSettings
+from refgi.methods import find_method
 from refgi.rays import Tracer, openness
 from refgi.rsm import reflective_shadow_map
-from refgi.scene import Material, SpotLight, load_scene, material_table
+from refgi.scene import Material, PointLight, SpotLight, load_scene, material_table
 from refgi.settings import of, replaced
 from refgi.splat import PairSettings, Receivers, irradiance
 from tests.rsm.shapes import geometry
@@ -270,3 +272,49 @@ def moved(light, step):
     """Return the light moved sideways."""
     x, y, z = light.position
     return SpotLight((x + step, y, z), light.direction, light.inner_half_angle, light.outer_half_angle, light.intensity)
+
+
+SAG = 1e-3  # twice by how much less than 1 m the middles of the ball's faces are away from its centre
+FACETS = 2 * SAG  # of irradiance, which goes by the square of the radius
+QUADRATURE = 5e-6  # of a spot's falloff over texels of a map that does not look along its axis
+
+
+@pytest.mark.feature("SII-02")
+@pytest.mark.parametrize("shape", ["auto", "cube", "paraboloid"])
+def test_a_ball_is_lit_alike_by_maps_of_any_shape(shape, evidence):
+    """Closed form: all power of the lamps arrives, and a sphere's wall gets rho times it over 4 pi everywhere."""
+    spot = SpotLight((0.3, 0.2, -0.4), (1, -2, 0.5), math.radians(30), math.radians(60), (3, 2, 1), "ramp")
+    point = PointLight((-0.2, 0.1, 0.3), (1.0, 2.0, 3.0))
+    inner, outer = math.cos(spot.inner_half_angle), math.cos(spot.outer_half_angle)
+    arriving = (2 * math.pi * (1 - (inner + outer) / 2) * np.array(spot.intensity)
+                + 4 * math.pi * np.array(point.intensity))
+    ball = load_scene("integrating_sphere").with_lights(spot, point)
+    sent = np.array(ball.materials[0].diffuse) * arriving
+    frame = Frame(ball, width=12, height=8, rsm_resolution=24, dtype=np.float64)
+    every, some = {"source.projection": shape, "source.pattern": "all"}, {"source.projection": shape, "count": 1024}
+    lights = choose_lights(frame, of(LightSettings, **every))
+    assert lights.texel.max() >= 24 * 24 * (1 if shape == "paraboloid" else 2)  # of two maps at least
+    assert np.abs(np.linalg.norm(lights.position, axis=0) - 1).max() < SAG
+    assert np.abs(lights.flux.sum(axis=1) / sent - 1).max() < QUADRATURE
+    drawn = np.abs(choose_lights(frame, of(LightSettings, **some)).flux.sum(axis=1) / sent - 1).max()
+    random = deviation(lights, [rsm.texels for rsm in frame.rsms_as(shape)], some["count"])
+    assert drawn < random  # Halton points are more even
+    errors = {}
+    for name, more in (("sii", {}), ("multires", {"subsplats": "geometry"}), ("val", {"visibility": None}),
+                       ("vpl", {"visibility": False})):
+        method, clamp = find_method(name), {} if name == "vpl" else {"pairs.clamp": None}
+        settings = of(method.settings, **{f"lights.{key}": value for key, value in every.items()}, **more, **clamp)
+        light = method.function(frame, settings)
+        errors[name] = np.abs(light / (sent / (4 * math.pi))[:, None, None] - 1).max()
+    assert max(errors.values()) < FACETS
+    evidence(f"{shape}: irradiance within {max(errors.values()):.0e} of the sphere's, flux of 1024 lights "
+             f"within {drawn:.1%}, of random ones {random:.1%}")
+
+
+def deviation(lights, texels, count):
+    """Return the standard deviation of the sum of N random lights' flux, shared out by it, as a share of all of it."""
+    flux = [lights.flux[:, lights.map_index == lamp].sum(axis=0) for lamp in range(len(texels))]
+    total = sum(one.sum() for one in flux)
+    variance = sum((size * (one**2).sum() - one.sum() ** 2) / (count * one.sum() / total)
+                   for one, size in zip(flux, texels, strict=True))
+    return math.sqrt(variance) / total

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from refgi.literal.light_flux import spot_share
+from refgi.rsm import reflective_shadow_map
 from tests.naive.draws import draw
 from tests.naive.openness import LIFT, basis, cosine_direction
 from tests.naive.pixel_lights import mirror, radical_inverse
@@ -105,10 +106,16 @@ class LightMap:
         return areas
 
 
+def drawn_maps(frame, shape):
+    """Draw the map of each lamp, of a shape that a sun's cannot have."""
+    return [reflective_shadow_map(frame.scene.geometry, frame.senders, lamp, frame.rsm_resolution, frame.dtype,
+                                  shape if hasattr(lamp, "position") else "auto") for lamp in frame.scene.lights]
+
+
 def maps_of(frame, arriving, source):
     """Return the maps of a frame as the source of lights has them; `arriving` as (3, H, W) W each."""
     maps = []
-    for rsm, incident in zip(frame.rsms, (rows(plane) for plane in arriving), strict=True):
+    for rsm, incident in zip(drawn_maps(frame, source.projection), (rows(plane) for plane in arriving), strict=True):
         here = raw(rsm)
         if source.refraction is not None:
             send_through_glass(here, frame.scene, rsm.triangle_id.ravel(), incident, source.refraction)

@@ -73,6 +73,7 @@ class Method(NamedTuple):
     memory: Callable[[Any, Extent], int] | None = None  # bytes that settings add to a picture
     presets: Mapping[str, Settings] = NONE  # named settings beside the default; "paper": the values printed
     temporal: Settings | None = None  # of its temporal filter over frames, where it has one
+    temporal_presets: Mapping[str, Settings] = NONE  # the same that belong to presets of the method
     approximations: tuple[Approximation, ...] = ()  # in the order of its pipeline
     lobes: Callable[[Any, Any], Array] | None = None  # (3, h, w) radiance of receivers' lobes by indirect light
     lobe_estimate: Callable[[Any, Any], Any] | None = None  # gives that radiance with its own error, W/m^2/sr

@@ -43,7 +43,7 @@ def _compare(session: Session, asked: Asked) -> int:
     from refgi.compare.report import file_names
 
     names, settings = _methods(asked)
-    still = still_frames(names, asked.frames, asked.filtering)
+    still = still_frames(names, asked.frames, asked.filtering, asked.preset)
     scene = scene_of(asked)
     if asked.out is not None:
         folder(asked.out, Permission(asked.parents, asked.force), file_names(names))

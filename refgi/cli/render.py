@@ -86,7 +86,7 @@ def _job(asked: Asked) -> "Job":
         path = Path(asked.again)
         return job_of(read_record(path), path, asked.scene_path)
     settings = settings_for(asked.method, asked.pairs, asked.seed, asked.preset)
-    still = still_frames([asked.method], asked.frames, asked.filtering)
+    still = still_frames([asked.method], asked.frames, asked.filtering, asked.preset)
     scene = scene_of(asked)
     frame = {key: getattr(asked, key) for key in ("dtype", "rsm_resolution", "shadows")}
     return Job(scene, asked.method, settings, frame, scene.exposure, still=still)

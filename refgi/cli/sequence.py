@@ -57,7 +57,7 @@ def _sequence(session: Session, asked: Asked) -> int:
     light = KeepingEstimate(find_method(method))
     settings = settings_for(method, asked.pairs, asked.seed, asked.preset)
     require_repeatable(settings)
-    temporal = _temporal(method, asked.filtering, asked.unfiltered)
+    temporal = _temporal(asked)
     frame_options = {"dtype": asked.dtype, "rsm_resolution": asked.rsm_resolution,
                      "shadows": asked.shadows or usual_shadows(settings)}
     scene, way, frames = _scene_and_way(asked)
@@ -194,15 +194,14 @@ def _history_after(sequence: "Sequence", scene: "Scene", files: FrameFiles, numb
     return history_of(frame, scene.geometry, with_frames(*files.light(number)))
 
 
-def _temporal(method: str, pairs: tuple[str, ...], unfiltered: bool) -> "TemporalSettings | None":
+def _temporal(asked: Asked) -> "TemporalSettings | None":
+    from refgi.cli.view import filter_for
     from refgi.errors import expect
-    from refgi.settings import from_text
-    from refgi.sssil.temporal import TemporalSettings
 
-    expect(not (pairs and unfiltered), "--temporal", "nothing beside --no-temporal", " ".join(pairs))
-    if unfiltered or not (pairs or method == "hssil"):
-        return None
-    return from_text(TemporalSettings(), pairs)
+    pairs = asked.filtering
+    expect(not (pairs and asked.unfiltered), "--temporal", "nothing beside --no-temporal", " ".join(pairs))
+    return None if asked.unfiltered or not (pairs or asked.method == "hssil") else filter_for(
+        [asked.method], asked.preset, pairs)
 
 
 def _scene_and_way(asked: Asked) -> "tuple[Scene, Way, int]":

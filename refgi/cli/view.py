@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from refgi.cli.options import Asked
 from refgi.errors import InputError, expect, first_faults
 from refgi.memory import available_bytes
-from refgi.method import Extent
+from refgi.method import DEFAULT, Extent
 from refgi.methods import find_method, require_filter
 from refgi.scene import Camera, DirectionalLight, Light, PointLight, Scene, SpotLight, builtin_scenes, load_scene
 from refgi.scene.files import did_you_mean, text_of
@@ -22,6 +22,7 @@ from refgi.settings import from_text, leaves
 if TYPE_CHECKING:
     from refgi.jit.ahead import Specialisation
     from refgi.provenance.frames import StillFrames
+    from refgi.sssil.settings import TemporalSettings
     from refgi.types import Tell
 
 KEYS = {
@@ -54,16 +55,24 @@ def has_seed(method: str) -> bool:
     return any(leaf.key.rpartition(".")[2] == "seed" for leaf in leaves(find_method(method).settings))
 
 
-def still_frames(methods: Iterable[str], frames: int | None, pairs: Sequence[str]) -> "StillFrames | None":
+def filter_for(methods: Iterable[str], preset: str, pairs: Iterable[str]) -> "TemporalSettings":
+    """Return the settings of a temporal filter that belong to a preset of a method, changed by texts `key=value`."""
+    from refgi.sssil.temporal import TemporalSettings
+
+    known: list[Any] = [find_method(name).temporal_presets for name in methods]
+    return from_text(next((one[preset] for one in known if preset in one), TemporalSettings()), pairs)
+
+
+def still_frames(
+    methods: Iterable[str], frames: int | None, pairs: Sequence[str], preset: str = DEFAULT
+) -> "StillFrames | None":
     """Return how many frames of a resting scene methods blend, and by which filter; None without --frames."""
     if frames is None:
         expect(not pairs, "--temporal", "--frames beside it", " ".join(pairs))
         return None
     from refgi.provenance.frames import StillFrames
-    from refgi.sssil.temporal import TemporalSettings
 
-    require_filter(methods)
-    return StillFrames(frames, from_text(TemporalSettings(), pairs))
+    return StillFrames(frames, filter_for(require_filter(methods), preset, pairs))
 
 
 def by_method(pairs: Iterable[str], methods: Iterable[str]) -> dict[str, list[str]]:

@@ -13,6 +13,7 @@ from refgi.sssil.hssil import hssil, hssil_lobes
 from refgi.sssil.levels import pyramid
 from refgi.sssil.settings import (
     PRESETS,
+    TEMPORAL_PRESETS,
     Bilateral,
     Bilinear,
     Bitmask,
@@ -30,6 +31,7 @@ from refgi.sssil.view import Level
 
 __all__ = [
     "PRESETS",
+    "TEMPORAL_PRESETS",
     "Bilateral",
     "Bilinear",
     "Bitmask",
@@ -51,4 +53,4 @@ __all__ = [
 METHOD = Method(
     "hssil", "Hierarchical Screen-Space Indirect Illumination (2009): what the camera sees lights what it sees", hssil,
     HssilSettings, visibility=lambda settings: settings.visibility is not None, memory=extra_bytes, presets=PRESETS,
-    temporal=TemporalSettings(), approximations=APPROXIMATIONS, lobes=hssil_lobes)
+    temporal=TemporalSettings(), temporal_presets=TEMPORAL_PRESETS, approximations=APPROXIMATIONS, lobes=hssil_lobes)

@@ -257,3 +257,9 @@ class TemporalSettings(Settings):
         if self.form == "printed":
             return self.weight**2 + (1 - self.weight) ** 2
         return (1 - self.weight) / (1 + self.weight)
+
+
+TEMPORAL_PRESETS: Mapping[str, TemporalSettings] = {
+    # Sec. 3.3: new pixels have an a by the camera's speed, of which it gives no number; first frames are as all others
+    "paper": TemporalSettings(warm_up=False, entering_speed=16.0),
+}

@@ -1,5 +1,6 @@
 """`refgi sequence`: the frames it writes, how it goes on after an interruption, what it refuses before computing."""
 
+import dataclasses
 import json
 import re
 
@@ -16,6 +17,7 @@ from refgi.scene.pathfile import read_path
 from refgi.settings import of
 from refgi.splat import SiiSettings
 from refgi.splat.sii.sii import sii
+from refgi.sssil import PRESETS
 from refgi.sssil.temporal import Sequence, TemporalSettings
 from tests.cli.command import TINY, refused, runner
 
@@ -149,6 +151,20 @@ def test_another_method_is_not_filtered_unless_asked(way, tmp_path):
                           tmp_path).stdout)
     assert told["temporal"]["weight"] == 0.25
     assert len(told["frames"]) == 1
+
+
+@pytest.mark.feature("HSS-13")
+def test_the_papers_filter_goes_by_the_cameras_speed(way, tmp_path):
+    """New pixels of the preset have an a by the camera's speed, and its first frames are as all others (Sec. 3.3)."""
+    asked = [*TINY, "--method", "hssil", "--preset", "paper", "--frames", "2", "--json", "--out", tmp_path]
+    told = json.loads(run("cornell_box", way, *asked, "--temporal", "weight=0.6").stdout)
+    expected = TemporalSettings(weight=0.6, warm_up=False, entering_speed=16.0)
+    assert told["temporal"] == dataclasses.asdict(expected)
+    scene = load_scene("cornell_box").with_camera(width=12, height=10)
+    along = scenes_along(scene, read_path(way, scene)[0], 2)
+    for step, light in zip(Sequence(along, PRESETS["paper"], expected, rsm_resolution=16),
+                           lights(tmp_path, range(2)), strict=True):
+        assert np.array_equal(light, step.irradiance)
 
 
 @pytest.mark.parametrize(("arguments", "words"), [

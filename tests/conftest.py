@@ -1,6 +1,7 @@
 """What every test can ask for: the real scenes' folder, and a place to put the figure a feature's evidence gave."""
 
 import os
+import re
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -90,8 +91,18 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     table = sorted(row for report in reports if report.when == "call" for row in _evidence_of(report))
     if table:
         terminalreporter.section("evidence")
+        terminalreporter.write_line(features_built())
         for feature, test, figure in table:
             terminalreporter.write_line(f"{feature:8} {test}\n         {figure}")
+
+
+def features_built() -> str:
+    """Return how many features docs/features.md lists, and which of them are built in part or not."""
+    page = (ROOT / "docs/features.md").read_text()
+    rows = re.findall(r"^\| ([A-Z]{3}-\d\d) \|[^|]+\| (in part|not built)?", page, re.MULTILINE)
+    short = [f"{sum(kind == how for _, kind in rows)} {how}: " + ", ".join(name for name, kind in rows if kind == how)
+             for how in ("in part", "not built") if any(kind == how for _, kind in rows)]
+    return ", ".join([f"Of {len(rows)} features {sum(not kind for _, kind in rows)} are built", *short])
 
 
 def _evidence_of(report: pytest.TestReport) -> list[tuple[str, str, str]]:

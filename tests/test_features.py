@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from tests.conftest import COLLECTED
+from tests.conftest import COLLECTED, features_built
 
 ROOT = Path(__file__).parents[1]
 NUMBERS = {paper: range(1, count + 1) for paper, count in (("SII", 32), ("VAL", 27), ("AMS", 22), ("HSS", 21))}
@@ -34,6 +34,12 @@ def test_every_feature_is_listed_once_and_in_order():
 
 def test_listed_features_are_the_marked_ones():
     assert {feature for feature, evidence in listed() if not evidence.startswith(NOT_BUILT)} == marked().keys()
+
+
+def test_pages_count_what_is_built_in_part():
+    for page in ("docs/features.md", "README.md"):
+        text = " ".join((ROOT / page).read_text().split())
+        assert features_built() in text, page
 
 
 def test_the_short_list_has_a_test_of_every_feature(request):

@@ -2,12 +2,14 @@
 
 import dataclasses
 import math
+from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from benchmarks.harness import interleaved
 from benchmarks.papers.records import Cell, Figure, Picture, Plot, Table
 from benchmarks.papers.val.moving import mean_motion, motion
 from benchmarks.papers.val.subjects import (
@@ -16,9 +18,12 @@ from benchmarks.papers.val.subjects import (
     Clustered,
     clustered,
     clustered_along,
+    drawing,
     frame_of,
+    grouped,
     lit_by,
     maps_of,
+    published,
     rays_to,
     scene_of,
     settings_of,
@@ -32,6 +37,7 @@ from refgi.compare.pages import Axes, Curve, curves_plot
 from refgi.compare.pictures import luminance
 from refgi.frame import Frame
 from refgi.image import tone_map
+from refgi.lights.selection import choose_lights
 from refgi.scene import Scene
 from refgi.types import Array
 
@@ -40,6 +46,7 @@ TARGET, VFOV = (0.4, 0.42, 0.4), math.radians(20)  # m and rad, of Figure 6's ca
 EYE = (0.278, 0.36, 0.08)  # m, where Figure 8's spot is
 LOW, HIGH = math.radians(4), math.radians(64)  # elevation of its axis at the start and at the ceiling
 NORMAL_WEIGHT = 0.3  # diagonals for a unit of normals: a pixel's light lies on its own side of an edge
+OFTEN = 10  # clusterings timed for each frame: they take milliseconds
 GREY, INK = 0.55, 0.8  # how bright surfaces without lights are, how strong clusters' colours
 
 
@@ -154,13 +161,19 @@ def to_the_ceiling(bench: Workbench, scene: str, starts: dict[str, str], distanc
     titles = {(distance, start): f"{starts[start]}, {distances[distance]}" for distance, start in runs}
     warm, kept, mild = counts["raw", "warm"], counts["raw", "restart"], counts["normalised", "warm"]
     step = moves["normalised", "restart"]
+    times = {distance: _times_of_starts(bench, frames[there // 2], runs[distance, "warm"][there // 2 - 1], one)
+             for distance, one in settings.items()}
+    slower = [one["restart"].frame / one["warm"].frame for one in times.values()]
     return Figure(
         facts=(scene_of(bench, scene).description, f"{len(frames)} frames, to the ceiling and back",
                f"{settings['raw'].lights.count} lights", f"{AREA_LIGHTS} clusters"), pictures=shown,
         tables=[Table("Clusters with lights, and how far things move between two frames in % of the scene's diagonal",
                       ("", "on the wall", "on the ceiling", "back on the wall", "lights, mean", "centres, mean",
                        "centres, 95 %", "centres, farthest"),
-                      [(titles[key], used[0], used[ceiling], used[-1], *moves[key]) for key, used in counts.items()])],
+                      [(titles[key], used[0], used[ceiling], used[-1], *moves[key]) for key, used in counts.items()]),
+                Table("Half way up: rounds of k-means, its time, and that of a whole frame as published",
+                      ("", "rounds", "clustering, ms", "frame, ms"),
+                      [(titles[key], *times[key[0]][key[1]]) for key in counts])],
         plots=[Plot(curves_plot([Curve(titles[key], range(1, len(frames) + 1), used, key[1] == "warm")
                                  for key, used in counts.items()], Axes("frame", "clusters with lights")),
                     f"Clusters with lights in each frame; frame {there} is on the ceiling.")],
@@ -175,7 +188,28 @@ def to_the_ceiling(bench: Workbench, scene: str, starts: dict[str, str], distanc
             f"Restarted, a centre moves by {step.typical:.2f} % of the diagonal from frame to frame in the mean while "
             f"lights move by {step.lights:.2f} %; 95 of 100 move by less than {step.nearly_all:.2f} %. Not all of it "
             f"is smooth: the farthest step is {step.largest:.1f} %, of a cluster that takes other lights on the far "
-            "side of an edge."))
+            "side of an edge.",
+            f"A frame takes {min(slower):.3f} to {max(slower):.3f} times as long with restarted clusters."))
+
+
+class StartTime(NamedTuple):
+    """What a start of k-means costs."""
+
+    rounds: int
+    clustering: float  # ms
+    frame: float  # ms
+
+
+def _times_of_starts(bench: Workbench, frame: Frame, before: Clustered, settings: ValSettings) -> dict[str, StartTime]:
+    """Time k-means from its own start and from the clusters of the frame before; frames differ in that alone."""
+    starts = {"restart": None, "warm": before.clusters}
+    lights = choose_lights(frame, settings.lights)
+    whole = published(bench, frame.scene, distance=settings.clusters.distance)
+    work = {key: partial(grouped, frame, lights, settings, start) for key, start in starts.items()}
+    seconds = interleaved(work, OFTEN * bench.scale.repeats)
+    rest = interleaved({"frame": drawing(bench, frame.scene, whole)}, bench.scale.repeats)["frame"] - seconds["restart"]
+    return {key: StartTime(run().clusters.rounds, 1000 * seconds[key], 1000 * (rest + seconds[key]))
+            for key, run in work.items()}
 
 
 def moved(bench: Workbench, scene: Scene, there: int) -> list[Frame]:

@@ -175,9 +175,9 @@ def clamped(bench: Workbench, scene: Scene, **changes: Any) -> ValSettings:
     return settings_of(bench, **(clamp | changes))
 
 
-def published(bench: Workbench, scene: Scene) -> ValSettings:
+def published(bench: Workbench, scene: Scene, **changes: Any) -> ValSettings:
     """Return the paper's settings with its interleaving and blur."""
-    return clamped(bench, scene, interleaving=BLOCK)
+    return clamped(bench, scene, interleaving=BLOCK, **changes)
 
 
 def drawing(bench: Workbench, scene: Scene, settings: ValSettings) -> Callable[[], Array]:

@@ -85,6 +85,7 @@ def test_val(frame, shadow, soft):
     same(picture, val(frame, settings))
 
 
+@pytest.mark.feature("HSS-09")
 @pytest.mark.parametrize("downsample", ["closest", "average", "closest_average", "resampled"])
 def test_hssil(frame, downsample):
     settings = of(HssilSettings, **{"levels": 3, "radius": 2.0, "samples": 9, "downsample": downsample})

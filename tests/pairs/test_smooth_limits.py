@@ -61,7 +61,7 @@ def test_limits_of_methods_meet(name, dtype, evidence):
     assert max(pairs.values()) < LIMIT
 
 
-@pytest.mark.feature("REF-32")
+@pytest.mark.feature("REF-27", "REF-32")
 @pytest.mark.parametrize("name", SCENES[:2])
 def test_limits_of_lobes_meet(name, evidence):
     """A glossy floor, a glossy ball: radiance of their lobes."""

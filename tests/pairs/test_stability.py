@@ -134,6 +134,20 @@ def test_sums_lose_no_more_than_their_groups(evidence):
     evidence(f"900 lights: sums off by up to {worst:.0f} U of E beyond their terms; bound 66 U")
 
 
+@pytest.mark.feature("SII-04")
+def test_a_sum_of_very_many_lights_loses_no_more_than_a_group(evidence):
+    """The same light again and again: what is added to the total is compensated, group after group."""
+    count = 300_001
+    receivers, lights = sets.room(np.random.default_rng(3), 200, np.float32)
+    one = lights.selected(slice(1))
+    many = one._replace(**{name: np.repeat(part, count, axis=-1) for name, part in one._asdict().items()
+                           if isinstance(part, np.ndarray)})
+    term, total = (irradiance(receivers, some, PairSettings())[0, 0].astype(float) for some in (one, many))
+    worst = (np.abs(total / count - term)[term > 0] / term[term > 0]).max() / U
+    assert worst < 66
+    evidence(f"{count} times the same light: off by {worst:.0f} U; bound 66 U")
+
+
 @pytest.mark.parametrize("real", [np.float32, np.float64])
 @pytest.mark.parametrize("how", [PairSettings(), of(PairSettings, widening=0.3), of(SiiSettings, cut_share=0.05)])
 @pytest.mark.feature("SII-07")

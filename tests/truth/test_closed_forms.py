@@ -99,7 +99,7 @@ def test_integrating_sphere(estimator, evidence):
              f"{(np.sqrt(result.picture_variance) / expected).max():.1e}), spread over the wall {spread:.1e}")
 
 
-@pytest.mark.feature("REF-16")
+@pytest.mark.feature("REF-10", "REF-16")
 @pytest.mark.parametrize("bounces", [2, 4])
 def test_bounces_in_a_sphere_are_a_geometric_series(bounces, evidence):
     light = PointLight((0.3, -0.2, 0.4), (0.8, 1.6, 0.4))

@@ -128,6 +128,14 @@ def test_some_stages_alone_are_given_what_they_read():
     assert expected_of(case)["pairs.sum"] == pytest.approx(whole, rel=1e-5, abs=1e-6)
 
 
+@pytest.mark.feature("REF-33")
+def test_a_case_of_indirect_light_ends_there():
+    case, picture = recorded_case("sii-heap", heap(), "sii", indirect=True, **SIZE), recorded("sii")
+    left_out = {step.name for step in picture.stages} - {step.name for step in case.stages}
+    assert {"rsm.direct_irradiance", "rsm.leaving_radiance"} <= left_out
+    np.testing.assert_array_equal(expected_of(case)["pairs.sum"], expected_of(picture)["pairs.sum"])
+
+
 @pytest.mark.parametrize(("method", "stage", "changed"), [
     ("sii", "pairs.sum", "lights.pixel_lights.flux"),
     ("hssil", "sssil.gather_samples0", "sssil.senders.0.radiance"),

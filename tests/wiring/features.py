@@ -15,7 +15,7 @@ PAIRS = {
 }
 LIGHTS = {
     "count": "SII-10 SII-26", "seed": "SII-10", "source.projection": "SII-02",
-    "source.pattern": "SII-10", "source.filtered": "SII-03",
+    "source.pattern": "SII-10", "source.pattern = grid": "AMS-01", "source.filtered": "SII-03",
     "source.warp = A": "SII-11", "source.warp = B": "SII-12", "source.warp.levels": "SII-11 SII-12",
     "source.warp.importance": "SII-14", "source.warp.defensive": "REF-13", "source.warp.renormalise_weights": "SII-13",
     "source.refraction": "SII-09", "source = walk": "SII-17", "source.bounces": "REF-16", "openness.flux": "SII-16",
@@ -44,7 +44,7 @@ SHADOWS = {
 VAL = SHADOWS | {"visibility = none": "VAL-01", "interleaving": "VAL-23", "blur": "VAL-24"}
 MULTIRES = {
     "criteria.depth": "AMS-02", "criteria.derivative": "AMS-03", "criteria.normal": "AMS-04",
-    "criteria.curvature": "AMS-05", "subsplats.coarsest": "AMS-06", "subsplats.finest": "AMS-06",
+    "criteria.curvature": "AMS-05", "subsplats.coarsest": "AMS-06 AMS-07", "subsplats.finest": "AMS-06 AMS-07",
     "criteria.traversal": "AMS-09", "criteria.rim": "AMS-12", "criteria.diagonal": "AMS-12",
     "subsplats = irradiance": "AMS-08", "subsplats.threshold": "AMS-08", "subsplats.form": "AMS-08",
     "subsplats.upsampling": "AMS-11", "detail": "AMS-14", "supersampled": "AMS-15",

@@ -61,7 +61,7 @@ def shadow(areas, maps, points, normals, **settings):
     return visibility(maps, areas, 0, points, normals, of(ValSettings, **scale | settings))
 
 
-@pytest.mark.feature("VAL-12", "VAL-13")
+@pytest.mark.feature("VAL-12", "VAL-13", "VAL-20")
 @pytest.mark.parametrize("scale", ["log_map", "map", "scene"])
 @pytest.mark.parametrize("terms", [1, 4, 9])
 def test_chain_is_its_literal_text(terms, scale):

@@ -46,6 +46,8 @@ def test_spot_flux_sums_to_albedo_times_its_power(resolution, inner, outer, fall
     expected = np.array(RHO) * light.intensity * power
     error = np.abs(rsm.flux.sum(axis=(1, 2)) / expected - 1).max()
     assert error < 1e-6
+    some = np.arange(0, rsm.texels, 3)  # which alone have the bits of the whole map
+    np.testing.assert_array_equal(in_a_ball(light, resolution).at(some, "flux")[0], rsm.flux.reshape(3, -1)[:, some])
     evidence(f"spot {inner}/{outer} deg {falloff}, {resolution}^2: {error:.0e}")
 
 

@@ -25,6 +25,7 @@ def image(height: int, width: int) -> Image:
     return Image(RNG.random((height, width, 3)).astype(np.float32))
 
 
+@pytest.mark.feature("REF-22")
 @pytest.mark.parametrize("size", [(4, 8), (5, 7), (1, 1), (1, 6), (3, 2)])
 @pytest.mark.parametrize("wrap", [*itertools.product(WRAPS, WRAPS)])
 def test_points_equal_the_twin(size: tuple[int, int], wrap: tuple[str, str]) -> None:

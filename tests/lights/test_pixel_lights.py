@@ -142,7 +142,7 @@ def test_several_lights_share_the_count_and_each_keeps_its_flux():
     ((1, 1), 256, [121, 121]), ((1, 1, 1), 256, [81, 81, 81]), ((1, 6), 256, [121, 150]), ((6,), 256, [6 * 49]),
     ((6, 1, 1), 192, [54, 64, 64]), ((6, 6), 2, [6, 6]), ((1, 1), 3, [1, 1]), ((1, 1), 5, [4, 1]), ((1,), 2, [1]),
     ((1,), 3, [4]), ((6,), 15, [6]), ((6,), 16, [24])])
-@pytest.mark.feature("SII-13")
+@pytest.mark.feature("AMS-01", "SII-13")
 def test_a_grid_puts_n_by_n_on_each_face_as_near_to_each_share_as_can_be(faces, count, shares, evidence):
     """By hand; lights of one map are those that it draws alone, and the flux is that of the maps."""
     rsms = [with_flux(box_map() if maps == 1 else cube_map(), 7.0) for maps in faces]

@@ -15,7 +15,7 @@ PAIRS = {
 }
 LIGHTS = {
     "count": "SII-10 SII-26", "seed": "SII-10", "source.projection": "SII-02",
-    "source.pattern": "SII-10", "source.pattern = grid": "AMS-01", "source.filtered": "SII-03",
+    "source.pattern": "SII-10", "source.filtered": "SII-03",
     "source.warp = A": "SII-11", "source.warp = B": "SII-12", "source.warp.levels": "SII-11 SII-12",
     "source.warp.importance": "SII-14", "source.warp.defensive": "REF-13", "source.warp.renormalise_weights": "SII-13",
     "source.refraction": "SII-09", "source = walk": "SII-17", "source.bounces": "REF-16", "openness.flux": "SII-16",

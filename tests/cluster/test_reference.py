@@ -180,7 +180,7 @@ def test_same_bits_for_any_threads_and_any_split(box):
     assert reference_visibility(frame, lights, areas, maps, SETTINGS) is None
 
 
-@pytest.mark.feature("REF-32")
+@pytest.mark.feature("REF-15", "REF-32")
 def test_what_cosines_let_through_and_the_face_hides_counts_as_hidden(box):
     """Receivers whose interpolated normal looks at an area light and whose face looks away."""
     frame, _, areas, points, _ = box

@@ -150,14 +150,15 @@ def test_a_lamp_whose_trial_meets_nothing_has_one_path_beyond_the_number():
 
 
 @pytest.mark.parametrize("how", [{"pattern": "halton"}, {"pattern": "grid"}, {"source": "walk", "bounces": 3},
-                                 {"pattern": "all"}])
+                                 {"pattern": "all"}, {"pattern": "all", "projection": "cube"}])
 @pytest.mark.parametrize("count", [1, 3, 40])
 def test_there_are_no_more_lights_than_memory_is_planned_for(how, count):
     lamps = (BOX.lights[0], PointLight((0.278, 0.4, -0.2), (1.0, 1.0, 1.0)), BOX.lights[0])
     frame = Frame(BOX.with_lights(*lamps), **SMALL)
     settings = of(LightSettings, count=count, **how)
     most = most_lights(settings, 8, 32**2)
-    limit = 8 * 32**2 if "all" in how.values() else 8 + 3 * count
+    maps = 8 * 6 if "cube" in how.values() else 8
+    limit = maps * 32**2 if "all" in how.values() else maps + 3 * count
     assert choose_lights(frame, settings).flux.shape[1] <= most <= limit
 
 

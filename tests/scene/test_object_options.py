@@ -47,7 +47,7 @@ def of_wall(frame):
             for rsm in frame.rsms]
 
 
-@pytest.mark.feature("HSS-21")
+@pytest.mark.feature("HSS-01", "HSS-21")
 @pytest.mark.parametrize(("method", "how"), CHOICES, ids=str)
 def test_it_lights_others_as_black_does_and_is_seen_as_it_is(method, how):
     """Oracle: the irradiance with a black object, to the bit; the picture with the object's own reflectance."""

@@ -49,6 +49,7 @@ def is_off(got, expected, bound):
     return (distance(got, expected) > bound.limit) & ~bound.masked
 
 
+@pytest.mark.feature("VAL-09")
 @pytest.mark.parametrize("name", ALL)
 def test_the_last_stage_is_the_method(name):
     """Oracle: `val` on a frame of the same scene, in float64."""

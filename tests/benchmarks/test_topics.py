@@ -2,16 +2,22 @@
 
 import math
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks import eq2
+from benchmarks import eq2, peers
 from benchmarks.__main__ import COMMANDS, topics
 from benchmarks.harness import Row, ratio
 from refgi.pairs.lobe_sum import add_lobes
 from refgi.pairs.pair_sum import Clamp, sum_pairs
+from refgi.scene import load_scene
+from refgi.settings.text import from_text
+from refgi.splat.sii import SiiSettings
+from refgi.vectors.recorded import recorded_case
+from refgi.vectors.spec import expected_of
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "Makefile", *(ROOT / "docs").rglob("*.md")]
@@ -43,6 +49,17 @@ def test_a_yardstick_sums_what_the_strict_kernel_does():
     add_lobes(position, normal, lobes, clamp, None, None, None, strict)
     eq2.lobes_freely(eq2.power_in_lanes)(position, normal, lobes, free)
     np.testing.assert_allclose(free, strict, rtol=1e-4, atol=1e-5 * strict.max())
+
+
+def test_a_peer_does_the_same_work_or_is_refused():
+    case = recorded_case("peers", load_scene("cornell_box"), "sii", from_text(SiiSettings(), ["lights=16"]),
+                         only="pairs.sum", width=16, height=12)
+    known, (step,) = expected_of(case), case.stages
+    result = np.empty_like(known["pairs.sum"])
+    numba = partial(peers.sum_plainly, *(known[name] for name in step.reads), result.reshape(3, -1))
+    peers.expect_same({"plain Numba": numba}, step, known, result)
+    with pytest.raises(AssertionError, match="plain Numba: off by"):
+        peers.expect_same({"plain Numba": lambda: known["pairs.sum"] * 1.01}, step, known, result)
 
 
 def test_aims_are_met_or_not_and_ratios_are_of_pairs():

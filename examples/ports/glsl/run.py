@@ -25,20 +25,19 @@ VARIANTS = {  # what a port may do otherwise: macros of the shaders
 
 def irradiance(gpu: Gpu, arrays: Arrays, stage: dict) -> None:
     """Run pairs.comp, each receiver with the light of its number, or sum.comp, with all lights."""
-    one_each = kind_of(stage) == "pairs.pairs"
-    at, light = ("pairs.pairs", "pairs.pairs.light_") if one_each else ("rsm.surface", "lights.pixel_lights.")
-    flux = "pairs.pairs." if one_each else light
-    lights, receivers = arrays[f"{flux}flux"].shape[1], arrays[f"{at}.normal"][0].size
-    lobes, disc = f"{flux}lobe_flux" in stage["reads"], arrays.facts[stage["name"]]["clamp"] == "disc"
-    result = gpu.empty(3 * receivers)
-    ids = np.zeros(receivers, np.int32) if one_each else arrays["rsm.visible_triangles"]
-    buffers: dict[int, np.ndarray | moderngl.Buffer] = {2: ids, 11: result}
-    plain = {1: f"{at}.normal", 4: f"{light}normal", 5: f"{flux}flux"}
-    plain |= {6: f"{flux}lobe_flux", 7: f"{flux}lobe_axis", 8: f"{flux}lobe_exponent"} if lobes else {}
-    plain |= {10: "lights.footprints"} if disc else {}
-    buffers |= {binding: gpu.stored(arrays[name]) for binding, name in plain.items()}
-    buffers |= {binding: gpu.stored(arrays[name], place=True) for binding, name in
-                {0: f"{at}.position", 3: f"{light}position"}.items()}
+    one_each, reads = kind_of(stage) == "pairs.pairs", list(stage["reads"])
+    lobes, disc = any(name.endswith("lobe_flux") for name in reads), arrays.facts[stage["name"]]["clamp"] == "disc"
+    if not one_each:
+        covered = arrays[reads.pop(2)]  # ids of triangles, or whether there are any
+    places = {0: reads[0], 3: reads[2]}  # positions of receivers and lights
+    plain = {1: reads[1], **dict(zip((4, 5, *((6, 7, 8) if lobes else ()), *((10,) if disc else ())), reads[3:],
+                                     strict=True))}
+    buffers: dict[int, np.ndarray | moderngl.Buffer] = {at: gpu.stored(arrays[name]) for at, name in plain.items()}
+    buffers |= {at: gpu.stored(arrays[name], place=True) for at, name in places.items()}
+    lights, receivers = arrays[reads[4]].shape[1], arrays[reads[1]][0].size
+    buffers[2] = np.zeros(receivers, np.int32) if one_each else (
+        covered.astype(np.int32) - 1 if covered.dtype == bool else covered)
+    result = buffers[11] = gpu.empty(3 * receivers)
     if lobes:
         peaks = buffers[9] = gpu.empty(lights)
         gpu.run("lobe_norm.comp", (), {0: buffers[4], 1: buffers[7], 2: buffers[8], 3: peaks}, lights,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refgi.pairs.lightcuts.groups import bound_group, fill_errors
-from refgi.pairs.lightcuts.tree import BOUND_ROWS, FAN, SOFT, block_of, light_tree
+from refgi.pairs.lightcuts.tree import BOUND_ROWS, FAN, SOFT, block_of, compact_order, light_tree
 from refgi.pairs.pair_sum import ROWS, TILE
 from refgi.pairs.pixel_lights import pack
 from refgi.pairs.settings import PairSettings
@@ -100,3 +100,16 @@ def test_bounds_grow_with_the_group():
     for lane in range(RECEIVERS):
         for level, place, bound in bounds_at(tree, points, [lane]):
             assert bound <= of_all[level, place] * (1 + 1e-9)
+
+
+def test_lights_are_halved_across_their_widest_side():
+    rng = np.random.default_rng(0)
+    lights = np.zeros((9, 64), np.float32)
+    lights[:3], lights[5] = rng.uniform(0, 1, (3, 64)), 1
+    parts = [lights[:3, compact_order(lights, 64)]]
+    while parts[0].shape[1] > 2:
+        halves = [half for part in parts for half in np.split(part, 2, axis=1)]
+        for part, low, high in zip(parts, halves[::2], halves[1::2], strict=True):
+            widest = np.ptp(part, axis=1).argmax()
+            assert low[widest].max() <= high[widest].min()
+        parts = halves

@@ -122,15 +122,14 @@ def tiles(set_of: Array, first: int, last: int) -> tuple[Array, Array]:
 
 @kernel(parallel=True)
 def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: tuple[Array, Array],
-         sampling: tuple[int, int, int, Any, bool], rays: tuple[Array, Array, Array, Array, Array]) -> None:
+         sampling: tuple[int, int, int, int, Any, bool], rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Pick light vertices for each receiver of some tiles; write shadow rays and their contributions.
 
-    `starts` (sets, 2) int64: first block of each set and one past its last. `tiles`: receivers
-    sorted by set, and the table of tiles. `sampling`: first receiver of the span; picks of each; seed of the random
-    shift, a hash of it and the receiver's pixel; the tracer's grain: segments end above the sender's face by
-    `ray_offset` and `far_offset`, m; whether faces hide what lies behind them. `rays`: filled: origins, directions
-    (n, 3), reach (n,), contribution (n, 3) W/m^2, float32, and the point picked (n,) int32; n = picks x receivers. The
-    reach is 0 where there is nothing to gain.
+    `starts` (sets, 2) int64: first block of each set and one past its last. `tiles`: receivers sorted by set, and the
+    table of tiles. `sampling`: first receiver of the span; picks of each; seed and turn of the random shift; the
+    tracer's grain: segments end above the sender's face by `ray_offset` and `far_offset`, m; whether faces hide what
+    lies behind them. `rays`: filled: origins, directions (n, 3), reach (n,), contribution (n, 3) W/m^2, float32, and
+    the point picked (n,) int32; n = picks x receivers. The reach is 0 where there is nothing to gain.
     """
     members, table = tiles
     longest = (starts[:, 1] - starts[:, 0]).max() * BLOCK
@@ -149,18 +148,18 @@ def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: t
 
 @kernel
 def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array,
-              sampling: tuple[int, int, int, Any, bool], senders: tuple[int, Array],
+              sampling: tuple[int, int, int, int, Any, bool], senders: tuple[int, Array],
               rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Let receivers pick among senders, the first one's number and the running sums of their terms."""
     origins, directions, reach, contribution, picked = rays
-    first, picks, seed, grain, hide = sampling
+    first, picks, seed, turn, grain, hide = sampling
     first_point, sums = senders
     real, count, step = np.float32, len(sums) // TILE - 1, 1
     while 2 * step < count:
         step *= 2
     for i in range(len(members)):
         r, total = members[i], sums[count * TILE + i]
-        shift, share = random_shift(receivers.pixel[r], seed), total / real(picks)
+        shift, share = random_shift(receivers.pixel[r], seed, turn), total / real(picks)
         for s in range(picks):
             ray = (r - first) * picks + s
             k = _find(sums, count, step, i, (real(s) + shift) * share)
@@ -174,6 +173,10 @@ def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array,
 
 
 @kernel
-def random_shift(pixel: int, seed: int) -> Any:
-    """Return how far a receiver's picks are shifted in a pass: 0 to 1 of the way from one to the next."""
-    return np.float32(hash_bits(np.uint32(pixel) ^ np.uint32(seed)) >> np.uint32(8)) * np.float32(2.0**-24)
+def random_shift(pixel: int, seed: int, turn: int) -> Any:
+    """Return how far a receiver's picks are shifted in a pass: 0 to 1 of the way from one to the next.
+
+    A hash of seed and pixel, and from turn to turn a golden section on: any number of turns is spread evenly.
+    """
+    word = np.uint32(hash_bits(np.uint32(pixel) ^ np.uint32(seed)) + np.uint32(turn) * np.uint32(0x9E3779B9))
+    return np.float32(word >> np.uint32(8)) * np.float32(2.0**-24)

@@ -47,7 +47,7 @@ from refgi.truth.paths import (
     toward_light,
 )
 from refgi.truth.surfaces import around, face_cross, lift, lobe_above, lobe_pattern, shading_normal
-from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
+from refgi.truth.task import Draw, Task, add_unblocked, drawn, shadow_batch, spans
 from refgi.types import Array
 
 
@@ -235,34 +235,34 @@ def lobe_pass(task: Task, number: int) -> Array:
     """
     assert task.lobes is not None
     sums = np.zeros((3, len(task.receivers.pixel)))
-    words = np.random.SeedSequence([task.settings.seed, number, LOBES]).generate_state(4 + task.settings.bounces)
+    draw = drawn(task.settings, number, LOBES)
     if len(task.receivers.pixel):
         if task.picks:
-            add_light_side(task, words[:3], sums)
+            add_light_side(task, draw, sums)
         if task.cells is not None:
-            add_cells(task, int(words[2]), sums)
+            add_cells(task, int(draw.own[2]), sums)
         if task.directions:
-            _add_directions(task, words, sums)
+            _add_directions(task, draw, sums)
         if task.caustics is not None:
-            random = np.random.default_rng([*words[:2], 1])
+            random = np.random.default_rng([*draw.own[:2], 1])
             sums += lobe_photon_pass(task.caustics, task, random)
     return sums
 
 
-def _add_directions(task: Task, words: Array, sums: Array) -> None:
+def _add_directions(task: Task, draw: Draw, sums: Array) -> None:
     """Add what directions along the lobes find, by its share where light vertices have the rest."""
     assert task.lobes is not None
-    count = task.directions
-    points = scrambled_points(count, int(words[3]))
+    count, seed = task.directions, int(draw.shared[3])
+    points = scrambled_points(count, seed, draw.turn)
     for first, last in spans(task, count):
         paths, density = paths_for((last - first) * count), np.empty((last - first) * count)
-        send_along_lobes(task.receivers, task.lobes, (first, last), points, int(words[3]), task.grain_below, paths,
-                         density)
+        send_along_lobes(task.receivers, task.lobes, (first, last), points, seed, task.grain_below, paths, density)
         for bounce in range(task.settings.bounces):
             if bounce == 0:
                 _follow_lobes(task, paths, density, first, sums)
                 continue
-            scatter(task.lobes.surfaces, task.tracer.grain, int(words[3 + bounce]), task.receivers, first, count, paths)
+            scatter(task.lobes.surfaces, task.tracer.grain, int(draw.own[3 + bounce]), task.receivers, first, count,
+                    paths)
             follow(task, paths, first, count, 0.0, sums)
 
 

@@ -1,4 +1,4 @@
-"""One pass of the ground truth: an independent, unbiased estimate of every receiver's one-bounce irradiance.
+"""One pass of the ground truth: an unbiased estimate of every receiver's one-bounce irradiance.
 
 At a surface a path passes through (without visibility), or scatters by the surface's reflection.
 
@@ -27,7 +27,7 @@ from refgi.truth.light_pass import add_light_side, hidden_from_camera
 from refgi.truth.paths import Paths, diffuse_at, dot, hit_point, pass_through, paths_for, row
 from refgi.truth.result import blocks_of
 from refgi.truth.surfaces import Surfaces, around, face_normal, lift, shading_normal
-from refgi.truth.task import Group, Task, add_unblocked, shadow_batch, spans
+from refgi.truth.task import Draw, Group, Task, add_unblocked, drawn, shadow_batch, spans
 from refgi.types import Array
 
 
@@ -102,40 +102,42 @@ def one_pass(task: Task, number: int) -> Array:
     irradiance, W/m^2.
     """
     sums = np.zeros((3, len(task.receivers.pixel)))
-    words = np.random.SeedSequence([task.settings.seed, number]).generate_state(4 + task.settings.bounces)
+    draw = drawn(task.settings, number)
     if len(task.receivers.pixel):
         if task.settings.picks_per_pass:
-            add_light_side(task, words[:3], sums)
+            add_light_side(task, draw, sums)
         if task.cells is not None:
-            add_cells(task, int(words[2]), sums)
+            add_cells(task, int(draw.own[2]), sums)
         if task.settings.directions_per_pass:
-            _hemisphere(task, words, sums)
+            _hemisphere(task, draw, sums)
         if task.caustics is not None:
-            random = np.random.default_rng([*words[:2], 1])
+            random = np.random.default_rng([*draw.own[:2], 1])
             photons = photon_pass(task.caustics, task.tracer, task.lights, task.settings.photons, random)
             sums += photons[:, task.receivers.pixel]
     return sums
 
 
-def _hemisphere(task: Task, words: Array, sums: Array) -> None:
+def _hemisphere(task: Task, draw: Draw, sums: Array) -> None:
     """Add the hemisphere estimator, by its MIS weight where the light side has the rest."""
     if not task.groups:
-        add_directions(task, task.settings.directions_per_pass, words, sums)
+        add_directions(task, task.settings.directions_per_pass, draw, sums)
     for group in task.groups:
         found = np.zeros((3, len(group.chosen)))
-        add_directions(task._replace(receivers=group.receivers), group.directions, words, found)
+        add_directions(task._replace(receivers=group.receivers), group.directions, draw, found)
         sums[:, group.chosen] += found
 
 
-def add_directions(task: Task, count: int, words: Array, sums: Array) -> None:
-    """Add what so many directions of each receiver find; `words`: of a pass."""
-    points, reach = scrambled_points(count, int(words[3])), directions_reach(task)
+def add_directions(task: Task, count: int, draw: Draw, sums: Array) -> None:
+    """Add what so many directions of each receiver find."""
+    seed, reach = int(draw.shared[3]), directions_reach(task)
+    points = scrambled_points(count, seed, draw.turn)
     for first, last in spans(task, count):
         paths = paths_for((last - first) * count)
-        send(task.receivers, (first, last), points, int(words[3]), reach, task.grain_below, paths)
+        send(task.receivers, (first, last), points, seed, reach, task.grain_below, paths)
         for bounce in range(task.settings.bounces):
             if bounce:
-                scatter(task.surfaces, task.tracer.grain, int(words[3 + bounce]), task.receivers, first, count, paths)
+                scatter(task.surfaces, task.tracer.grain, int(draw.own[3 + bounce]), task.receivers, first, count,
+                        paths)
             beside = beside_of(task, first) if bounce == 0 and task.cells is not None else None
             follow(task, paths, first, count, task.settings.shared_bound if bounce == 0 else 0.0, sums, beside)
 
@@ -186,7 +188,7 @@ def directions_shared_out(task: Task) -> tuple[Group, ...]:
     sampled = task._replace(receivers=_some(task.receivers, np.arange(0, len(pixel), EVERY)))
     halves = np.zeros((2, 3, len(sampled.receivers.pixel)))
     for half, words in zip(halves, np.random.SeedSequence(0).generate_state(8).reshape(2, 4), strict=True):
-        add_directions(sampled, PILOT, words, half)
+        add_directions(sampled, PILOT, Draw(words, words, 0), half)
     block, grid = blocks_of(pixel, task.shape)
     sums = [_with_neighbours(np.bincount(block[::EVERY], weights, grid[0] * grid[1]).reshape(grid))
             for weights in (((halves[0] - halves[1]) ** 2).mean(axis=0), None)]

@@ -169,7 +169,7 @@ class TruthResult(NamedTuple):
     def confidence_factor(self, level: float = 0.95) -> float:
         """Return how many standard errors hold the expectation with a probability in (0, 1), by Student's t.
 
-        At 95 %: 12.7 from two passes, 2.36 from eight and from many.
+        At 95 %: 12.7 from two passes, 2.36 from eight.
         """
         from scipy.stats import t
 

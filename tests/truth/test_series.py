@@ -10,11 +10,13 @@ from refgi.truth import TruthSettings
 from refgi.truth.hemisphere import scrambled_points
 from refgi.truth.light_grid import stratified_sets
 from refgi.truth.light_side import random_shift
+from refgi.truth.lobe_cells import glossy_triangles
+from refgi.truth.lobe_pass import lobe_pass
 from refgi.truth.passes import one_pass
 from refgi.truth.result import SERIES
-from refgi.truth.settings import Estimator
 from refgi.truth.task import drawn
-from refgi.truth.truth import task_of
+from refgi.truth.truth import _guided, _with_lobes, without_pilot
+from tests.glossy import glossy_box
 
 CERTAIN = 1e-4
 # Of n turns around a circle, each a golden section on, the widest gap times n is at most 1 + 2 / sqrt(5) (three gaps).
@@ -84,20 +86,27 @@ def test_light_vertices_go_on_in_their_cells(evidence):
     assert expected < 0.5 * apart
 
 
-@pytest.mark.slow("light-0.9")
-@pytest.mark.parametrize(("estimator", "most"), [("combined", 0.75), ("hemisphere", 0.6), ("light", 0.9)])
-def test_sixteen_passes_of_a_series_are_better_than_independent_ones(estimator: Estimator, most, evidence):
+CASES = {"combined": ("cornell_box", {}, 0.75), "hemisphere": ("cornell_box", {"estimator": "hemisphere"}, 0.6),
+         "light": ("cornell_box", {"estimator": "light"}, 0.9),
+         "two bounces": ("cornell_box", {"estimator": "hemisphere", "bounces": 2}, 0.85),
+         "lobes": (glossy_box(exponent=20.0), {"picks": 8, "directions": 8}, 0.85)}
+
+
+@pytest.mark.slow("light", "lobes")
+@pytest.mark.parametrize("case", list(CASES))
+def test_sixteen_passes_of_a_series_are_better_than_independent_ones(case, evidence):
     """Variance of a pixel's mean over a series against that of as many independent passes, from 12 seeds."""
-    frame = Frame(load_scene("cornell_box"), width=32, height=32)
-    buffer, means, ones = frame.gbuffer, [], []
-    for seed in range(12):
-        task = task_of(frame.scene, frame.tracer, buffer.position, buffer.normal, buffer.triangle_id,
-                       TruthSettings(estimator=estimator, seed=seed))
-        found = np.array([one_pass(task, SERIES * turn) for turn in range(16)])
-        means.append(found.mean(axis=0))
-        ones.append(found)
-    together = np.var(means, axis=0, ddof=1)
-    apart = np.var(ones, axis=0, ddof=1).mean(axis=0) / 16
-    usual = np.median(together / np.maximum(apart, 1e-30))  # alone, either side has rare large terms
-    evidence(f"{estimator}: a series of 16 passes has {usual:.2f} of the variance of independent passes (median pixel)")
+    given, options, most = CASES[case]
+    frame = Frame(load_scene(given) if isinstance(given, str) else given, width=32, height=32)
+    buffer = frame.gbuffer
+    ids = buffer.triangle_id
+    if case == "lobes":
+        ids = glossy_triangles(frame.scene, buffer.position, buffer.normal, ids)
+    prepare, once = (_with_lobes, lobe_pass) if case == "lobes" else (without_pilot, one_pass)
+    tasks = [_guided(prepare(frame.scene, frame.tracer, buffer.position, buffer.normal, ids,
+                             TruthSettings(seed=seed, **options))) for seed in range(12)]
+    found = np.array([[once(task, SERIES * turn) for turn in range(16)] for task in tasks])
+    together, apart = found.mean(axis=1).var(axis=0, ddof=1), found.var(axis=0, ddof=1).mean(axis=0) / 16
+    usual = np.median((together / np.maximum(apart, 1e-30))[apart > 0])  # either side alone has rare large terms
+    evidence(f"{case}: a series of 16 passes has {usual:.2f} of the variance of independent passes (median pixel)")
     assert usual < most

@@ -39,10 +39,7 @@ from refgi.types import Array
 
 @kernel
 def scrambled_points(count: int, seed: int, turn: int) -> Array:
-    """Return scrambled low-discrepancy points of the square as 32-bit words; from turn to turn the sequence goes on.
-
-    Returns (count, 2) uint32: coordinates times 2^32.
-    """
+    """Return scrambled low-discrepancy points (count, 2) of the square as 32-bit words; turn by turn it goes on."""
     points = np.empty((count, 2), np.uint32)
     for i in range(count):
         for axis in range(2):

@@ -274,10 +274,7 @@ def stratified_sets(n: int, side: int, random: np.random.Generator, turn: int = 
 
 
 def cell_centres(n: int) -> Array:
-    """Return the centres of n x n cells of the unit square, along a Hilbert curve.
-
-    `n`: cells along one side. Returns (n * n, 2): points.
-    """
+    """Return the centres (n * n, 2) of n x n cells of the unit square, along a Hilbert curve."""
     return np.asarray((_cells(n) + 0.5) / n)
 
 

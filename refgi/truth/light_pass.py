@@ -125,10 +125,7 @@ def fresh_points(task: Task, random: np.random.Generator, turn: int = 0) -> Poin
 
 
 def trace_vertices(task: Task, squares: list[Array], densities: tuple[Any, ...]) -> PointSets:
-    """Trace rays from every light, through points of its unit square, to light vertices.
-
-    `squares`: points of each light, in sets.
-    """
+    """Trace rays from every light, through points of its unit square in sets, to light vertices."""
     settings, sets, per_set = task.settings, len(squares[0]) if squares else 1, squares[0].shape[1] if squares else 1
     parts = []
     for k, (light, square, density) in enumerate(zip(task.scene.lights, squares, densities, strict=True)):
@@ -159,10 +156,7 @@ def pick_points(task: Task, sets: PointSets, span: tuple[int, int], picks: int, 
 
 
 def pilot(task: Task) -> tuple[Density | None, ...]:
-    """Estimate the density of each light's rays, in proportion to contributions.
-
-    Result: one a light; empty for a uniform density.
-    """
+    """Estimate the density of each light's rays, in proportion to contributions; empty for a uniform one."""
     lights, share = len(task.scene.lights), task.settings.uniform_share
     if share == 1 or not task.picks or not lights or not len(task.receivers.pixel):
         return ()

@@ -6,9 +6,10 @@ What the bound leaves to directions lies near lit surfaces: in corners nearly al
 A pilot sends two directions from every second receiver, twice; the difference tells the standard deviation s of each
 block of 8 x 8 pixels, averaged with its neighbours'. A block then gets n = N s / rms(s) directions, as a power of two:
 least error for so many rays. The pilot does not depend on the seed and leaves no receiver without directions: passes
-stay independent and unbiased whatever it found.
+stay unbiased whatever it found.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,14 +18,14 @@ from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import inverse_fraction, lobe_direction
 from refgi.rays import MISS
-from refgi.sampling import hash_bits
+from refgi.sampling import hash_bits, uniform
 from refgi.truth.caustics import photon_pass
 from refgi.truth.cell_densities import Beside
 from refgi.truth.cell_pass import add_cells, beside_of
 from refgi.truth.hemisphere import cosine_direction, gather, scrambled_points, send
 from refgi.truth.light_grid import footprint
 from refgi.truth.light_pass import add_light_side, hidden_from_camera
-from refgi.truth.paths import Paths, diffuse_at, dot, hit_point, pass_through, paths_for, row
+from refgi.truth.paths import Paths, Shadows, diffuse_at, dot, hit_point, pass_through, paths_for, row
 from refgi.truth.result import blocks_of
 from refgi.truth.surfaces import Surfaces, around, face_normal, lift, shading_normal
 from refgi.truth.task import Draw, Group, Task, add_unblocked, drawn, shadow_batch, spans
@@ -63,14 +64,14 @@ def _scatter(surfaces: Surfaces, grain: float, word: Any, paths: Paths, ray: int
     most, most_glossy = max(rho[0], rho[1], rho[2]), max(glossy[0], glossy[1], glossy[2])
     if most + most_glossy <= 0:
         return
-    u, v = _uniform(word ^ np.uint32(0x68E31DA4)), _uniform(word ^ np.uint32(0xB5297A4D))
+    u, v = uniform(word ^ np.uint32(0x68E31DA4)), uniform(word ^ np.uint32(0xB5297A4D))
     chance = most / (most + most_glossy)
     g = face_normal(surfaces, triangle, -back[0], -back[1], -back[2])
     n = shading_normal(surfaces, triangle, y, g)
     cos_g, cos_n = dot(g, back), dot(n, back)
     if cos_g <= 0 or cos_n <= 0:
         return
-    if _uniform(word ^ np.uint32(0x1B56C4E9)) < chance:
+    if uniform(word ^ np.uint32(0x1B56C4E9)) < chance:
         x0, x1, x2 = cosine_direction(u, v)
         w = around(g, x0, x1, x2)
         part, factor = rho, cos_n / (cos_g * chance)
@@ -88,11 +89,6 @@ def _scatter(surfaces: Surfaces, grain: float, word: Any, paths: Paths, ray: int
         paths.origin[ray, c] = y[c] + offset * g[c]
         paths.direction[ray, c] = w[c]
         paths.weight[ray, c] *= part[c] * factor
-
-
-@kernel
-def _uniform(word: Any) -> Any:
-    return (hash_bits(word) + 0.5) * 2.0**-32
 
 
 def one_pass(task: Task, number: int) -> Array:
@@ -143,16 +139,22 @@ def add_directions(task: Task, count: int, draw: Draw, sums: Array) -> None:
 
 
 def follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums: Array,
-           beside: Beside | None = None) -> None:
-    """Trace paths to the next surface, next-event estimation there; to every surface along them without visibility."""
+           beside: Beside | None = None, gathered: Callable[[int, float, Shadows], None] | None = None) -> None:
+    """Trace paths to the next surface, next-event estimation there; to every surface along them without visibility.
+
+    `gathered`: fills shadow rays to a light of some measure, in place of `gather`.
+    """
     while True:
         task.tracer.fill_closest(paths.origin, paths.direction, paths.reach, paths.triangle_id, paths.distance)
         hidden = hidden_from_camera(task, paths)
         for k, light in enumerate(task.scene.lights):
             measure, _ = footprint(light, task.scene.geometry, task.settings.light_grid)
             shadows = shadow_batch(len(paths.reach))
-            gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.grain), task.sides, paths, shadows,
-                   beside)
+            if gathered is not None:
+                gathered(k, measure, shadows)
+            else:
+                gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.grain), task.sides, paths, shadows,
+                       beside)
             if hidden is not None:
                 shadows.reach[hidden] = 0
             add_unblocked(task, shadows, first, count, sums, True)

@@ -97,20 +97,12 @@ def drawn(settings: TruthSettings, number: int, *kind: int) -> Draw:
 
 
 def sets_of(pixel: Array, width: int, side: int) -> Array:
-    """Return which of side^2 sets of light vertices each pixel picks from, interleaved.
-
-    `pixel` (r,): flat index into the picture. `width`: of the picture, pixels. `side`: pixels along one side of the
-    pattern. Returns (r,): numbers of sets.
-    """
+    """Return which of side^2 interleaved sets of light vertices each pixel (r,), a flat index, picks from."""
     return np.asarray(pixel // width % side * side + pixel % width % side)
 
 
 def spans(task: Task, per_receiver: int) -> list[tuple[int, int]]:
-    """Cut the receivers into spans of at most a batch of rays.
-
-    `task`: names receivers and batch. `per_receiver`: rays of each receiver. Result: first receiver of each span and
-    one past its last.
-    """
+    """Cut the receivers into spans of at most a batch of rays: first receiver of each, and one past its last."""
     step, total = max(1, task.settings.batch // per_receiver), len(task.receivers.pixel)
     return [(first, min(first + step, total)) for first in range(0, total, step)]
 

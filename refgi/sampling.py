@@ -96,6 +96,12 @@ def hash_bits(value: Any) -> Any:
 
 
 @kernel
+def uniform(word: Any) -> Any:
+    """Return a hash of 32 bits as a number in (0, 1), float64."""
+    return (hash_bits(word) + 0.5) * 2.0**-32
+
+
+@kernel
 def reverse_bits(value: Any) -> Any:
     """Return a 32-bit integer (taken modulo 2^32) with its bits in reverse order."""
     x = np.uint32(value)

@@ -20,6 +20,7 @@ from refgi.errors import InputError
 from refgi.image import read_exr, tone_map, write_exr, write_png, write_text
 from refgi.jit.cache import KernelCache
 from refgi.truth.checkpoint import Checkpoint
+from refgi.truth.result import SERIES
 from refgi.types import Array
 
 COMPUTATION, VALUES = b"c" * 32, 6
@@ -61,8 +62,9 @@ def changed_checkpoint(rng: np.random.Generator) -> Case:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "passes.truth"
         content = bytearray(_saved(rng, path))
-        moments = len(content) - 8 * (7 * VALUES + 1)  # means, squares, values left out, unit of tails
-        bit = int(rng.integers(0, 52)) + 64 * int(rng.integers(0, 6 * VALUES))  # of a mantissa: numbers stay finite
+        numbers = 3 * VALUES * (1 + SERIES)  # means and sums; behind them counts and the unit of tails
+        moments = len(content) - 8 * numbers - 4 * SERIES * VALUES - 8
+        bit = int(rng.integers(0, 52)) + 64 * int(rng.integers(0, numbers))  # of a mantissa: numbers stay finite
         content[moments + bit // 8] ^= 1 << bit % 8
         path.write_bytes(content)
         return _taken(lambda: Checkpoint(path, COMPUTATION, VALUES), f"checkpoint with bit {bit} changed")
@@ -72,7 +74,7 @@ def _saved(rng: np.random.Generator, path: Path) -> bytes:
     checkpoint = Checkpoint(path, COMPUTATION, VALUES)
     moments = checkpoint.moments
     moments.passes[...] += int(rng.integers(1, 100))
-    moments.mean[:], moments.squares[:] = rng.random((2, 3, VALUES))
+    moments.mean[:], moments.sums[:] = rng.random((3, VALUES)), rng.random((SERIES, 3, VALUES))
     checkpoint.save()
     return path.read_bytes()
 
@@ -153,7 +155,7 @@ PROMISES = (
     Promise("exr-changed", "a changed picture is refused", "EXR", "one bit of a pixel, or an attribute, the rest kept",
             changed_picture, "taken", 0.0, "exact", "SHA-256 of pixels and attributes", 2000, 12, adds=True),
     Promise("checkpoint-changed", "a changed checkpoint is refused", "checkpoint",
-            "one bit of a mean or a sum of squares, which stays finite", changed_checkpoint, "taken", 0.0, "exact",
+            "one bit of a mean or a sum, which stays finite", changed_checkpoint, "taken", 0.0, "exact",
             "SHA-256 of its content", 2000, 12, adds=True),
     Promise("png-magenta", "what is no number shows", "PNG", "NaN and either infinity in any channel", magenta,
             "pixels", 0.0, "exact", "magenta stands for it", 5000, 30, adds=True),

@@ -17,7 +17,7 @@ from refgi.radiometry import inverse_fraction, lobe_direction, radiant_intensity
 from refgi.rays import MISS, Tracer, ray_offset
 from refgi.rsm.buffers.solid_angle import texel_solid_angles
 from refgi.rsm.raster.projection import camera_projection, project
-from refgi.sampling import hash_bits
+from refgi.sampling import uniform
 from refgi.scene import DirectionalLight, LightTable, Scene, material_table
 from refgi.truth.light_grid import light_rays
 from refgi.truth.paths import CHUNK
@@ -211,7 +211,7 @@ def _through_glass(n: tuple[float, float, float], d: tuple[float, float, float],
     cos_out = math.sqrt(max(0.0, 1 - sin2))
     along = (ratio * cos_in - cos_out) / (ratio * cos_in + cos_out)  # perpendicular polarisation
     across = (cos_in - ratio * cos_out) / (cos_in + ratio * cos_out)
-    if sin2 >= 1 or (hash_bits(word) + 0.5) * 2.0**-32 < (along * along + across * across) / 2:
+    if sin2 >= 1 or uniform(word) < (along * along + across * across) / 2:
         return d[0] + 2 * cos_in * n[0], d[1] + 2 * cos_in * n[1], d[2] + 2 * cos_in * n[2]
     bend = ratio * cos_in - cos_out
     return ratio * d[0] + bend * n[0], ratio * d[1] + bend * n[1], ratio * d[2] + bend * n[2]
@@ -221,7 +221,7 @@ def _through_glass(n: tuple[float, float, float], d: tuple[float, float, float],
 def _off_lobe(n: tuple[float, float, float], g: tuple[float, float, float], d: tuple[float, float, float],
               exponent: float, word: Any) -> tuple[tuple[float, float, float], float]:
     """Return a direction of a lobe and 1 / K, or 0 where it points below the surface."""
-    u, v = (hash_bits(word) + 0.5) * 2.0**-32, (hash_bits(word ^ np.uint32(0xB5297A4D)) + 0.5) * 2.0**-32
+    u, v = uniform(word), uniform(word ^ np.uint32(0xB5297A4D))
     cos_in = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
     mirror = (d[0] + 2 * cos_in * n[0], d[1] + 2 * cos_in * n[1], d[2] + 2 * cos_in * n[2])
     x, y, z = lobe_direction(u, v, exponent)

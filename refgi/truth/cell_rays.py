@@ -11,7 +11,7 @@ import numpy as np
 from refgi.jit import kernel, prange
 from refgi.radiometry import lobe_direction
 from refgi.rays import ray_offset
-from refgi.sampling import hash_bits
+from refgi.sampling import hash_bits, uniform
 from refgi.truth.cell_densities import EVEN, Beside, Counts, even_density, image_of, point_of, receiver_at, takes
 from refgi.truth.cell_walk import (
     CHUNK,
@@ -84,7 +84,7 @@ def _pick_chunk(beside: Beside, first: int, part: tuple[int, int], seed: int, gr
 def _pick_rays(beside: Beside, to: Receiver, word: Any, grain: float, sums: Array, path: Path, start: int,
                picks: Picks) -> None:
     cells, count, total = beside.cells, beside.counts.cells, sums[len(sums) - 1]
-    lights, shift = len(cells.squares.kind), _uniform(word ^ np.uint32(0x1B56C4E9))
+    lights, shift = len(cells.squares.kind), uniform(word ^ np.uint32(0x1B56C4E9))
     top, level = -1, 0
     for s in range(count):
         place, (u, v) = (s + shift) / count, _place(word, s)
@@ -106,7 +106,7 @@ def _pick_rays(beside: Beside, to: Receiver, word: Any, grain: float, sums: Arra
 def _pick_images(beside: Beside, to: Receiver, r: int, word: Any, sums: Array, path: Path, start: int,
                  picks: Picks) -> None:
     tree, count, total = beside.cells.tree, beside.counts.mirrors, sums[len(sums) - 1]
-    shift, top, level = _uniform(word ^ np.uint32(0x7FEB352D)), -1, 0
+    shift, top, level = uniform(word ^ np.uint32(0x7FEB352D)), -1, 0
     for s in range(count):
         picks.paths.reach[start + s] = 0
         if total > 0:
@@ -173,9 +173,4 @@ def _send_to_image(beside: Beside, mirror: Any, r: int, place: tuple[float, floa
 @kernel
 def _place(word: Any, pick: int) -> tuple[float, float]:
     word = hash_bits(word + np.uint32(pick))
-    return _uniform(word ^ np.uint32(0x68E31DA4)), _uniform(word ^ np.uint32(0xB5297A4D))
-
-
-@kernel
-def _uniform(word: Any) -> Any:
-    return (hash_bits(word) + 0.5) * 2.0**-32
+    return uniform(word ^ np.uint32(0x68E31DA4)), uniform(word ^ np.uint32(0xB5297A4D))

@@ -1,8 +1,8 @@
 """Checkpoints: all passes so far in one file, which a later run of the same computation continues.
 
 The file holds a first line, SHA-256 digests of the computation and of the content, and the content: number of passes
-(int64), means and sums of squares (float64), values left out (int64), the unit of the tails (float64) and their counts
-(int32), little-endian. Its length follows from the
+(int64), means and sums of each series (float64), how many values those are of (int32), the unit of the tails (float64)
+and their counts (int32), little-endian. Its length follows from the
 computation, so nothing of a file that is damaged, or another's, is ever read.
 """
 
@@ -18,10 +18,10 @@ import numpy as np
 
 from refgi.errors import InputError, RefgiWarning, expect
 from refgi.image import temporary_name
-from refgi.truth.result import Moments, no_passes
+from refgi.truth.result import SERIES, Moments, no_passes
 
-FIRST_LINE = b"refgi truth checkpoint 4\n"
-KINDS = ("<i8", "<f8", "<f8", "<i8", "<f8", "<i4")  # of the fields of `Moments`
+FIRST_LINE = b"refgi truth checkpoint 5\n"
+KINDS = ("<i8", "<f8", "<f8", "<i4", "<f8", "<i4")  # of the fields of `Moments`
 DIGEST = 32  # bytes of SHA-256
 SECONDS_BETWEEN = 10.0  # saves are at least that far apart
 
@@ -90,8 +90,9 @@ def _load(path: Path, computation: bytes, empty: Moments) -> Moments:
         parts.append(np.frombuffer(content, kind, field.size, start).astype(field.dtype).reshape(field.shape))
         start += field.nbytes
     found = Moments(*parts)
-    finite = all(np.isfinite(one).all() for one in (found.mean, found.squares, found.scale))
-    counted = (found.squares >= 0).all() and (found.lost >= 0).all() and (found.lost <= found.passes).all()
+    finite = all(np.isfinite(one).all() for one in (found.mean, found.sums, found.scale))
+    most = (found.passes + np.arange(SERIES)[::-1, None]) // SERIES  # passes of each series
+    counted = (found.counts >= 0).all() and (found.counts <= most).all()
     sound = found.passes >= 0 and finite and counted and found.scale >= 0 and (found.tails >= 0).all()
     expect(bool(sound), f"checkpoint {path}", "finite moments", "others")
     return found

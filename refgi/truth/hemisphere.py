@@ -4,8 +4,8 @@ A direction of density cos/pi that finds radiance L contributes pi L. Both estim
 importance sampling (MIS) at a bounded geometry term G: the light side has min(G, b), weight min(1, b / G); here the
 rest remains, weight max(0, (G - b) / G) of diffuse radiance (Kollig & Keller 2004). Without bound the weight is 1.
 Lobes are weighted by how densely both estimators sample a point instead (`refgi.truth.cell_densities`).
-Directions are points of a low-discrepancy set that is scrambled anew in every pass and shifted by a random word per
-pixel.
+Directions are points of a low-discrepancy sequence, scrambled anew for every series of passes and shifted by a random
+word per pixel.
 """
 
 import math
@@ -38,15 +38,12 @@ from refgi.types import Array
 
 
 @kernel
-def scrambled_points(count: int, seed: int) -> Array:
-    """Return scrambled low-discrepancy points of the square as 32-bit words.
-
-    Returns (count, 2) uint32: coordinates times 2^32.
-    """
+def scrambled_points(count: int, seed: int, turn: int) -> Array:
+    """Return scrambled low-discrepancy points (count, 2) of the square as 32-bit words; turn by turn it goes on."""
     points = np.empty((count, 2), np.uint32)
     for i in range(count):
         for axis in range(2):
-            points[i, axis] = np.uint32(sobol_owen(np.uint32(i), axis, np.uint32(seed)) * 2.0**32)
+            points[i, axis] = np.uint32(sobol_owen(np.uint32(turn * count + i), axis, np.uint32(seed)) * 2.0**32)
     return points
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.radiometry import DIRECTIONAL, POINT, SPOT
-from refgi.sampling import ONE_ULP_BELOW_1, hilbert_order
+from refgi.sampling import FIRST_STEP, ONE_ULP_BELOW_1, SECOND_STEP, hilbert_order
 from refgi.scene import DirectionalLight, Geometry, Light, PointLight, SpotLight
 from refgi.types import Array
 
@@ -258,24 +258,23 @@ class LightRays(NamedTuple):
     weight: Array  # (s,) what a ray stands for, in units of `measure`: 1 over the density at its place
 
 
-def stratified_sets(n: int, side: int, random: np.random.Generator) -> Array:
+def stratified_sets(n: int, side: int, random: np.random.Generator, turn: int = 0) -> Array:
     """Place side^2 sets of n x n points in the unit square: each set jittered, all of them together jittered finer.
 
     `n`: cells along one side of the grid of a set. `side`: parts along one side of a cell: the side^2 sets share out
-    its parts at random, one each. `random`: shares out the parts and places the points in them. Returns (side^2, n * n,
-    2): each set along a Hilbert curve over the grid. Every point is uniform in its cell.
+    its parts at random, one each. `random`: shares out the parts and places the points in them. `turn`: steps of low
+    discrepancy that all points then go on in their cells, around the edges. Returns (side^2, n * n, 2): each set along
+    a Hilbert curve over the grid. Every point is uniform in its cell.
     """
     count = side * side
     part = random.permuted(np.broadcast_to(np.arange(count), (n * n, count)), axis=1).T
     within = np.stack([part % side, part // side], axis=-1) + random.random((count, n * n, 2))
-    return np.asarray(np.minimum((_cells(n) + within / side) / n, ONE_ULP_BELOW_1))
+    place = (within / side + turn * np.array([FIRST_STEP, SECOND_STEP])) % 1
+    return np.asarray(np.minimum((_cells(n) + place) / n, ONE_ULP_BELOW_1))
 
 
 def cell_centres(n: int) -> Array:
-    """Return the centres of n x n cells of the unit square, along a Hilbert curve.
-
-    `n`: cells along one side. Returns (n * n, 2): points.
-    """
+    """Return the centres (n * n, 2) of n x n cells of the unit square, along a Hilbert curve."""
     return np.asarray((_cells(n) + 0.5) / n)
 
 

@@ -25,7 +25,7 @@ from refgi.truth.lobe_cells import subset_of
 from refgi.truth.lobe_light_side import pick_for_lobes
 from refgi.truth.paths import CHUNK, Paths, Shadows, dot, hit_point
 from refgi.truth.surfaces import Surfaces, face_normal, lift
-from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
+from refgi.truth.task import Draw, Task, add_unblocked, shadow_batch, spans
 from refgi.types import Array
 
 
@@ -106,33 +106,26 @@ CELLS = 64  # along one side of a light's grid
 RECEIVERS, PICKS = 2048, 1 << 15  # sampled receivers, at most; picks of all of them together, at least
 
 
-def add_light_side(task: Task, words: Array, sums: Array) -> None:
-    """Add the irradiance from picked light vertices.
-
-    `words` (3,) uint32: the pass's random numbers: two for the light vertices, one for the picks. `sums` (3, r)
-    float64: added to, W/m^2.
-    """
-    sets, picks = fresh_points(task, np.random.default_rng(words[:2])), task.picks
+def add_light_side(task: Task, draw: Draw, sums: Array) -> None:
+    """Add the irradiance from picked light vertices; `sums` (3, r) float64: added to, W/m^2."""
+    sets, picks = fresh_points(task, np.random.default_rng(draw.shared[:2]), draw.turn), task.picks
     if not len(sets.points.power):
         return
     for first, last in spans(task, picks):
-        rays, _ = pick_points(task, sets, (first, last), picks, int(words[2]))
+        rays, _ = pick_points(task, sets, (first, last), picks, int(draw.shared[2]), draw.turn)
         add_unblocked(task, rays, first, picks, sums, task.settings.visibility)
 
 
-def fresh_points(task: Task, random: np.random.Generator) -> PointSets:
-    """Trace fresh rays from every light to light vertices; `random`: places the rays in their cells."""
+def fresh_points(task: Task, random: np.random.Generator, turn: int = 0) -> PointSets:
+    """Trace fresh rays from every light to light vertices; `random`, `turn`: place the rays in their cells."""
     n, side = task.settings.light_grid, task.settings.interleave
     count = len(task.scene.lights)
-    squares = [stratified_sets(n, side, random) for _ in range(count)]
+    squares = [stratified_sets(n, side, random, turn) for _ in range(count)]
     return trace_vertices(task, squares, task.densities or (None,) * count)
 
 
 def trace_vertices(task: Task, squares: list[Array], densities: tuple[Any, ...]) -> PointSets:
-    """Trace rays from every light, through points of its unit square, to light vertices.
-
-    `squares`: points of each light, in sets.
-    """
+    """Trace rays from every light, through points of its unit square in sets, to light vertices."""
     settings, sets, per_set = task.settings, len(squares[0]) if squares else 1, squares[0].shape[1] if squares else 1
     parts = []
     for k, (light, square, density) in enumerate(zip(task.scene.lights, squares, densities, strict=True)):
@@ -144,15 +137,16 @@ def trace_vertices(task: Task, squares: list[Array], densities: tuple[Any, ...])
     return join(parts, sets, per_set)
 
 
-def pick_points(task: Task, sets: PointSets, span: tuple[int, int], picks: int, seed: int) -> tuple[Shadows, Array]:
+def pick_points(task: Task, sets: PointSets, span: tuple[int, int], picks: int, seed: int,
+                turn: int = 0) -> tuple[Shadows, Array]:
     """Pick light vertices for the receivers of a span.
 
-    `span`: first receiver and one past the last. `picks`: picks of each receiver. `seed`: random shift of each
+    `span`: first receiver and one past the last. `picks`: picks of each receiver. `seed`, `turn`: random shift of each
     receiver's picks. Result: shadow rays, not traced, and which point each goes to.
     """
     rays, picked = shadow_batch((span[1] - span[0]) * picks), plane(((span[1] - span[0]) * picks,), np.int32)
     written = (rays.origin, rays.direction, rays.reach, rays.contribution, picked)
-    sampling = (span[0], picks, seed, np.float32(task.tracer.grain), task.sides.hide)
+    sampling = (span[0], picks, seed, turn, np.float32(task.tracer.grain), task.sides.hide)
     if task.lobes is None:
         pick(*sets, task.receivers, tiles(task.set_of, *span), sampling, written)
     else:
@@ -162,10 +156,7 @@ def pick_points(task: Task, sets: PointSets, span: tuple[int, int], picks: int, 
 
 
 def pilot(task: Task) -> tuple[Density | None, ...]:
-    """Estimate the density of each light's rays, in proportion to contributions.
-
-    Result: one a light; empty for a uniform density.
-    """
+    """Estimate the density of each light's rays, in proportion to contributions; empty for a uniform one."""
     lights, share = len(task.scene.lights), task.settings.uniform_share
     if share == 1 or not task.picks or not lights or not len(task.receivers.pixel):
         return ()

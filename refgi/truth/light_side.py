@@ -72,17 +72,23 @@ def _fill_sums(points: LightVertices, tile: Array, first: int, sums: Array) -> N
 
 
 @kernel
-def _find(sums: Array, count: int, step: int, i: int, target: Any) -> int:
-    """Return the first of `count` senders at which the running sum of receiver i exceeds a target, else the last.
+def _find(sums: Array, shift: Array, share: Array, picks: int, found: Array) -> None:
+    """Find for pick s of each lane the first sender at which the running sum exceeds (s + shift) share, else the last.
 
-    `step`: the largest power of two below `count`. Free of branches, so that one pick need not wait for another.
+    `shift`, `share` (TILE,): of each lane. `found`: filled, a row of lanes for each pick. By bisection, all lanes
+    together and free of branches.
     """
-    j = 0
-    while step > 0:
-        k = min(j + step, count - 1)
-        j += (k - j) * int(sums[k * TILE + i] <= target)
-        step >>= 1
-    return j
+    last = np.int32(len(sums) // TILE - 2)
+    for s in range(picks):
+        row, step = found[s * TILE : (s + 1) * TILE], np.int32(1)
+        row[:] = 0
+        while 2 * step <= last:
+            step = np.int32(2 * step)
+        while step > 0:
+            for i in range(TILE):
+                k = np.int32(min(np.int32(row[i] + step), last))
+                row[i] = k if sums[np.int64(k) * TILE + i] <= (np.float32(s) + shift[i]) * share[i] else row[i]
+            step = np.int32(step >> 1)
 
 
 @kernel
@@ -122,19 +128,19 @@ def tiles(set_of: Array, first: int, last: int) -> tuple[Array, Array]:
 
 @kernel(parallel=True)
 def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: tuple[Array, Array],
-         sampling: tuple[int, int, int, Any, bool], rays: tuple[Array, Array, Array, Array, Array]) -> None:
+         sampling: tuple[int, int, int, int, Any, bool], rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Pick light vertices for each receiver of some tiles; write shadow rays and their contributions.
 
-    `starts` (sets, 2) int64: first block of each set and one past its last. `tiles`: receivers
-    sorted by set, and the table of tiles. `sampling`: first receiver of the span; picks of each; seed of the random
-    shift, a hash of it and the receiver's pixel; the tracer's grain: segments end above the sender's face by
-    `ray_offset` and `far_offset`, m; whether faces hide what lies behind them. `rays`: filled: origins, directions
-    (n, 3), reach (n,), contribution (n, 3) W/m^2, float32, and the point picked (n,) int32; n = picks x receivers. The
-    reach is 0 where there is nothing to gain.
+    `starts` (sets, 2) int64: first block of each set and one past its last. `tiles`: receivers sorted by set, and the
+    table of tiles. `sampling`: first receiver of the span; picks of each; seed and turn of the random shift; the
+    tracer's grain: segments end above the sender's face by `ray_offset` and `far_offset`, m; whether faces hide what
+    lies behind them. `rays`: filled: origins, directions (n, 3), reach (n,), contribution (n, 3) W/m^2, float32, and
+    the point picked (n,) int32; n = picks x receivers. The reach is 0 where there is nothing to gain.
     """
     members, table = tiles
     longest = (starts[:, 1] - starts[:, 0]).max() * BLOCK
     tile, sums = np.empty(6 * TILE, np.float32), np.empty((longest + 1) * TILE, np.float32)
+    found = np.empty(sampling[1] * TILE, np.int32)
     for number in prange(len(table)):
         low, high, chosen = table[number, 0], table[number, 1], table[number, 2]
         tile[:] = 0  # lanes beyond the last receiver receive nothing
@@ -144,36 +150,40 @@ def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: t
                 tile[(3 + c) * TILE + i] = receivers.normal[c, members[low + i]]
         first, count = starts[chosen, 0] * BLOCK, (starts[chosen, 1] - starts[chosen, 0]) * BLOCK
         _fill_sums(points, tile, first, sums[: (count + 1) * TILE])
-        _pick_all(points, receivers, members[low:high], sampling, (first, sums[: (count + 1) * TILE]), rays)
+        _pick_all(points, receivers, members[low:high], sampling, (first, sums[: (count + 1) * TILE], found), rays)
 
 
 @kernel
 def _pick_all(points: LightVertices, receivers: RayReceivers, members: Array,
-              sampling: tuple[int, int, int, Any, bool], senders: tuple[int, Array],
+              sampling: tuple[int, int, int, int, Any, bool], senders: tuple[int, Array, Array],
               rays: tuple[Array, Array, Array, Array, Array]) -> None:
-    """Let receivers pick among senders, the first one's number and the running sums of their terms."""
+    """Let receivers pick among senders: their first number, running sums of their terms, space for what is found."""
     origins, directions, reach, contribution, picked = rays
-    first, picks, seed, grain, hide = sampling
-    first_point, sums = senders
-    real, count, step = np.float32, len(sums) // TILE - 1, 1
-    while 2 * step < count:
-        step *= 2
+    first, picks, seed, turn, grain, hide = sampling
+    first_point, sums, found = senders
+    shift, share, real = np.zeros(TILE, np.float32), np.zeros(TILE, np.float32), np.float32
     for i in range(len(members)):
-        r, total = members[i], sums[count * TILE + i]
-        shift, share = random_shift(receivers.pixel[r], seed), total / real(picks)
+        shift[i] = random_shift(receivers.pixel[members[i]], seed, turn)
+        share[i] = sums[len(sums) - TILE + i] / real(picks)
+    _find(sums, shift, share, picks, found)
+    for i in range(len(members)):
+        r = members[i]
         for s in range(picks):
-            ray = (r - first) * picks + s
-            k = _find(sums, count, step, i, (real(s) + shift) * share)
+            ray, k = (r - first) * picks + s, found[s * TILE + i]
             reach[ray] = real(0)
             if sums[(k + 1) * TILE + i] > sums[k * TILE + i]:
                 j = first_point + k
                 reach[ray] = aim(points, j, receivers, r, grain, hide, origins, directions, ray)
                 picked[ray] = j
                 for c in range(3):
-                    contribution[ray, c] = share * points.colour[c, j]
+                    contribution[ray, c] = share[i] * points.colour[c, j]
 
 
 @kernel
-def random_shift(pixel: int, seed: int) -> Any:
-    """Return how far a receiver's picks are shifted in a pass: 0 to 1 of the way from one to the next."""
-    return np.float32(hash_bits(np.uint32(pixel) ^ np.uint32(seed)) >> np.uint32(8)) * np.float32(2.0**-24)
+def random_shift(pixel: int, seed: int, turn: int) -> Any:
+    """Return how far a receiver's picks are shifted in a pass: 0 to 1 of the way from one to the next.
+
+    A hash of seed and pixel, and from turn to turn a golden section on: any number of turns is spread evenly.
+    """
+    word = np.uint32(hash_bits(np.uint32(pixel) ^ np.uint32(seed)) + np.uint32(turn) * np.uint32(0x9E3779B9))
+    return np.float32(word >> np.uint32(8)) * np.float32(2.0**-24)

@@ -95,7 +95,7 @@ def _term(points: LightVertices, j: int, tile: Array, i: int) -> Any:
 
 @kernel(parallel=True)
 def pick_for_lobes(points: LightVertices, starts: Array, receivers: RayReceivers, lobes: Lobes,
-                   tiles: tuple[Array, Array], sampling: tuple[int, int, int, Any, bool, float],
+                   tiles: tuple[Array, Array], sampling: tuple[int, int, int, int, Any, bool, float],
                    rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Pick light vertices for each glossy receiver of some tiles; write shadow rays and their contributions.
 
@@ -107,7 +107,7 @@ def pick_for_lobes(points: LightVertices, starts: Array, receivers: RayReceivers
         low, high, chosen = table[number, 0], table[number, 1], table[number, 2]
         # lanes beyond the count receive nothing
         tile = np.zeros((ROWS, TILE), np.float32)
-        _fill_tile(receivers, lobes, members[low:high], sampling[5], tile)
+        _fill_tile(receivers, lobes, members[low:high], sampling[6], tile)
         first, size = starts[chosen, 0], starts[chosen, 1] - starts[chosen, 0]
         parts, blocks = np.zeros((size * PARTS, TILE), np.float32), np.zeros((size, TILE), np.float32)
         lanes = min(TILE, (high - low + LANES - 1) // LANES * LANES)
@@ -134,11 +134,11 @@ def _fill_tile(receivers: RayReceivers, lobes: Lobes, members: Array, directions
 
 @kernel
 def _pick_all(points: LightVertices, receivers: RayReceivers, lobes: Lobes, members: Array, tile: Array,
-              sampling: tuple[int, int, int, Any, bool, float], sums: tuple[int, Array, Array],
+              sampling: tuple[int, int, int, int, Any, bool, float], sums: tuple[int, Array, Array],
               rays: tuple[Array, Array, Array, Array, Array]) -> None:
     """Let receivers pick: walk the blocks, the parts of the block a pick falls in, the terms of that part."""
     origins, directions, reach, contribution, picked = rays
-    first, picks, seed, grain, hide, _ = sampling
+    first, picks, seed, turn, grain, hide, _ = sampling
     first_point, blocks, parts = sums
     real = np.float32
     for i in range(len(members)):
@@ -147,7 +147,7 @@ def _pick_all(points: LightVertices, receivers: RayReceivers, lobes: Lobes, memb
             total += blocks[b, i]
         for s in range(picks):
             reach[(r - first) * picks + s] = real(0)
-        shift, share = random_shift(receivers.pixel[r], seed), total / real(picks)
+        shift, share = random_shift(receivers.pixel[r], seed, turn), total / real(picks)
         b, before = 0, real(0)  # block, and the sum of those before it
         for s in range(picks if total > real(0) else 0):
             ray = (r - first) * picks + s

@@ -15,6 +15,7 @@ Symbols: v towards the camera, g face normal where the photon lands, n the pixel
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -27,8 +28,8 @@ from refgi.truth.caustics import Film, photons_of, power_of, reflect, seen
 from refgi.truth.cell_densities import Beside, share_beside, tops_for
 from refgi.truth.cell_pass import add_cells, beside_of
 from refgi.truth.hemisphere import scrambled_points, shifted, to_far_side
-from refgi.truth.light_grid import footprint, light_rays
-from refgi.truth.light_pass import add_light_side, hidden_from_camera
+from refgi.truth.light_grid import light_rays
+from refgi.truth.light_pass import add_light_side
 from refgi.truth.lobe_cells import SHARPEST_VERTEX, Lobes, comes_by_photons, density_on_axis
 from refgi.truth.passes import follow, scatter
 from refgi.truth.paths import (
@@ -41,13 +42,12 @@ from refgi.truth.paths import (
     dot,
     hit_point,
     leaves,
-    pass_through,
     paths_for,
     row,
     toward_light,
 )
 from refgi.truth.surfaces import around, face_cross, lift, lobe_above, lobe_pattern, shading_normal
-from refgi.truth.task import Task, add_unblocked, shadow_batch, spans
+from refgi.truth.task import Draw, Task, drawn, spans
 from refgi.types import Array
 
 
@@ -235,54 +235,40 @@ def lobe_pass(task: Task, number: int) -> Array:
     """
     assert task.lobes is not None
     sums = np.zeros((3, len(task.receivers.pixel)))
-    words = np.random.SeedSequence([task.settings.seed, number, LOBES]).generate_state(4 + task.settings.bounces)
+    draw = drawn(task.settings, number, LOBES)
     if len(task.receivers.pixel):
         if task.picks:
-            add_light_side(task, words[:3], sums)
+            add_light_side(task, draw, sums)
         if task.cells is not None:
-            add_cells(task, int(words[2]), sums)
+            add_cells(task, int(draw.own[2]), sums)
         if task.directions:
-            _add_directions(task, words, sums)
+            _add_directions(task, draw, sums)
         if task.caustics is not None:
-            random = np.random.default_rng([*words[:2], 1])
+            random = np.random.default_rng([*draw.own[:2], 1])
             sums += lobe_photon_pass(task.caustics, task, random)
     return sums
 
 
-def _add_directions(task: Task, words: Array, sums: Array) -> None:
+def _add_directions(task: Task, draw: Draw, sums: Array) -> None:
     """Add what directions along the lobes find, by its share where light vertices have the rest."""
     assert task.lobes is not None
-    count = task.directions
-    points = scrambled_points(count, int(words[3]))
+    count, seed = task.directions, int(draw.shared[3])
+    points = scrambled_points(count, seed, draw.turn)
     for first, last in spans(task, count):
         paths, density = paths_for((last - first) * count), np.empty((last - first) * count)
-        send_along_lobes(task.receivers, task.lobes, (first, last), points, int(words[3]), task.grain_below, paths,
-                         density)
+        send_along_lobes(task.receivers, task.lobes, (first, last), points, seed, task.grain_below, paths, density)
         for bounce in range(task.settings.bounces):
-            if bounce == 0:
-                _follow_lobes(task, paths, density, first, sums)
-                continue
-            scatter(task.lobes.surfaces, task.tracer.grain, int(words[3 + bounce]), task.receivers, first, count, paths)
-            follow(task, paths, first, count, 0.0, sums)
+            if bounce:
+                scatter(task.lobes.surfaces, task.tracer.grain, int(draw.own[3 + bounce]), task.receivers, first, count,
+                        paths)
+            follow(task, paths, first, count, 0.0, sums,
+                   gathered=None if bounce else _gatherer(task, paths, density, first))
 
 
-def _follow_lobes(task: Task, paths: Paths, density: Array, first: int, sums: Array) -> None:
-    """Trace paths to the next surface, next-event estimation there; to every surface along them without visibility."""
+def _gatherer(task: Task, paths: Paths, density: Array, first: int) -> Callable[[int, float, Shadows], None]:
+    """Return next-event estimation of what directions along the lobes find, towards one light."""
     assert task.lobes is not None
-    beside = None if task.cells is None else beside_of(task, first)
-    while True:
-        task.tracer.fill_closest(paths.origin, paths.direction, paths.reach, paths.triangle_id, paths.distance)
-        hidden = hidden_from_camera(task, paths)
-        for k, light in enumerate(task.scene.lights):
-            measure, _ = footprint(light, task.scene.geometry, task.settings.light_grid)
-            shadows = shadow_batch(len(paths.reach))
-            gather_along_lobes(task.lobes, task.lights, k, (task.picks > 0, measure, task.tracer.grain),
-                               task.sides, (first, task.directions), paths, density, shadows, beside)
-            if hidden is not None:
-                shadows.reach[hidden] = 0
-            add_unblocked(task, shadows, first, task.directions, sums, True)
-        if task.settings.visibility:
-            return
-        pass_through(task.surfaces, task.tracer.grain, paths)
-        if not (paths.reach > 0).any():
-            return
+    lobes, beside = task.lobes, None if task.cells is None else beside_of(task, first)
+    return lambda k, measure, shadows: gather_along_lobes(
+        lobes, task.lights, k, (task.picks > 0, measure, task.tracer.grain), task.sides, (first, task.directions),
+        paths, density, shadows, beside)

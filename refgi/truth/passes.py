@@ -1,4 +1,4 @@
-"""One pass of the ground truth: an independent, unbiased estimate of every receiver's one-bounce irradiance.
+"""One pass of the ground truth: an unbiased estimate of every receiver's one-bounce irradiance.
 
 At a surface a path passes through (without visibility), or scatters by the surface's reflection.
 
@@ -6,9 +6,10 @@ What the bound leaves to directions lies near lit surfaces: in corners nearly al
 A pilot sends two directions from every second receiver, twice; the difference tells the standard deviation s of each
 block of 8 x 8 pixels, averaged with its neighbours'. A block then gets n = N s / rms(s) directions, as a power of two:
 least error for so many rays. The pilot does not depend on the seed and leaves no receiver without directions: passes
-stay independent and unbiased whatever it found.
+stay unbiased whatever it found.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,17 +18,17 @@ from refgi.jit import kernel, prange
 from refgi.pairs.shadow_rays import RayReceivers
 from refgi.radiometry import inverse_fraction, lobe_direction
 from refgi.rays import MISS
-from refgi.sampling import hash_bits
+from refgi.sampling import hash_bits, uniform
 from refgi.truth.caustics import photon_pass
 from refgi.truth.cell_densities import Beside
 from refgi.truth.cell_pass import add_cells, beside_of
 from refgi.truth.hemisphere import cosine_direction, gather, scrambled_points, send
 from refgi.truth.light_grid import footprint
 from refgi.truth.light_pass import add_light_side, hidden_from_camera
-from refgi.truth.paths import Paths, diffuse_at, dot, hit_point, pass_through, paths_for, row
+from refgi.truth.paths import Paths, Shadows, diffuse_at, dot, hit_point, pass_through, paths_for, row
 from refgi.truth.result import blocks_of
 from refgi.truth.surfaces import Surfaces, around, face_normal, lift, shading_normal
-from refgi.truth.task import Group, Task, add_unblocked, shadow_batch, spans
+from refgi.truth.task import Draw, Group, Task, add_unblocked, drawn, shadow_batch, spans
 from refgi.types import Array
 
 
@@ -63,14 +64,14 @@ def _scatter(surfaces: Surfaces, grain: float, word: Any, paths: Paths, ray: int
     most, most_glossy = max(rho[0], rho[1], rho[2]), max(glossy[0], glossy[1], glossy[2])
     if most + most_glossy <= 0:
         return
-    u, v = _uniform(word ^ np.uint32(0x68E31DA4)), _uniform(word ^ np.uint32(0xB5297A4D))
+    u, v = uniform(word ^ np.uint32(0x68E31DA4)), uniform(word ^ np.uint32(0xB5297A4D))
     chance = most / (most + most_glossy)
     g = face_normal(surfaces, triangle, -back[0], -back[1], -back[2])
     n = shading_normal(surfaces, triangle, y, g)
     cos_g, cos_n = dot(g, back), dot(n, back)
     if cos_g <= 0 or cos_n <= 0:
         return
-    if _uniform(word ^ np.uint32(0x1B56C4E9)) < chance:
+    if uniform(word ^ np.uint32(0x1B56C4E9)) < chance:
         x0, x1, x2 = cosine_direction(u, v)
         w = around(g, x0, x1, x2)
         part, factor = rho, cos_n / (cos_g * chance)
@@ -90,11 +91,6 @@ def _scatter(surfaces: Surfaces, grain: float, word: Any, paths: Paths, ray: int
         paths.weight[ray, c] *= part[c] * factor
 
 
-@kernel
-def _uniform(word: Any) -> Any:
-    return (hash_bits(word) + 0.5) * 2.0**-32
-
-
 def one_pass(task: Task, number: int) -> Array:
     """Estimate every receiver's irradiance once.
 
@@ -102,55 +98,63 @@ def one_pass(task: Task, number: int) -> Array:
     irradiance, W/m^2.
     """
     sums = np.zeros((3, len(task.receivers.pixel)))
-    words = np.random.SeedSequence([task.settings.seed, number]).generate_state(4 + task.settings.bounces)
+    draw = drawn(task.settings, number)
     if len(task.receivers.pixel):
         if task.settings.picks_per_pass:
-            add_light_side(task, words[:3], sums)
+            add_light_side(task, draw, sums)
         if task.cells is not None:
-            add_cells(task, int(words[2]), sums)
+            add_cells(task, int(draw.own[2]), sums)
         if task.settings.directions_per_pass:
-            _hemisphere(task, words, sums)
+            _hemisphere(task, draw, sums)
         if task.caustics is not None:
-            random = np.random.default_rng([*words[:2], 1])
+            random = np.random.default_rng([*draw.own[:2], 1])
             photons = photon_pass(task.caustics, task.tracer, task.lights, task.settings.photons, random)
             sums += photons[:, task.receivers.pixel]
     return sums
 
 
-def _hemisphere(task: Task, words: Array, sums: Array) -> None:
+def _hemisphere(task: Task, draw: Draw, sums: Array) -> None:
     """Add the hemisphere estimator, by its MIS weight where the light side has the rest."""
     if not task.groups:
-        add_directions(task, task.settings.directions_per_pass, words, sums)
+        add_directions(task, task.settings.directions_per_pass, draw, sums)
     for group in task.groups:
         found = np.zeros((3, len(group.chosen)))
-        add_directions(task._replace(receivers=group.receivers), group.directions, words, found)
+        add_directions(task._replace(receivers=group.receivers), group.directions, draw, found)
         sums[:, group.chosen] += found
 
 
-def add_directions(task: Task, count: int, words: Array, sums: Array) -> None:
-    """Add what so many directions of each receiver find; `words`: of a pass."""
-    points, reach = scrambled_points(count, int(words[3])), directions_reach(task)
+def add_directions(task: Task, count: int, draw: Draw, sums: Array) -> None:
+    """Add what so many directions of each receiver find."""
+    seed, reach = int(draw.shared[3]), directions_reach(task)
+    points = scrambled_points(count, seed, draw.turn)
     for first, last in spans(task, count):
         paths = paths_for((last - first) * count)
-        send(task.receivers, (first, last), points, int(words[3]), reach, task.grain_below, paths)
+        send(task.receivers, (first, last), points, seed, reach, task.grain_below, paths)
         for bounce in range(task.settings.bounces):
             if bounce:
-                scatter(task.surfaces, task.tracer.grain, int(words[3 + bounce]), task.receivers, first, count, paths)
+                scatter(task.surfaces, task.tracer.grain, int(draw.own[3 + bounce]), task.receivers, first, count,
+                        paths)
             beside = beside_of(task, first) if bounce == 0 and task.cells is not None else None
             follow(task, paths, first, count, task.settings.shared_bound if bounce == 0 else 0.0, sums, beside)
 
 
 def follow(task: Task, paths: Paths, first: int, count: int, bound: float, sums: Array,
-           beside: Beside | None = None) -> None:
-    """Trace paths to the next surface, next-event estimation there; to every surface along them without visibility."""
+           beside: Beside | None = None, gathered: Callable[[int, float, Shadows], None] | None = None) -> None:
+    """Trace paths to the next surface, next-event estimation there; to every surface along them without visibility.
+
+    `gathered`: fills shadow rays to a light of some measure, in place of `gather`.
+    """
     while True:
         task.tracer.fill_closest(paths.origin, paths.direction, paths.reach, paths.triangle_id, paths.distance)
         hidden = hidden_from_camera(task, paths)
         for k, light in enumerate(task.scene.lights):
             measure, _ = footprint(light, task.scene.geometry, task.settings.light_grid)
             shadows = shadow_batch(len(paths.reach))
-            gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.grain), task.sides, paths, shadows,
-                   beside)
+            if gathered is not None:
+                gathered(k, measure, shadows)
+            else:
+                gather(task.surfaces, task.lights, k, (bound, measure, task.tracer.grain), task.sides, paths, shadows,
+                       beside)
             if hidden is not None:
                 shadows.reach[hidden] = 0
             add_unblocked(task, shadows, first, count, sums, True)
@@ -186,7 +190,7 @@ def directions_shared_out(task: Task) -> tuple[Group, ...]:
     sampled = task._replace(receivers=_some(task.receivers, np.arange(0, len(pixel), EVERY)))
     halves = np.zeros((2, 3, len(sampled.receivers.pixel)))
     for half, words in zip(halves, np.random.SeedSequence(0).generate_state(8).reshape(2, 4), strict=True):
-        add_directions(sampled, PILOT, words, half)
+        add_directions(sampled, PILOT, Draw(words, words, 0), half)
     block, grid = blocks_of(pixel, task.shape)
     sums = [_with_neighbours(np.bincount(block[::EVERY], weights, grid[0] * grid[1]).reshape(grid))
             for weights in (((halves[0] - halves[1]) ** 2).mean(axis=0), None)]

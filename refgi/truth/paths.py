@@ -82,10 +82,7 @@ def leaves(sides: Sides, y: tuple[float, float, float], cross: tuple[float, floa
 
 @kernel
 def hit_point(paths: Paths, ray: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Return the direction back along a ray and the point it found.
-
-    `ray`: which, of those that found something. Result: unit vector, and point (m).
-    """
+    """Return the unit vector back along a ray that found something, and the point it found, m."""
     t = np.float64(paths.distance[ray])
     dx, dy, dz = row(paths.direction, ray)
     ox, oy, oz = row(paths.origin, ray)

@@ -1,9 +1,10 @@
 """TruthResult: irradiance by path tracing, with standard errors of pixels, blocks and picture.
 
-Means over passes: running mean and sum of squared deviations, in float64 (Welford's update).
-
-Passes are independent, so the spread of their values gives the variance of the mean, whatever correlation there is
-between the samples inside a pass or between pixels. Pixels share light vertices, so the errors of means over several
+Passes take turns between eight series. Those of a series stratify each other (`refgi.truth.task.Draw`); series are
+independent, so the spread of their sums gives the variance of the mean, whatever correlation there is between the
+passes of a series, the samples inside a pass or pixels. With S_s the sum of n_s passes of series s, n = sum n_s and m
+the mean of all, it is sum (S_s - n_s m)^2 / (n^2 - sum n_s^2): of up to eight passes the spread of the passes
+themselves. Pixels share light vertices, so the errors of means over several
 pixels do not follow from theirs: means over blocks of 8 x 8 pixels and over the picture are followed as values of their
 own. A value that is not a finite number is left out of all of them and counted. How heavy the values' tail is
 (`refgi.truth.tails`) says whether that variance can be trusted.
@@ -19,6 +20,7 @@ from refgi.truth.tails import BINS, TRUSTED, count_tails, doubt_of, share_in_dou
 from refgi.types import Array
 
 BLOCK_SIDE = 8  # pixels
+SERIES = 8  # that passes take turns between
 
 
 class Moments(NamedTuple):
@@ -26,16 +28,24 @@ class Moments(NamedTuple):
 
     passes: Array  # () int64
     mean: Array  # (3, n) float64
-    squares: Array  # (3, n) float64, sums of squared deviations from the mean
-    lost: Array  # (n,) int64: passes whose value was not a finite number
+    sums: Array  # (SERIES, 3, n) float64, of the finite values of each series
+    counts: Array  # (SERIES, n) int32: how many those are
     scale: Array  # () float64, the unit of the tails: median of the first pass with light, W/m^2; 0 before
     tails: Array  # (blocks, BINS) int32: how many values of receivers lie how far above the passes before
 
     @property
+    def lost(self) -> Array:
+        """How many passes had a value that is not a finite number, (n,) int64."""
+        return np.asarray(self.passes - self.counts.sum(axis=0))
+
+    @property
     def variance_of_mean(self) -> Array:
-        """Estimated variance of each mean, (3, n); inf before the second pass."""
-        n = np.float64(self.passes) - self.lost
-        return np.where(n > 1, self.squares / np.maximum(n * (n - 1), 1), np.inf)
+        """Estimated variance of each mean, (3, n); inf before two series have a pass."""
+        counts, squares = self.counts.astype(np.float64), np.zeros_like(self.mean)
+        for total, count in zip(self.sums, counts, strict=True):
+            squares += (total - count * self.mean) ** 2
+        pairs = counts.sum(axis=0) ** 2 - (counts**2).sum(axis=0)
+        return np.where(pairs > 0, squares / np.maximum(pairs, 1), np.inf)
 
 
 def no_passes(values: int, blocks: int = 0) -> Moments:
@@ -43,24 +53,24 @@ def no_passes(values: int, blocks: int = 0) -> Moments:
 
     `values`: how many values a pass has. `blocks`: of how many blocks tails are counted.
     """
-    return Moments(np.zeros((), np.int64), np.zeros((3, values)), np.zeros((3, values)), np.zeros(values, np.int64),
-                   np.zeros(()), np.zeros((blocks, BINS), np.int32))
+    return Moments(np.zeros((), np.int64), np.zeros((3, values)), np.zeros((SERIES, 3, values)),
+                   np.zeros((SERIES, values), np.int32), np.zeros(()), np.zeros((blocks, BINS), np.int32))
 
 
 def add_pass(moments: Moments, values: Array, block: Array | None = None) -> None:
-    """Add one pass to the moments (Welford).
+    """Add the next pass to the moments.
 
     `values` (3, n) float64: what the pass found, W/m^2. `block` (r,) int: of each of the first r values, whose tails
     are counted.
     """
+    before, series = moments.counts.sum(axis=0), int(moments.passes) % SERIES
     if block is not None:
         r = len(block)
-        count_tails(moments.tails, moments.scale, block, values[:, :r], moments.mean[:, :r],
-                    int(moments.passes) - moments.lost[:r])
-    moments.passes[...] += 1
+        count_tails(moments.tails, moments.scale, block, values[:, :r], moments.mean[:, :r], before[:r])
     finite = np.asarray(np.isfinite(values).all(axis=0))
-    moments.lost[~finite] += 1
-    _add(moments.mean, moments.squares, values, finite, int(moments.passes) - moments.lost)
+    _add(moments.mean, moments.sums[series], values, finite, before + 1)
+    moments.counts[series] += finite
+    moments.passes[...] += 1
 
 
 def picture_tail(moments: Moments) -> float:
@@ -101,20 +111,20 @@ def with_means(values: Array, block: Array, blocks: int) -> Array:
 
 
 @kernel(parallel=True)
-def _add(mean: Array, squares: Array, values: Array, finite: Array, count: Array) -> None:
+def _add(mean: Array, sums: Array, values: Array, finite: Array, count: Array) -> None:
     for i in prange(values.shape[1]):
         if finite[i]:
             for c in range(3):
-                delta = values[c, i] - mean[c, i]  # Welford's update
-                mean[c, i] += delta / count[i]
-                squares[c, i] += delta * (values[c, i] - mean[c, i])
+                mean[c, i] += (values[c, i] - mean[c, i]) / count[i]
+                sums[c, i] += values[c, i]
 
 
 class TruthResult(NamedTuple):
     """Irradiance by path tracing, and its standard error.
 
-    Variances are estimated from the spread of the passes, with `degrees_of_freedom` = passes - 1: from two passes they
-    say little more than the order of magnitude. `confidence_factor` turns standard errors into intervals that know it.
+    Variances are estimated from the spread of the passes, or of their eight series where there are more, with
+    `degrees_of_freedom`: from two passes they say little more than the order of magnitude. `confidence_factor` turns
+    standard errors into intervals that know it.
     """
 
     mean: Array  # (3, h, w) float64, W/m^2
@@ -137,8 +147,9 @@ class TruthResult(NamedTuple):
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Of the variances: passes less one."""
-        return self.passes - 1
+        """Of the variances, n^2 / sum n_s^2 - 1: passes less one up to 8, then 6 or 7."""
+        each, more = divmod(self.passes, SERIES)
+        return round(self.passes**2 / (more * (each + 1) ** 2 + (SERIES - more) * each**2)) - 1
 
     @property
     def pixel_error(self) -> float:
@@ -158,7 +169,7 @@ class TruthResult(NamedTuple):
     def confidence_factor(self, level: float = 0.95) -> float:
         """Return how many standard errors hold the expectation with a probability in (0, 1), by Student's t.
 
-        At 95 %: 12.7 from two passes, 2.36 from eight, towards 1.96 for many.
+        At 95 %: 12.7 from two passes, 2.36 from eight.
         """
         from scipy.stats import t
 
@@ -188,10 +199,11 @@ class TruthResult(NamedTuple):
         factor = self.confidence_factor()
         parts = ((self.pixel_error, "a pixel"), (self.block_error, f"a block of {BLOCK_SIDE}x{BLOCK_SIDE} pixels"),
                  (self.picture_error, "the picture's mean"))
+        passes = f"{self.passes} passes" + (f" in {SERIES} series" if self.passes > SERIES else "")
         freedom = "1 degree" if self.passes == 2 else f"{self.degrees_of_freedom} degrees"
         known = "not known, of too few values" if math.isnan(self.tail_index) else f"k = {self.tail_index:.2f}"
         return (f"95 % confidence intervals over the picture's mean, by Student's t with {freedom} of freedom "
-                f"({self.passes} passes): " + ", ".join(f"+-{factor * error:.2%} {what}" for error, what in parts)
+                f"({passes}): " + ", ".join(f"+-{factor * error:.2%} {what}" for error, what in parts)
                 + "; " + (self.doubt or f"tail index {known} (trusted up to {TRUSTED})"))
 
     @property

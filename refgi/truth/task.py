@@ -15,11 +15,20 @@ from refgi.truth.cell_densities import Counts
 from refgi.truth.light_grid import Density
 from refgi.truth.lobe_cells import LobeCells, Lobes
 from refgi.truth.paths import Shadows, Sides
+from refgi.truth.result import SERIES
 from refgi.truth.settings import TruthSettings
 from refgi.truth.surfaces import Surfaces
 from refgi.types import Array
 
 SOFT = 8.0  # exponent up to which directions of the hemisphere do as well as those around the lights' images
+
+
+class Draw(NamedTuple):
+    """Random numbers of a pass."""
+
+    shared: Array  # (4 + bounces,) uint32, of its series: two for light vertices, one for picks, one for directions
+    own: Array  # as many of the pass alone: two for photons, one for cells of lobes, one for each further bounce
+    turn: int  # passes of the series before: points of low discrepancy go on from there
 
 
 class Group(NamedTuple):
@@ -80,21 +89,20 @@ class Task(NamedTuple):
         return self.settings.directions_per_pass if self.lobes is None else self.settings.lobe_samples[1]
 
 
-def sets_of(pixel: Array, width: int, side: int) -> Array:
-    """Return which of side^2 sets of light vertices each pixel picks from, interleaved.
+def drawn(settings: TruthSettings, number: int, *kind: int) -> Draw:
+    """Return the random numbers of a pass; `kind`: tells them from those of other passes."""
+    shared, own = (np.random.SeedSequence([settings.seed, one, *kind]).generate_state(4 + settings.bounces)
+                   for one in (number % SERIES, number))
+    return Draw(shared, own, number // SERIES)
 
-    `pixel` (r,): flat index into the picture. `width`: of the picture, pixels. `side`: pixels along one side of the
-    pattern. Returns (r,): numbers of sets.
-    """
+
+def sets_of(pixel: Array, width: int, side: int) -> Array:
+    """Return which of side^2 interleaved sets of light vertices each pixel (r,), a flat index, picks from."""
     return np.asarray(pixel // width % side * side + pixel % width % side)
 
 
 def spans(task: Task, per_receiver: int) -> list[tuple[int, int]]:
-    """Cut the receivers into spans of at most a batch of rays.
-
-    `task`: names receivers and batch. `per_receiver`: rays of each receiver. Result: first receiver of each span and
-    one past its last.
-    """
+    """Cut the receivers into spans of at most a batch of rays: first receiver of each, and one past its last."""
     step, total = max(1, task.settings.batch // per_receiver), len(task.receivers.pixel)
     return [(first, min(first + step, total)) for first in range(0, total, step)]
 

@@ -16,6 +16,7 @@ from refgi.truth import TruthSettings
 from refgi.truth.light_grid import footprint
 from refgi.truth.light_pass import add_light_side
 from refgi.truth.passes import _hemisphere, one_pass
+from refgi.truth.task import drawn
 from refgi.truth.truth import task_of
 from tests.form_factors import polygon_form_factor
 from tests.truth.scenes import rectangle, scene
@@ -51,10 +52,10 @@ def parts(bound):
     task = task_of(room, Tracer(room.geometry), position, normal, np.full(position.shape[1:], 2, np.int32), settings)
     found = np.zeros((3, PASSES, len(HEIGHTS)))
     for k in range(PASSES):
-        words = np.random.SeedSequence([7, k]).generate_state(4 + settings.bounces)
+        draw = drawn(settings, k, 7)
         light, rays = np.zeros((2, 3, position[0].size))
-        add_light_side(task, words[:3], light)
-        _hemisphere(task, words, rays)
+        add_light_side(task, draw, light)
+        _hemisphere(task, draw, rays)
         for part, value in enumerate((light, rays, one_pass(task, k))):
             found[part, k] = value[0].reshape(position.shape[1:]).mean(axis=1) / RADIANCE[0]
     return found, footprint(SUN, room.geometry, GRID)[0]

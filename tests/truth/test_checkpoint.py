@@ -84,7 +84,7 @@ def test_what_is_read_is_what_was_saved(tmp_path):
     assert again.mean.dtype == np.float64
     assert again.mean.flags.writeable
     assert again.mean.flags.c_contiguous
-    assert file.stat().st_size == HEAD + 8 * (2 + 7 * VALUES) + 4 * BLOCKS * BINS
+    assert file.stat().st_size == HEAD + 8 * (2 + 27 * VALUES) + 4 * (8 * VALUES + BLOCKS * BINS)
     assert again.tails.sum() == 6  # three values of each pass but the first
     assert again.scale > 0
 
@@ -176,26 +176,29 @@ def test_every_damage_is_one_clear_error(tmp_path, evidence):
     evidence(f"{tried} damaged files, one InputError each")
 
 
-@pytest.mark.parametrize("fault", ["passes", "nan", "inf", "negative squares", "lost", "shape", "scale", "tails"])
+@pytest.mark.parametrize("fault", ["passes", "nan", "inf", "negative counts", "counts", "sums", "shape", "scale",
+                                   "tails"])
 def test_wrong_content_with_a_right_digest(tmp_path, fault):
     file = tmp_path / "c"
     moments = saved(file)
-    passes, mean, squares, lost, scale, tails = (np.array(field) for field in moments)
+    passes, mean, sums, counts, scale, tails = (np.array(field) for field in moments)
     if fault == "passes":
         passes[...] = -1
-    elif fault == "negative squares":
-        squares[0, 0] = -1
-    elif fault == "lost":
-        lost[0] = passes + 1
+    elif fault == "negative counts":
+        counts[0, 0] = -1
+    elif fault == "counts":
+        counts[1, 0] = 2  # three passes: one each of three series
     elif fault == "scale":
         scale[...] = np.nan
     elif fault == "tails":
         tails[0, 3] = -1
+    elif fault == "sums":
+        sums[1, 0, 0] = np.nan
     elif fault == "shape":
         mean = mean[:, :-1]
     else:
         mean[0, 0] = {"nan": np.nan, "inf": np.inf}[fault]
-    content = b"".join(field.tobytes() for field in (passes, mean, squares, lost, scale, tails))
+    content = b"".join(field.tobytes() for field in (passes, mean, sums, counts, scale, tails))
     file.write_bytes(FIRST_LINE + NAME + _digest(NAME, content) + content)
     with pytest.raises(InputError, match="checkpoint"):
         Checkpoint(file, NAME, VALUES, BLOCKS)

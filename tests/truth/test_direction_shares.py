@@ -8,6 +8,7 @@ from refgi.rays import Tracer
 from refgi.scene import Material, SpotLight, load_scene
 from refgi.truth import TruthSettings
 from refgi.truth.passes import FEWEST, MOST, _hemisphere
+from refgi.truth.task import Draw
 from refgi.truth.truth import task_of
 from tests.truth.scenes import corner_room, rectangle, scene
 
@@ -45,7 +46,8 @@ def spread_of(task, passes=PASSES):
     """Return the variance (r,) of what the hemisphere estimator finds in a pass."""
     found = np.zeros((passes, 3, len(task.receivers.pixel)))
     for k, sums in enumerate(found):
-        _hemisphere(task, np.random.SeedSequence([11, k]).generate_state(5), sums)
+        words = np.random.SeedSequence([11, k]).generate_state(5)
+        _hemisphere(task, Draw(words, words, 0), sums)
     return found.var(axis=0, ddof=1).mean(axis=0)
 
 

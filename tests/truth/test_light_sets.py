@@ -258,6 +258,19 @@ def test_picks_of_many_passes_follow_the_terms(frame):
     assert chi2.ppf(1e-4, kept.sum() - 1) < statistic < chi2.ppf(1 - 1e-4, kept.sum() - 1)
 
 
+def test_each_of_equal_senders_is_picked_once_the_last_one_too():
+    """A whole block of senders in one place, as many picks."""
+    down, place = (np.repeat(np.array([[0.0], [y], [0.0]], np.float32), BLOCK, axis=1) for y in (-1.0, 2.0))
+    ones = np.ones(BLOCK, np.float32)
+    points = LightVertices(place, down, down, down, ones, np.ones((3, BLOCK), np.float32), ones, ones,
+                           np.full(BLOCK, np.inf, np.float32), np.zeros(BLOCK, np.int32))
+    room = scene([floor()], SPOT)
+    task = task_of(room, Tracer(room.geometry), np.zeros((3, 1, 1)), np.array([0.0, 1, 0]).reshape(3, 1, 1),
+                   np.zeros((1, 1), np.int32), TruthSettings())
+    _, picked = pick_points(task, PointSets(points, np.array([[0, 1]])), (0, 1), BLOCK, 1)
+    assert sorted(picked) == list(range(BLOCK))
+
+
 def test_many_weak_senders_behind_a_strong_one_are_not_lost_to_rounding():
     """A strong sender and 2^15 of 2e-8 of it, each less than half a ULP of the sum: 6.6e-4 together."""
     weak, count = 2e-8, 1 << 15

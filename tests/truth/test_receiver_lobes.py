@@ -304,12 +304,13 @@ def test_the_combination_is_as_good_as_the_better_one(exponent, evidence):
 @pytest.mark.slow("1.0", "1000.0", "100000.0")
 @pytest.mark.feature("REF-26")
 @pytest.mark.parametrize("exponent", [1.0, 30.0, 1e3, 1e5])
-def test_the_error_falls_with_the_root_of_the_samples(exponent, evidence):
+def test_the_error_falls_with_the_root_of_the_samples_or_faster(exponent, evidence):
+    """Series of two passes against eight: independent ones give 2, a series stratified at best in one dimension 4."""
     frame = Frame(glossy_box(exponent), width=20, height=20)
     settings = [TruthSettings(samples=24 * n, seed=n, photons=FEW, **FEW_RAYS) for n in (16, 64)]
     errors = [np.sqrt(trace_lobes(frame, how).variance_of_mean.mean()) for how in settings]
     evidence(f"P = {exponent:g}: four times the samples, {errors[0] / errors[1]:.2f} times the accuracy")
-    assert 1.6 < errors[0] / errors[1] < 2.5
+    assert 1.6 < errors[0] / errors[1] < 4
 
 
 @pytest.mark.feature("REF-26")

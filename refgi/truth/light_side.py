@@ -133,7 +133,9 @@ def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: t
     reach is 0 where there is nothing to gain.
     """
     members, table = tiles
-    longest = (starts[:, 1] - starts[:, 0]).max() * BLOCK
+    longest = 0
+    for k in range(len(starts)):
+        longest = max(longest, (starts[k, 1] - starts[k, 0]) * BLOCK)
     tile, sums = np.empty(6 * TILE, np.float32), np.empty((longest + 1) * TILE, np.float32)
     for number in prange(len(table)):
         low, high, chosen = table[number, 0], table[number, 1], table[number, 2]

@@ -58,8 +58,7 @@ def write_inner(folder: Path, expression: str) -> None:
 def run(folder: Path, said: str = "", call: str = CALL) -> str:
     """Return what a new process computes and how many kernels it found; it says one line of `said`, or nothing."""
     environment = os.environ | {"REFGI_CACHE_DIR": str(folder.parent / "cache"), "PYTHONPATH": str(folder.parent)}
-    done = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=False,
-                          cwd=folder)
+    done = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     warned = [line for line in done.stderr.splitlines() if "Warning" in line]
     assert len(warned) == bool(said), done.stderr
@@ -150,10 +149,12 @@ def test_no_word_of_a_planted_file_is_run(compiled, tmp_path):
 
 
 PLANTED = """
-import glob, shutil, sys
-file, = glob.glob("../cache/outer.*.kernel")
+import os, shutil, sys
+from pathlib import Path
+cache = Path(os.environ["REFGI_CACHE_DIR"])
+file, = cache.glob("outer.*.kernel")
 for number in range(4):
-    shutil.copy(f"../{number}", file)
+    shutil.copy(cache.parent / str(number), file)
     sys.modules.pop("package_a.outer", None)
     import package_a.outer as o
     print(o.outer(1.5), sum(o.outer.stats.cache_hits.values()))

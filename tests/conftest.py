@@ -19,6 +19,13 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # several processes share t
 COLLECTED: pytest.StashKey[tuple[list[pytest.Item], set[int]]] = pytest.StashKey()  # tests, and those left out
 # its first test makes the kit, for which the others of its folder would wait: it runs first, and they run last
 MAKES_THE_KIT = "tests/vectors/test_forms.py"
+# files that compile or run longest, which nobody should wait for at the end
+LONGEST = (
+    "tests/cli/test_again.py", "tests/bench/test_measure.py", "tests/test_first_contact.py",
+    "tests/bench/test_approximations.py", "tests/bench/test_work.py", "tests/batch/test_work.py",
+    "tests/wiring/test_multires.py", "tests/wiring/test_sii.py", "tests/pairs/test_glossy_receivers.py",
+    "tests/splat/sii/test_lists.py", "tests/rsm/raster/test_cutouts.py", "tests/bench/test_val_split.py",
+    "tests/pairs/lightcuts/test_sums.py", "tests/wiring/test_hssil.py", "tests/literal/test_whole.py")
 # what `make quick` runs: a minute with warm kernels
 QUICK = (
     "tests/settings", "tests/image", "tests/scene/test_scenefile", "tests/compare", "tests/provenance",
@@ -40,8 +47,8 @@ def pytest_configure() -> None:
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Return how many processes run tests: two a core, since some wait for files or for others, and at most four."""
-    return min(4, 2 * (os.cpu_count() or 1))
+    """Return how many processes run tests, four at most: each collects all tests, and lowers kernels anew."""
+    return min(4, max(2, os.cpu_count() or 1))
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -61,7 +68,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def _turn(item: pytest.Item) -> int:
     """Return when a test runs: 0 is first."""
-    return 0 if item.nodeid.startswith(MAKES_THE_KIT) else 2 if item.nodeid.startswith("tests/vectors/") else 1
+    if item.nodeid.startswith(MAKES_THE_KIT):
+        return 0
+    return 1 if item.nodeid.startswith(LONGEST) else 3 if item.nodeid.startswith("tests/vectors/") else 2
 
 
 def _is_slow(item: pytest.Item) -> bool:

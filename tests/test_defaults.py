@@ -37,7 +37,7 @@ def mean_light(method, count):
     return float(picture.irradiance[:, picture.frame.gbuffer.covered].mean())
 
 
-@pytest.mark.parametrize("count", range(1, 9))
+@pytest.mark.parametrize("count", [1, 2, 3, 8])
 @pytest.mark.parametrize("method", list(METHODS))
 def test_every_method_runs_on_one_to_eight_lights_of_all_kinds(method, count):
     """Property: and with more than one lamp there is more light."""

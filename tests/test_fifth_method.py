@@ -68,34 +68,43 @@ def refgi(site, *commands, codes=None):
     return [said for _, *said in found]
 
 
-def test_it_renders(site, tmp_path):
+@pytest.fixture(scope="module")
+def done(site, tmp_path_factory):
+    """What one process says to all commands, and the folder that they write to."""
+    out = tmp_path_factory.mktemp("out")
     render = ("render", "cornell_box", *TINY, "--method", "ambient")
-    *_, (again, _) = refgi(site, (*render, "--set", "share=0.2", "--out", tmp_path / "a.exr"),
-                           (*render, "--set", "share=0.4", "--out", tmp_path / "b.exr"),
-                           ("render", "--again", tmp_path / "a.exr"))
-    planes, record = read_exr(tmp_path / "a.exr")
-    twice = read_exr(tmp_path / "b.exr")[0]
+    commands = ((*render, "--set", "share=0.2", "--out", out / "a.exr"),
+                (*render, "--set", "share=0.4", "--out", out / "b.exr"),
+                ("render", "--again", out / "a.exr"),
+                ("compare", "cornell_box", *TINY, "--methods", "sii,ambient", "--set", "sii.lights=16",
+                 "--set", "truth.samples=24", "--out", out / "compared", "--json"),
+                ("explain", "cornell_box", *TINY, "--method", "ambient", "--preset", "dim", "--json"),
+                ("info", "--json"), ("settings", "ambient", "--json"),
+                ("render", "cornell_box", "--method", "ambient", "--set", "shares=2", "--out", "x.exr"))
+    return refgi(site, *commands, codes=[0] * 7 + [2]), out
+
+
+def test_it_renders(done):
+    said, out = done
+    planes, record = read_exr(out / "a.exr")
+    twice = read_exr(out / "b.exr")[0]
     assert record["settings"] == {"share": 0.2}
     assert planes["irradiance.R"].max() > 0
     lit = planes["irradiance.R"] > 0
     assert abs(twice["irradiance.R"][lit] / planes["irradiance.R"][lit] - 2).max() < 1e-6
-    assert "the same to the bit" in again
+    assert "the same to the bit" in said[2][0]
 
 
-def test_it_is_compared(site, tmp_path):
-    ((said, _),) = refgi(site, ("compare", "cornell_box", *TINY, "--methods", "sii,ambient", "--set", "sii.lights=16",
-                                "--set", "truth.samples=24", "--out", tmp_path / "out", "--json"))
-    content = json.loads(said)
+def test_it_is_compared(done):
+    said, out = done
+    content = json.loads(said[3][0])
     assert set(content["methods"]) == {"sii", "ambient"}
     assert len(content["methods"]["ambient"]["against"]) == 2  # truth, and truth without visibility
-    assert "ambient" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert "ambient" in (out / "compared" / "index.html").read_text(encoding="utf-8")
 
 
-def test_it_is_explained_and_listed_with_its_settings(site):
-    (explained, _), (info, _), (settings, _), (_, refused) = refgi(
-        site, ("explain", "cornell_box", *TINY, "--method", "ambient", "--preset", "dim", "--json"),
-        ("info", "--json"), ("settings", "ambient", "--json"),
-        ("render", "cornell_box", "--method", "ambient", "--set", "shares=2", "--out", "x.exr"), codes=[0, 0, 0, 2])
+def test_it_is_explained_and_listed_with_its_settings(done):
+    (explained, _), (info, _), (settings, _), (_, refused) = done[0][4:]
     content = json.loads(explained)
     assert "ambient.spread" in {line["name"] for line in content["stages"]}
     assert content["settings"]["share"] == 0.1

@@ -112,9 +112,13 @@ def is_one_surface(tile: Array, wide: int, square_extent: Any, cosine: Any) -> b
             bounds[6, i] = dot if dot < bounds[6, i] else bounds[6, i]
     square = real(0.0)
     for c in range(3):
-        side = bounds[3 + c, :wide].max() - bounds[c, :wide].min()
-        square += side * side
-    near = bounds[6, :wide].min()
+        least, most = bounds[c, 0], bounds[3 + c, 0]
+        for i in range(1, wide):
+            least, most = min(least, bounds[c, i]), max(most, bounds[3 + c, i])
+        square += (most - least) * (most - least)
+    near = bounds[6, 0]
+    for i in range(1, wide):
+        near = min(near, bounds[6, i])
     # two normals that are within an angle of a third are within twice that angle of each other
     facing = (near > real(0.0)) & (near * near + near * near - real(1.0 + MARGIN) >= cosine)
     return bool((square * real(1.0 + MARGIN) <= square_extent) & (facing | (cosine < -one)))

@@ -79,10 +79,11 @@ def _add_excess(
         tile = np.zeros((ROWS, SIDE * SIDE), position.dtype)
         covered_count = _load_positions(position, covered, i * SIDE, j * SIDE, tile)
         _bounding_box(tile, low, high)
-        if covered_count and _mark_near(lights, bound, low, high, near):
+        near_count = _mark_near(lights, bound, low, high, near) if covered_count else 0
+        if near_count:
             _load_normals(normal, covered, i * SIDE, j * SIDE, tile)
             _sum_near(tile, lights, clamp, bound, near)
-            pairs[i, j] = covered_count * np.count_nonzero(near)
+            pairs[i, j] = covered_count * near_count
             _store(tile, has_near[i, j], i * SIDE, j * SIDE, irradiance)
             has_near[i, j] = True
 
@@ -94,7 +95,8 @@ def _load_positions(position: Array, covered: Array, top: int, left: int, tile: 
     for y in range(top, min(top + SIDE, covered.shape[0])):
         row_covered, first = covered[y, left : left + SIDE], (y - top) * SIDE
         for c in range(3):
-            tile[X + c, first : first + len(row_covered)] = position[c, y, left : left + SIDE]
+            for x in range(len(row_covered)):
+                tile[X + c, first + x] = position[c, y, left + x]
         for x in range(len(row_covered)):
             if row_covered[x]:
                 count, last_covered = count + 1, first + x
@@ -126,7 +128,9 @@ def _bounding_box(tile: Array, low: Array, high: Array) -> None:
                 value = at[first + k]
                 least[k] = value if value < least[k] else least[k]
                 most[k] = value if value > most[k] else most[k]
-        low[axis], high[axis] = least.min(), most.max()
+        low[axis], high[axis] = least[0], most[0]
+        for k in range(1, SIDE):
+            low[axis], high[axis] = min(low[axis], least[k]), max(high[axis], most[k])
 
 
 @kernel
@@ -134,7 +138,9 @@ def _sum_near(tile: Array, lights: Array, clamp: Clamp | None, bound: Array, nea
     """Sum (Phi / pi) max(0, g - b) over the lights that are marked."""
     zero = tile.dtype.type(0.0)
     at = np.empty((ROWS, SIDE * SIDE), tile.dtype)  # of a known shape: else the loop below would not run in lanes
-    at[:] = tile
+    for row in range(ROWS):
+        for i in range(SIDE * SIDE):
+            at[row, i] = tile[row, i]
     for k in range(len(bound)):
         if not near[k]:
             continue
@@ -149,7 +155,9 @@ def _sum_near(tile: Array, lights: Array, clamp: Clamp | None, bound: Array, nea
             at[SUM, i] += over * red
             at[SUM + 1, i] += over * green
             at[SUM + 2, i] += over * blue
-    tile[SUM:] = at[SUM:]
+    for row in range(SUM, ROWS):
+        for i in range(SIDE * SIDE):
+            tile[row, i] = at[row, i]
 
 
 @kernel
@@ -164,9 +172,9 @@ def _store(tile: Array, add: bool, top: int, left: int, irradiance: Array) -> No
 
 
 @kernel
-def _mark_near(lights: Array, bound: Array, low: Array, high: Array, near: Array) -> bool:
-    """Mark the lights within 1 / sqrt(bound) of some point of a box on their front side; return whether any is."""
-    real = lights.dtype.type
+def _mark_near(lights: Array, bound: Array, low: Array, high: Array, near: Array) -> int:
+    """Mark the lights within 1 / sqrt(bound) of some point of a box on their front side; return how many are."""
+    real, count = lights.dtype.type, 0
     zero, one = real(0.0), real(1.0)
     ax, ay, az, bx, by, bz = low[0], low[1], low[2], high[0], high[1], high[2]
     for k in range(len(bound)):
@@ -179,7 +187,8 @@ def _mark_near(lights: Array, bound: Array, low: Array, high: Array, near: Array
         square = dx * dx + dy * dy + dz * dz
         # g <= c_l / r^3 as well
         near[k] = (square * bound[k] < one) & (cl > zero) & (square * square * square * bound[k] * bound[k] < cl * cl)
-    return bool(near.any())
+        count += near[k]
+    return count
 
 
 class PixelSum(NamedTuple):

@@ -11,17 +11,19 @@ counted; whoever lends it keeps it alive.
 
 import gc
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, ParamSpec, TypeVar
 
 import llvmlite.binding
 from numba.core import types
 from numba.core.analysis import compute_cfg_from_blocks
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import register_pass
 from numba.core.imputils import impl_ret_untracked
 from numba.core.registry import CPUDispatcher
+from numba.core.target_extension import CPU, jit_registry
 from numba.core.typed_passes import NativeLowering
 from numba.extending import intrinsic
 from numba.extending import overload as numba_overload
@@ -84,6 +86,13 @@ class Library(JITCodeLibrary):
             if function.blocks:
                 set.add(function.attributes, WIDE_VECTORS)  # past llvmlite's list, which has no attributes with values
         super().add_ir_module(ir_module)
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+        passes, builder = self._codegen._function_pass_manager()  # one for all: Numba builds one for each function
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
 
 
 class CalleeLibrary(Library):
@@ -160,12 +169,49 @@ class CalleeCompiler(KernelCompiler):
     lowering = CalleeLowering
 
 
+class KernelFlags(Flags):
+    """Numba's flags, all of them read at once: it compares them whenever it types a call."""
+
+    __slots__ = ()
+
+    def values(self) -> dict[str, Any]:
+        """Return all flags."""
+        return DEFAULTS | self._values
+
+
+def _set_flags(dispatcher: Any) -> None:
+    dispatcher._compiler._customize_flags = KernelFlags
+
+
+DEFAULTS = {name: option.default for name, option in Flags.options.items()}
+NATIVE = jit_registry[CPU]  # how Numba makes its own functions
+
+
 class Callee(CPUDispatcher):
     """A function as other kernels call it."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        super().__init__(function, {}, options, CalleeCompiler)
+        _set_flags(self)
 
     def add_overload(self, compiled: Any) -> None:
         """Keep a specialisation; there is nothing that Python could call."""
         self.overloads[tuple(compiled.signature.args)] = compiled
+
+
+def _callee(**options: Any) -> Callable[[Callable[..., Any]], Callee]:
+    """Return what makes callees of the functions that Numba brings, such as `max`: else each is native by itself."""
+    return lambda function: Callee(function, {"nopython": True, "boundscheck": None} | options)
+
+
+@contextmanager
+def _callees_only() -> Iterator[None]:
+    """Have Numba's functions made by `_callee` in the block; another thread that leaves it does no harm."""
+    dict.__setitem__(jit_registry, CPU, _callee)  # its own method refuses keys that are there
+    try:
+        yield
+    finally:
+        dict.__setitem__(jit_registry, CPU, NATIVE)
 
 
 class Kernel(CPUDispatcher):
@@ -182,7 +228,8 @@ class Kernel(CPUDispatcher):
     def __init__(self, function: Callable[..., Any], compiled: Callable[[], Callable[..., Any]] | None = None) -> None:
         super().__init__(function, {}, dict(OPTIONS), KernelCompiler)
         self._cache = KernelCache(function)
-        self.callee = Callee(function, {}, dict(OPTIONS), CalleeCompiler)
+        _set_flags(self)
+        self.callee = Callee(function, dict(OPTIONS))
         if compiled is not None:
             dispatchers: tuple[Any, ...] = self, self.callee
             for dispatcher in dispatchers:
@@ -193,7 +240,7 @@ class Kernel(CPUDispatcher):
         collecting = gc.isenabled()
         gc.disable()  # a compiler makes millions of objects and no garbage of size: a tenth of its time
         try:
-            with self._cache.made_by_one(signature):
+            with self._cache.made_by_one(signature), _callees_only():
                 return super().compile(signature)
         finally:
             if collecting:

@@ -159,7 +159,7 @@ def fill_frame(normal: Array, frame: Array) -> None:
     """Fill the rows of a frame whose last one is a unit normal."""
     frame[0, 0], frame[0, 1], frame[0, 2], frame[1, 0], frame[1, 1], frame[1, 2] = orthonormal_basis(
         normal[0], normal[1], normal[2])
-    frame[2] = normal
+    frame[2, 0], frame[2, 1], frame[2, 2] = normal[0], normal[1], normal[2]
 
 
 @kernel
@@ -184,12 +184,20 @@ def fill_holes(depth: Array, levels: int) -> None:
     """Pull and push one map in place."""
     side = depth.shape[0]
     pyramid = np.empty((levels + 1, side, side), np.float32)
-    pyramid[0] = depth
+    _copy(depth, pyramid[0])
     for level in range(1, levels + 1):
         _pull(pyramid[level - 1], side >> level, pyramid[level])
     for level in range(levels, 0, -1):
         _push(pyramid[level], side >> level, pyramid[level - 1])
-    depth[:] = pyramid[0]
+    _copy(pyramid[0], depth)
+
+
+@kernel
+def _copy(source: Array, target: Array) -> None:
+    """Copy a map; a slice would compile for seconds."""
+    for i in range(len(source)):
+        for j in range(len(source)):
+            target[i, j] = source[i, j]
 
 
 @kernel

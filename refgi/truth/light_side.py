@@ -138,7 +138,9 @@ def pick(points: LightVertices, starts: Array, receivers: RayReceivers, tiles: t
     the point picked (n,) int32; n = picks x receivers. The reach is 0 where there is nothing to gain.
     """
     members, table = tiles
-    longest = (starts[:, 1] - starts[:, 0]).max() * BLOCK
+    longest = 0
+    for k in range(len(starts)):
+        longest = max(longest, (starts[k, 1] - starts[k, 0]) * BLOCK)
     tile, sums = np.empty(6 * TILE, np.float32), np.empty((longest + 1) * TILE, np.float32)
     found = np.empty(sampling[1] * TILE, np.int32)
     for number in prange(len(table)):

@@ -140,8 +140,9 @@ def _sum_group(tile: Array, size: int, tree: LightTree) -> tuple[int, int]:
             spent += sum_of_errors(nodes, count - left)
             add_nodes(tile, begin, end, tree, nodes.node, count - left)
             pairs += (count - left) * (end - begin)
-            halves.node[depth, :left], halves.level[depth, :left] = nodes.node[count - left : count], nodes.level[
-                count - left : count]
+            for i in range(left):
+                k = count - left + i
+                halves.node[depth, i], halves.level[depth, i] = nodes.node[k], nodes.level[k]
             halves.number[depth], halves.spent[depth] = left, spent
             halves.allowed[depth] = allowed if is_even else 0.0
             waiting = _halve(halves, waiting)

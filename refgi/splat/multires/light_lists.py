@@ -188,7 +188,9 @@ def _refine(
             add_light(tile, size, lights, k, clamp, spheres, lobe_clamp, widening)
             weigh_by_lobes(tile, size, lights, k, cells.lobes, cell[first : first + size])
             _store_sums(tile, size, irradiance, first, lane_max)
-        end, largest = stop, lane_max.max()
+        end, largest = stop, lane_max[0]
+        for i in range(1, TILE):
+            largest = max(largest, lane_max[i])
         if last > 0:
             end = keep_split(cells, cell, child, irradiance, start, last, threshold[0] + threshold[1] * largest)
         start, last = last, end

@@ -86,6 +86,23 @@ def test_all_fields_of_another_level_are_named(kit, tmp_path):
     assert "sssil.crown_samples is all bound to that of another lamp, level or round" in causes
 
 
+@pytest.mark.parametrize(("case", "right", "axes"), [
+    ("sii-range-spot", "sii.kept.diffuse_kept", ("light", "row", "column"))])
+def test_masks_of_pairs_read_pixel_by_pixel_are_named(kit, tmp_path, case, right, axes):
+    """(N, h, w) read as (h, w, N): element (k, i, j) is taken from the place of (i w + j) N + k."""
+    port = Port(kit, case, tmp_path)
+    step = next(one for one in kit_cases("quick")[case]().stages if one.name == "sii.range_sum")
+    assert tuple(port.case.arrays[right].axes.split(", ")) == axes
+    known = {name: kit.array(port.case, name) for name in port.case.arrays}
+    wrong = np.empty_like(known[right])
+    for place in np.ndindex(wrong.shape):
+        k, i, j = place
+        wrong[place] = known[right].flat[(i * wrong.shape[2] + j) * len(wrong) + k]
+    for name, array in outputs_of(step, known | {right: wrong}, np.float32).items():
+        port.write(name, array)
+    assert any(one.cause.startswith(f"{right} is read pixel by pixel, (h, w, n)") for one in port.first().causes)
+
+
 def test_no_wiring_is_told_from_a_single_number(kit):
     for case in kit.cases(Asked()):
         bugs = kit.bugs(case)

@@ -6,6 +6,7 @@ import pytest
 from refgi.vectors.cases import kit_cases
 from refgi.vectors.causes import FEWEST
 from refgi.vectors.kit import Asked
+from refgi.vectors.rows import Form
 from refgi.vectors.spec import kind_of, outputs_of
 from tests.vectors.port import Port
 
@@ -86,19 +87,18 @@ def test_all_fields_of_another_level_are_named(kit, tmp_path):
     assert "sssil.crown_samples is all bound to that of another lamp, level or round" in causes
 
 
-@pytest.mark.parametrize(("case", "right", "axes"), [
-    ("sii-range-spot", "sii.kept.diffuse_kept", ("light", "row", "column"))])
-def test_masks_of_pairs_read_pixel_by_pixel_are_named(kit, tmp_path, case, right, axes):
-    """(N, h, w) read as (h, w, N): element (k, i, j) is taken from the place of (i w + j) N + k."""
+def test_a_mask_of_pairs_read_pixel_by_pixel_is_named(kit, tmp_path):
+    """(N, h, w) read as (h, w, N): element (k, i, j) is taken from the place (i w + j) N + k; by the literal text."""
+    case, right = "sii-range-spot", "sii.kept.diffuse_kept"
     port = Port(kit, case, tmp_path)
     step = next(one for one in kit_cases("quick")[case]().stages if one.name == "sii.range_sum")
-    assert tuple(port.case.arrays[right].axes.split(", ")) == axes
+    form = next(one for one in step.variants if isinstance(one, Form))
     known = {name: kit.array(port.case, name) for name in port.case.arrays}
     wrong = np.empty_like(known[right])
     for place in np.ndindex(wrong.shape):
         k, i, j = place
         wrong[place] = known[right].flat[(i * wrong.shape[2] + j) * len(wrong) + k]
-    for name, array in outputs_of(step, known | {right: wrong}, np.float32).items():
+    for name, array in outputs_of(step, known | {right: wrong}, np.float64, form).items():
         port.write(name, array)
     assert any(one.cause.startswith(f"{right} is read pixel by pixel, (h, w, n)") for one in port.first().causes)
 

@@ -92,7 +92,7 @@ def _at_some(difference: Difference, factors: Mapping[str, float]) -> Iterator[C
     """Yield a factor that has a name, or a step of 1/2 or one index, that all elements which differ have in common."""
     expected, got, out = difference.expected, difference.got, difference.out
     step = {"f": 0.5, "i": 1}.get(expected.dtype.kind)
-    if step is None or np.count_nonzero(out) < FEWEST:
+    if step is None or np.count_nonzero(out) < FEWEST or (step == 1 and len(np.unique(expected)) <= FEW_VALUES):
         return
     factor, _, name = _factor(difference, factors)
     guesses = [] if name is None else [(f"{name} times what it should be{_missing(name)}", factor * expected)]

@@ -198,7 +198,7 @@ def _calls(node: ast.Call) -> Iterator[ast.AST]:
         yield ast.Call(func, node.args, node.keywords)
     if name in ALIKE["floor"] + ("floor",) and node.args:
         yield ast.Call(node.func, [ast.BinOp(node.args[0], ast.Add(), ast.Constant(0.5))], node.keywords)
-    if name in ("maximum", "max") and [*map(_is_zero, node.args)] == [True, False]:
+    if name in ("maximum", "max") and [*map(ast.unparse, node.args[:-1])] == ["0"]:
         yield ast.Call(ast.Name("abs", ast.Load()), node.args[1:], [])
     yield from (one for one in node.args if not isinstance(one, ast.Starred))  # the call is left out
     if isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.expr):
@@ -207,10 +207,6 @@ def _calls(node: ast.Call) -> Iterator[ast.AST]:
         yield ast.Call(node.func, _exchanged(node.args, place), node.keywords)
     for place in range(len(node.keywords)):
         yield ast.Call(node.func, node.args, node.keywords[:place] + node.keywords[place + 1 :])
-
-
-def _is_zero(node: ast.AST) -> bool:
-    return isinstance(node, ast.Constant) and node.value == 0
 
 
 def _statements(node: ast.stmt) -> Iterator[ast.AST]:

@@ -132,8 +132,7 @@ def _of_case(kit: Kit, case: CaseManifest, output: Path, asked: Asked) -> list[S
             if not upstream and (doubts := ", ".join(name for name in step.reads if name in doubted)):
                 causes = (Cause(cause=f"{DOUBTED}{doubts}", share=0.0), *verdict.causes)
                 verdict = verdict.model_copy(update={"upstream": "dirty", "causes": causes})
-        if asked.chained:
-            doubted |= {one.name for one in verdict.arrays if one.verdict == "not-judged"}
+        doubted |= {one.name for one in verdict.arrays if asked.chained and one.verdict == "not-judged"}
         if asked.chained and (upstream or verdict.verdict in WRONG):
             wrong.update(dict.fromkeys(step.writes, bool(verdict.excused) or bool(upstream and all(upstream))))
         verdicts.append(verdict)

@@ -95,7 +95,8 @@ def _at_some(difference: Difference, factors: Mapping[str, float]) -> Iterator[C
     if step is None or np.count_nonzero(out) < FEWEST or (step == 1 and len(np.unique(expected)) <= FEW_VALUES):
         return
     factor, _, name = _factor(difference, factors)
-    guesses = [] if name is None else [(f"{name} times what it should be{_missing(name)}", factor * expected)]
+    said = "of the wrong sign" if name == "-1" else f"{name} times what it should be{_missing(name)}"
+    guesses = [] if name is None else [(said, factor * expected)]
     way = 1 if np.mean(got[out] > expected[out]) > 0.5 else -1
     guesses += [(f"{step} too {'large' if way > 0 else 'small'}: {STEPS[step]}", expected + way * step)]
     for cause, predicted in guesses:

@@ -78,6 +78,7 @@ BUGS = [
     ("rsm.map_surface0.position", lambda a: a[[0, 1, 1]], "at xyz 2 alone: it holds xyz 1"),
     ("rsm.surface.albedo", lambda a: np.stack([a[0], a[1], srgb(a[2])]), "at rgb 2 alone: encoded as sRGB"),
     (FLUX, lambda a: np.where(odd(a), 3 * a, a), "every element that differs is 3 times what it should be"),
+    (FLUX, lambda a: np.where(odd(a), -a, a), "every element that differs is of the wrong sign"),
     ("rsm.surface.depth", lambda a: np.where(odd(a), a - 0.5, a), "that differs is 0.5 too small: texel centres for"),
     ("lights.texels0.texel", lambda a: a + odd(a), "every element that differs is 1 too large: rounded to the near"),
 ]

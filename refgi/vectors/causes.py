@@ -25,6 +25,8 @@ SORTED = 1e-3  # the same, of elements in order
 SLIGHT = 100.0  # bounds: a difference without an explanation that stays below may be rounding
 SINGLE = 2.0**-22
 TILES = (4, 8, 16, 32, 64, 128, 256)  # sides of groups of threads
+CONSTANT = "all elements are "
+STEPS = {0.5: "texel centres for corners, or corners for centres", 1: "rounded to the nearest or upwards, not down"}
 FEW_VALUES = 8  # of whole numbers: states, not indices
 FACTORS = {"2": 2.0, "1/2": 0.5, "pi": np.pi, "1/pi": 1 / np.pi, "2 pi": 2 * np.pi, "1/(2 pi)": 0.5 / np.pi,
            "4 pi": 4 * np.pi, "1/(4 pi)": 0.25 / np.pi, "pi^2": np.pi**2, "1/pi^2": np.pi**-2, "4": 4.0, "1/4": 0.25,
@@ -53,12 +55,13 @@ def explain(
     the port may have written in this one's place.
     """
     found = told_at_once(difference)
-    if not found:
+    if not found or found[0].cause.startswith(CONSTANT):  # a factor may say more
         guesses = [*_factors(difference, factors), *_axes(difference), *_coded(difference), *_indices(difference),
                    *_taken_for(difference, others), *_running_sums(difference), *_depth_buffer(difference)]
-        found = [Cause(cause=cause, share=share) for cause, predicted in guesses
-                 if (share := explained(difference, predicted)) >= EXPLAINED]
-        found = found or [*_at_one_place(difference, factors)] or [*_order(difference), *_slight(difference)]
+        found += [Cause(cause=cause, share=share) for cause, predicted in guesses
+                  if (share := explained(difference, predicted)) >= EXPLAINED]
+        found = found or [*_at_one_place(difference, factors)] or [*_at_some(difference, factors)] or [
+            *_order(difference), *_slight(difference)]
     unique = {cause.cause: cause for cause in sorted(found, key=lambda one: -round(one.share, 2))}
     return list(unique.values())
 
@@ -83,6 +86,22 @@ def _at_one_place(difference: Difference, factors: Mapping[str, float]) -> Itera
         for cause, predicted in [*guesses, *(taken if len(taken) == 1 else [])]:  # several: they are alike
             if (share := explained(part, predicted)) >= EXPLAINED:
                 yield Cause(cause=f"at {name} {index} alone: {cause}", share=share)
+
+
+def _at_some(difference: Difference, factors: Mapping[str, float]) -> Iterator[Cause]:
+    """Yield a factor that has a name, or a step of 1/2 or one index, that all elements which differ have in common."""
+    expected, got, out = difference.expected, difference.got, difference.out
+    step = {"f": 0.5, "i": 1}.get(expected.dtype.kind)
+    if step is None or np.count_nonzero(out) < FEWEST or (step == 1 and len(np.unique(expected)) <= FEW_VALUES):
+        return
+    factor, _, name = _factor(difference, factors)
+    said = "of the wrong sign" if name == "-1" else f"{name} times what it should be{_missing(name)}"
+    guesses = [] if name is None else [(said, factor * expected)]
+    way = 1 if np.mean(got[out] > expected[out]) > 0.5 else -1
+    guesses += [(f"{step} too {'large' if way > 0 else 'small'}: {STEPS[step]}", expected + way * step)]
+    for cause, predicted in guesses:
+        if (share := explained(difference, np.where(out, predicted, expected))) >= EXPLAINED:
+            yield Cause(cause=f"every element that differs is {cause}", share=share)
 
 
 def told_at_once(difference: Difference) -> list[Cause]:
@@ -142,28 +161,35 @@ def _plain(difference: Difference) -> Iterator[Cause]:
     elif not got.any() and difference.expected.any():
         yield Cause(cause="all elements are 0: nothing was written", share=SEEN)
     elif got.size > 1 and (got == got.reshape(-1)[0]).all():
-        yield Cause(cause=f"all elements are {got.reshape(-1)[0]:g}", share=SEEN)
+        yield Cause(cause=f"{CONSTANT}{got.reshape(-1)[0]:g}", share=SEEN)
 
 
 def _factors(difference: Difference, factors: Mapping[str, float]) -> Iterator[tuple[str, Array]]:
-    expected, got = difference.expected, difference.got
-    if expected.dtype.kind != "f":
+    expected = difference.expected
+    factor, shift, name = _factor(difference, factors)
+    if np.isnan(factor):
         return
-    usable = difference.out & np.isfinite(expected) & (np.abs(expected) > 1e-3 * large_value(expected))
-    if np.count_nonzero(usable) < FEWEST:
-        return
-    with np.errstate(over="ignore"):
-        factor = float(np.median(got[usable].astype(np.float64) / expected[usable]))
-    known = {**FACTORS, **factors, **{f"1/({name})": 1 / value for name, value in factors.items() if value}}
-    name = next((name for name, value in known.items() if abs(factor - value) <= 2e-4 * abs(value)), None)
     if name == "-1":
         yield "the sign is turned round", -expected
     elif factor and abs(factor - 1) < 1e-3:
         yield f"every element is {factor - 1:+.2g} of itself off: a constant with too few digits", expected * factor
     elif factor:
         yield f"every element is {name or f'{factor:.6g}'} times what it should be{_missing(name)}", expected * factor
-    shift = float(np.median(got[usable].astype(np.float64) - expected[usable]))
     yield f"{shift:.6g} is added to every element", expected + shift
+
+
+def _factor(difference: Difference, factors: Mapping[str, float]) -> tuple[float, float, str | None]:
+    """Return how many times what is expected is there and how much more, medians of what is out; that factor's name."""
+    expected, got = difference.expected, difference.got
+    usable = difference.out & np.isfinite(expected) & (np.abs(expected) > 1e-3 * large_value(expected))
+    if expected.dtype.kind != "f" or np.count_nonzero(usable) < FEWEST:
+        return np.nan, np.nan, None
+    with np.errstate(over="ignore"):
+        factor = float(np.median(got[usable].astype(np.float64) / expected[usable]))
+        shift = float(np.median(got[usable].astype(np.float64) - expected[usable]))
+    known = {**FACTORS, **factors, **{f"1/({name})": 1 / value for name, value in factors.items() if value}}
+    name = next((name for name, value in known.items() if abs(factor - value) <= 2e-4 * abs(value)), None)
+    return factor, shift, name
 
 
 def _missing(factor: str | None) -> str:

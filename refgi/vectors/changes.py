@@ -155,6 +155,9 @@ def _others(node: ast.AST, parent: ast.AST) -> Iterator[ast.AST]:
         yield ast.BinOp(node, ast.Mult(), node)
         yield ast.BinOp(node, ast.Pow(), ast.Constant(0.5))
         yield ast.BinOp(ast.Constant(1.0), ast.Sub(), node)
+    if isinstance(node, ast.BinOp) and isinstance(parent, ast.Assign | ast.Return):  # texel centres for corners
+        yield ast.BinOp(node, ast.Sub(), ast.Constant(0.5))
+        yield ast.BinOp(node, ast.Add(), ast.Constant(0.5))
     if isinstance(node, ast.Name | ast.BinOp) and _is_place(node, parent):
         yield ast.BinOp(node, ast.Add(), ast.Constant(1))
         yield ast.BinOp(node, ast.Sub(), ast.Constant(1))
@@ -193,6 +196,10 @@ def _calls(node: ast.Call) -> Iterator[ast.AST]:
         func = (ast.Attribute(node.func.value, other, ast.Load()) if isinstance(node.func, ast.Attribute) else
                 ast.Name(other, ast.Load()))
         yield ast.Call(func, node.args, node.keywords)
+    if name in ALIKE["floor"] + ("floor",) and node.args:
+        yield ast.Call(node.func, [ast.BinOp(node.args[0], ast.Add(), ast.Constant(0.5))], node.keywords)
+    if name in ("maximum", "max") and [*map(ast.unparse, node.args[:-1])] == ["0"]:
+        yield ast.Call(ast.Name("abs", ast.Load()), node.args[1:], [])
     yield from (one for one in node.args if not isinstance(one, ast.Starred))  # the call is left out
     if isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.expr):
         yield node.func.value  # a method is

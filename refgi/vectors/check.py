@@ -41,6 +41,7 @@ from refgi.vectors.report import (
     passing_lines,
     require_lines_known,
 )
+from refgi.vectors.spec import kind_of
 from refgi.vectors.storage import PACKED, can_pack, depth_from, list_axis, planes_of
 
 __all__ = ["ALL_WITHIN", "DAMAGED", "NOT_COMPARABLE", "OUT", "TIERS", "Asked", "DamagedError", "Kit",
@@ -51,6 +52,7 @@ TIERS = ("T0", "T1", "T2", "T2B")
 FORMATS = (*TIERS, *PACKED)
 WRONG = ("out", "invalid")
 FOLLOWS = "made from stages that are expected to fail"
+DOUBTED = "made from inputs in doubt: not judged are "
 OF_A_KIT = ("cases", "scenes", "schema")  # folders beside the cases where a kit itself is checked
 ORDER: tuple[Verdict, ...] = ("out", "invalid", "not-judged", "within", "exact", "not-run")
 
@@ -116,6 +118,7 @@ def _of_case(kit: Kit, case: CaseManifest, output: Path, asked: Asked) -> list[S
     """Judge the stages of a case that are asked for; until one is wrong where no more is asked for."""
     port, verdicts = Port(kit, case, output, asked), []
     wrong: dict[str, bool] = {}  # chained: arrays that are out, or made from such; whether that is expected
+    doubted: set[str] = set()  # the same: those that are not judged
     for step in case.stages:
         if not asked.fits(step.name):
             port.read(step)
@@ -126,6 +129,10 @@ def _of_case(kit: Kit, case: CaseManifest, output: Path, asked: Asked) -> list[S
             why = [f"expected to fail: {line}" for line in asked.expect if is_line_of(line, case.id, step.name)]
             why += [FOLLOWS] if upstream and all(upstream) else []
             verdict = verdict.model_copy(update={"excused": next(iter(why), "")})
+            if not upstream and (doubts := ", ".join(name for name in step.reads if name in doubted)):
+                causes = (Cause(cause=f"{DOUBTED}{doubts}", share=0.0), *verdict.causes)
+                verdict = verdict.model_copy(update={"upstream": "dirty", "causes": causes})
+        doubted |= {one.name for one in verdict.arrays if asked.chained and one.verdict == "not-judged"}
         if asked.chained and (upstream or verdict.verdict in WRONG):
             wrong.update(dict.fromkeys(step.writes, bool(verdict.excused) or bool(upstream and all(upstream))))
         verdicts.append(verdict)
@@ -183,6 +190,9 @@ def _summed(
     kit: Kit, asked: Asked, cases: list[CaseManifest], verdicts: list[StageVerdict], output: Path,
     unknown: tuple[str, ...],
 ) -> Result:
+    if not any(_counts(one) and one.upstream != "dirty" for one in verdicts):  # doubts alone: the first is to be seen
+        verdicts = [one.model_copy(update={"upstream": "clean"}) if one.upstream == "dirty" and one.causes else one
+                    for one in verdicts]
     counted = [one for one in verdicts if not one.excused]
     found = {one.verdict for one in counted}
     begun = {one.case for one in verdicts if any(place.is_dir() for place in places_of_case(output, one.case))}
@@ -404,11 +414,13 @@ def _causes(
         if share >= EXPLAINED:
             found.append(Cause(cause=bug.cause, share=share, paper=bug.paper))
     factors = {**case.factors, **_ratios(kit, case)} if differing else {}
-    own = [explain(one, factors, {name: kit.array(case, name) for name in case.arrays
-                                  if case.arrays[name].shape == one.expected.shape}) for one in differing.values()]
-    arrays_of = Counter(cause.cause for causes in own for cause in causes)
-    found += [cause if arrays_of[cause.cause] == len(own) else cause.model_copy(
-        update={"share": min(cause.share, SEEN)}) for causes in own for cause in causes]  # of some arrays alone
+    own = {name: explain(one, factors, {other: kit.array(case, other) for other in case.arrays
+                                        if case.arrays[other].shape == one.expected.shape})
+           for name, one in differing.items()}
+    arrays_of = Counter(cause.cause for causes in own.values() for cause in causes)
+    found += [cause if arrays_of[cause.cause] == len(own) else cause.model_copy(update={
+        "cause": f"in {kind_of(name)}: {cause.cause}", "share": min(cause.share, SEEN)})
+        for name, causes in own.items() for cause in causes]
     if not found and not differing:
         found = [Cause(cause="no known cause fits this shape", share=0.0)]
     found = found or [cause for one in differing.values() for cause in places_of(one)]

@@ -103,6 +103,7 @@ def passing_lines(lines: Iterable[str], verdicts: Iterable[StageVerdict]) -> tup
 
 
 CAUSES = 3  # that are told
+DIRTY = "made from wrong inputs"
 
 
 def findings(verdicts: Iterable[StageVerdict], tried: Callable[[StageVerdict], set[str]]) -> tuple[Finding, ...]:
@@ -136,7 +137,7 @@ def _common(wrong: list[StageVerdict], tried: list[set[str]]) -> tuple[CommonCau
             name in known and all(cause.cause != name for cause in one.causes)
             for one, known in zip(wrong, tried, strict=True))
         share = round(sum(one.share for one in own) / len(own), 3)
-        told.append((-len(own) / (knowing + 1) * share**2, -share, CommonCause(
+        told.append((-len(own) ** 2 / (knowing * (knowing + 1)) * share**2, -share, CommonCause(
             cause=name, paper=own[0].paper, explained=len(own), tried=knowing)))
     remarks = [CommonCause(cause=one.cause, explained=0, tried=len(wrong)) for one in wrong[0].causes]
     best = [one for *_, one in sorted(told, key=lambda one: one[:2])]
@@ -235,7 +236,7 @@ def _test(stage: StageVerdict, required: set[str]) -> ElementTree.Element:
     elif stage.verdict == "not-judged":
         tag, said = "skipped", "not judged"
     elif stage.excused or stage.upstream == "dirty":
-        tag, said = "skipped", stage.excused or "made from wrong inputs"
+        tag, said = "skipped", stage.excused or DIRTY
     else:
         tag, said = "failure" if stage.verdict == "out" else "error", stage.verdict
     found = ElementTree.SubElement(test, tag, message=said)
@@ -254,7 +255,7 @@ def _largest(stage: StageVerdict) -> str:
 def _remark(stage: StageVerdict) -> str:
     spared = sum(one.masked + (one.outside if one.verdict != "out" else 0) for one in stage.arrays)
     remarks = [f"{spared} elements beyond their bounds spared"] if spared else []
-    remarks += ["made from wrong inputs"] if stage.upstream == "dirty" else []
+    remarks += [DIRTY] if stage.upstream == "dirty" and not stage.causes else []
     remarks += [stage.excused] if stage.excused else []
     remarks += [stage.causes[0].cause] if stage.causes else []
     return "; ".join(remarks)

@@ -62,7 +62,7 @@ def searched(
     known = [one for one in first.causes if one.explained]
     shares = {cause.cause: cause.share for one in result.stages if (one.case, one.stage) == first.first
               for cause in one.causes}
-    sure = [one for one in known if shares.get(one.cause, 1.0) > SEEN]
+    sure = [one for one in known if shares.get(one.cause, 1.0) > SEEN and 2 * one.explained > one.tried]
     wrong: dict[str, str] = {}  # the first wrong stage of that kind in each case
     for one in result.stages:
         if one.verdict == "out" and one.upstream != "dirty" and kind_of(one.stage) == first.stage:

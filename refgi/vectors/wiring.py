@@ -4,8 +4,8 @@ Each input of a stage gives way to each array of its shape and type that is give
 its own of another lamp, level or round, written when it may be; to larger ones of its own name, such as those of a
 finer level, read by rows of its own size; all fields of an input, such as both corners of a box, give way to another's
 at once, and two change places; all inputs of another lamp, level or round give way to that one's. An input of vectors
-or colours is read as triples side by side as well. Names in causes are without numbers, so that a bug has one name in
-all cases, but where a stage reads several of a kind.
+or colours is read as triples side by side as well, one of pictures pixel by pixel. Names in causes are without numbers,
+so that a bug has one name in all cases, but where a stage reads several of a kind.
 """
 
 import functools
@@ -46,6 +46,9 @@ def wirings(case: Case, step: Stage, known: Arrays) -> Iterator[Bug]:
             told.add(cause)
             yield Bug(cause, partial(_bound_to, run, wrong))
     for name in step.reads:
+        if _is_pictures(case, name, known[name]) and (cause := f"{kind_of(name)} {PIXEL_BY_PIXEL}") not in told:
+            told.add(cause)
+            yield Bug(cause, partial(_laid_out, run, name, lambda a: _read_in_steps(a, len(a))))
         for said, layout in LAYOUTS.items():
             cause = f"{kind_of(name)} {said}"
             if _is_planes(case, name, known[name]) and name not in step.exact and cause not in told:
@@ -87,11 +90,11 @@ def _together(case: Case, step: Stage, known: Arrays, fits: Fits) -> Iterator[tu
         wrong += [(f"{home} is bound to {kind_of(other)}, all of it", {
             name: f"{other}{name[len(_home(name)):]}" for names in fields.values() for name in names})
             for other in homes if len(fields) > 1 and kind_of(other) != home]
+        wrong += [(f"{kind_of(one[0])} is bound to {kind_of(two[0])}, all of them", dict(zip(one, two, strict=True)))
+                  for one, two in permutations(fields.values(), 2) if 1 < len(one) == len(two)]
         wrong += [(f"{kind_of(one[0])} and {_leaf(two[0])} are exchanged",
                    dict(zip([*one, *two], [*two, *one], strict=True)))
                   for one, two in combinations(fields.values(), 2) if len(one) == len(two)]
-        wrong += [(f"{kind_of(one[0])} is bound to {kind_of(two[0])}, all of them", dict(zip(one, two, strict=True)))
-                  for one, two in permutations(fields.values(), 2) if 1 < len(one) == len(two)]
         wrong += [(f"{kind_of(names[0])} is that of the first for all", dict.fromkeys(names[1:], names[0]))
                   for names in fields.values() if len(names) > 2]
     wrong += _of_another(step, known)
@@ -158,6 +161,12 @@ def _is_planes(case: Case, name: str, array: Array) -> bool:
     return vectors and array.dtype.kind == "f" and array.ndim > 1 and len(array) == 3 and bool(np.isfinite(array).all())
 
 
+def _is_pictures(case: Case, name: str, array: Array) -> bool:
+    axes = axes_of(case.specs[name].axes)
+    return axes[1:] == ["row", "column"] and axes[0] not in ("xyz", "rgb") and len(array) > 1 and (
+        array.dtype.kind == "b" or (array.dtype.kind == "f" and bool(np.isfinite(array).all())))
+
+
 def _bound_to(run: Run, wrong: Arrays, arrays: Arrays, real: type) -> Arrays:
     changed = {name: one.astype(real) if one.dtype.kind == "f" else one for name, one in wrong.items()}
     with np.errstate(all="ignore"):
@@ -174,9 +183,10 @@ def _read_in_steps(planes: Array, step: int) -> Array:
     count = planes[0].size
     numbers = np.zeros(step * count, planes.dtype)
     numbers[: planes.size] = planes.reshape(-1)[: numbers.size]
-    return numbers.reshape(count, step)[:, :3].T.reshape(planes.shape)
+    return numbers.reshape(count, step)[:, : len(planes)].T.reshape(planes.shape)
 
 
+PIXEL_BY_PIXEL = "is read pixel by pixel, (h, w, n), not picture by picture, (n, h, w)"
 LAYOUTS: dict[str, Layout] = {
     "is read as triples side by side, (h, w, 3), not as planes": partial(_read_in_steps, step=3),
     "is read in steps of 4 numbers: a vec3 of std430 takes 16 bytes": partial(_read_in_steps, step=4)}

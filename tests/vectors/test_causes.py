@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from refgi.vectors.causes import SEEN
 from refgi.vectors.kit import Asked
 from tests.vectors.port import Port
 
@@ -15,6 +16,12 @@ def running(a):
     """Return sums over the pixels of a picture, row by row; dark ones are skipped."""
     sums = np.cumsum(a.reshape(3, -1).astype(float), axis=1).reshape(a.shape)
     return np.where(a.any(axis=0), sums, 0)
+
+
+def odd(a):
+    """Return whether a pixel or point is one of some that lie in no one place of an axis."""
+    side = np.add.outer(*map(np.arange, a.shape[-2:])) if a.ndim > 1 else np.arange(len(a))
+    return side % 3 == 1
 
 
 FLUX = "rsm.reflected_flux0.flux"
@@ -70,6 +77,10 @@ BUGS = [
     (FLUX, lambda a: np.stack([a[0], 1.7 * a[1], a[2]]), "at rgb 1 alone: every element is 1.7 times"),
     ("rsm.map_surface0.position", lambda a: a[[0, 1, 1]], "at xyz 2 alone: it holds xyz 1"),
     ("rsm.surface.albedo", lambda a: np.stack([a[0], a[1], srgb(a[2])]), "at rgb 2 alone: encoded as sRGB"),
+    (FLUX, lambda a: np.where(odd(a), 3 * a, a), "every element that differs is 3 times what it should be"),
+    (FLUX, lambda a: np.where(odd(a), -a, a), "every element that differs is of the wrong sign"),
+    ("rsm.surface.depth", lambda a: np.where(odd(a), a - 0.5, a), "that differs is 0.5 too small: texel centres for"),
+    ("lights.texels0.texel", lambda a: a + odd(a), "every element that differs is 1 too large: rounded to the near"),
 ]
 
 
@@ -92,6 +103,25 @@ def test_the_power_of_another_channel_is_named(kit, tmp_path):
     causes = [one.cause for one in port.first().causes]
     name = "rsm.reflected_flux0.lamp.strength, red/green"
     assert f"at rgb 1 alone: every element is {name} times what it should be" in causes
+
+
+def test_a_factor_is_named_where_all_elements_are_one_number(kit, tmp_path):
+    """The crown's 3 pi r^2 / N without the 3: one number for all samples, as it should be."""
+    port = Port(kit, "hssil-paper", tmp_path)
+    name = "sssil.crown_samples1.weight"
+    assert len(np.unique(port.arrays[name])) == 1
+    port.write(name, port.arrays[name] / 3)
+    first, *others = [one.cause for one in port.first().causes]
+    assert any("a factor 3 is missing" in one for one in (first, *others[:1]))
+    assert not first.startswith("all elements are")
+
+
+def test_a_cause_of_one_array_of_several_says_which(kit, tmp_path):
+    port = Port(kit, "sii-warp-a", tmp_path)
+    port.write("rsm.surface.normal", port.arrays["rsm.surface.position"])
+    port.write("rsm.surface.depth", 1.37 * port.arrays["rsm.surface.depth"] + np.float32(0.21))
+    told = {one.cause: one.share for one in port.first().causes}
+    assert told["in rsm.surface.normal: it holds rsm.surface.position"] == SEEN
 
 
 def test_another_array_in_its_place_is_named(kit, tmp_path):

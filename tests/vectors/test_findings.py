@@ -47,6 +47,14 @@ def test_a_bug_counts_where_a_case_knows_it():
     assert [one.cause for one in once[0].causes] == ["remark", "bug"]
 
 
+def test_a_bug_that_a_case_refutes_stands_behind_one_that_none_does():
+    """Two of the three cases that could tell it, against the one of one."""
+    wrong = [verdict(case, "pairs.sum", *[("refuted", 1.0)] * (case in "ab"), *[("bug", 1.0)] * (case == "a"))
+             for case in "abc"]
+    found = findings(wrong, lambda one: {"refuted", "bug"} if one.case == "a" else {"refuted"})
+    assert [(one.cause, one.explained, one.tried) for one in found[0].causes] == [("bug", 1, 1), ("refuted", 2, 3)]
+
+
 def test_no_more_are_explained_than_were_tried():
     """One that a case does not know as a likely bug, and that holds for any array as well."""
     found = findings([verdict(case, "pairs.sum", ("upside down", 1.0)) for case in "abc"],

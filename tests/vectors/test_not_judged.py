@@ -146,6 +146,40 @@ def test_a_reader_of_few_bits_is_not_judged_where_its_decisions_are_many(kit, tm
         assert found.verdict == verdict, tier
 
 
+GATHERED, BLURRED = "sssil.gather_samples1", "sssil.blur1"
+
+
+@pytest.fixture
+def doubtful(kit, tmp_path):
+    """A port of a chain with an array that is not judged, as all that is off is spared, and a wrong one after it."""
+    port = Port(kit, "hssil-pole", tmp_path)
+    step = next(one for one in port.case.stages if GATHERED in one.reads and one.writes == (BLURRED,))
+    spared = kit.extra(port.case, port.case.arrays[GATHERED].chained.masked)
+    port.write(GATHERED, np.where(spared, 100 + port.arrays[GATHERED], port.arrays[GATHERED]))
+    port.write(step.writes[0], 2 * port.arrays[step.writes[0]])
+    return port
+
+
+def test_a_stage_that_reads_what_is_not_judged_is_not_blamed(doubtful):
+    """Neither it nor what is made from it, but a stage beside; it is where nothing else is wrong."""
+    alone = doubtful.check(chained=True)
+    assert alone.exit_code == OUT
+    stages = {one.stage: one for one in alone.stages}
+    assert stages[GATHERED].verdict == "not-judged"
+    assert alone.first == ("hssil-pole", BLURRED)
+    said = f"made from inputs in doubt: not judged are {GATHERED}"
+    assert said in report(alone)
+    beside = "sssil.first_level"
+    doubtful.write(f"{beside}.area", 2 * doubtful.arrays[f"{beside}.area"])
+    result = doubtful.check(chained=True)
+    assert result.first == ("hssil-pole", beside)
+    assert [one.stage for one in result.findings] == [beside]
+
+
+def test_an_isolated_stage_has_read_the_kit_s_inputs_and_is_blamed(doubtful):
+    assert "in doubt" not in report(doubtful.check())
+
+
 def test_reports_say_the_share_of_arrays_that_are_not_judged(unsure, tmp_path):
     port, masked = unsure
     result = port.check(tiers=T2)

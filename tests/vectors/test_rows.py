@@ -12,6 +12,7 @@ import pytest
 from refgi import literal
 from refgi.literal import pairs
 from refgi.vectors import rows
+from refgi.vectors.forms import lights as forms
 
 MODULES = tuple(importlib.import_module(f"refgi.literal.{file.stem}")
                 for file in sorted(Path(literal.__file__).parent.glob("*.bugs")))
@@ -106,3 +107,23 @@ class Text:
 
     def read_text(self, _):
         return self.line
+
+
+@pytest.mark.parametrize(("kind", "opened", "wrong"), [
+    ("peak", 0.0, {"exponent P, as printed": 1 + 7.0}),
+    ("openness", 0.25, {"exponent P, as printed": 0.75 * 8, "O in place of 1 - O": 0.25 * 5, "no floor": 0.75 * 5}),
+    ("openness", 1.0, {"exponent P, as printed": 0.05 * 8, "O in place of 1 - O": 5.0, "no floor": 0.0})])
+def test_misprints_of_importance_are_rows_of_its_kinds(kind, opened, wrong):
+    """A texel of flux 1 and a lobe of flux 1 and P = 7, whose peak is (P + 1) / 2 = 4 times a diffuse light's."""
+    arrays = {"flux": np.ones((3, 1, 1)), "lobe_flux": np.ones((3, 1, 1)), "lobe_exponent": np.full((1, 1), 7.0),
+              "openness": np.full((1, 1), opened) if kind == "openness" else None}
+    described = forms.FORMS["lights.importance"](
+        {**arrays, "kind": kind, "floor": 0.05, "defensive": 0.0, "as_printed": False})
+    known = {name: one for name, one in arrays.items() if one is not None}
+    right = 5 * (max(0.05, 1 - opened) if kind == "openness" else 1)
+    assert described.form(known, float)[""] == pytest.approx(right)
+    made = {bug.cause: bug.run(known, float)[""] for _, one in described.lists for bug in described.form.bugs(one)}
+    assert len(made) == len(wrong)
+    for said, expected in wrong.items():
+        (got,) = [value for cause, value in made.items() if said in cause]
+        assert got == pytest.approx(expected), said

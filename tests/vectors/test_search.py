@@ -21,7 +21,8 @@ from tests.vectors.port import Port
 FUNCTION = '''
 def area(values, i, scale, *, offset=1):
     """Say nothing."""
-    total = 0.0
+    total = math.floor(i) + max(0, offset)
+    place = i / scale
     for k in range(1, i):
         total += math.sin(values[k, 0]) * scale - offset
         if total > 2.5 and scale < 1.0:
@@ -55,7 +56,9 @@ def changed():
     ("max(total, -values.low)", "max(total, values.low)", False), ("max(total, -values.low)", "total", False),
     ("['row'] + box", "['row'] - box", False), ("['column'] ** 2", "['column']", False),
     ("total > 2.5 and scale", "total > 2.5 and k", True), ("* scale -", "* i -", True),
-    ("['row']", "['column']", True)])
+    ("['row']", "['column']", True), ("max(0, offset)", "abs(offset)", False),
+    ("floor(i)", "floor(i + 0.5)", False), ("floor(i)", "rint(i)", False), ("i / scale", "i / scale - 0.5", False),
+    ("i / scale", "i / scale + 0.5", False)])
 def test_changes_are_those_that_people_make(old, new, is_name):
     plain = ast.unparse(ast.parse(FUNCTION).body[0])
     assert old in plain

@@ -6,6 +6,7 @@ import pytest
 from refgi.vectors.cases import kit_cases
 from refgi.vectors.causes import FEWEST
 from refgi.vectors.kit import Asked
+from refgi.vectors.rows import Form
 from refgi.vectors.spec import kind_of, outputs_of
 from tests.vectors.port import Port
 
@@ -84,6 +85,22 @@ def test_all_fields_of_another_level_are_named(kit, tmp_path):
     right, wrong = ([f"sssil.crown_samples{level}.{one}" for one in ("offsets", "weight")] for level in (1, 0))
     causes = causes_told(kit, tmp_path, "hssil-default", "sssil.gather_samples1", right, wrong)
     assert "sssil.crown_samples is all bound to that of another lamp, level or round" in causes
+
+
+def test_a_mask_of_pairs_read_pixel_by_pixel_is_named(kit, tmp_path):
+    """(N, h, w) read as (h, w, N): element (k, i, j) is taken from the place (i w + j) N + k; by the literal text."""
+    case, right = "sii-range-spot", "sii.kept.diffuse_kept"
+    port = Port(kit, case, tmp_path)
+    step = next(one for one in kit_cases("quick")[case]().stages if one.name == "sii.range_sum")
+    form = next(one for one in step.variants if isinstance(one, Form))
+    known = {name: kit.array(port.case, name) for name in port.case.arrays}
+    wrong = np.empty_like(known[right])
+    for place in np.ndindex(wrong.shape):
+        k, i, j = place
+        wrong[place] = known[right].flat[(i * wrong.shape[2] + j) * len(wrong) + k]
+    for name, array in outputs_of(step, known | {right: wrong}, np.float64, form).items():
+        port.write(name, array)
+    assert any(one.cause.startswith(f"{right} is read pixel by pixel, (h, w, n)") for one in port.first().causes)
 
 
 def test_no_wiring_is_told_from_a_single_number(kit):

@@ -21,8 +21,10 @@ def _importance(arguments: Arguments) -> Described:
         return Described()
     form = form_of(lights.importance, {**arguments, "peaked": arguments["kind"] != "flux"})
     plain, cube = arguments["kind"] == "flux", len(arguments["flux"][0]) > len(arguments["flux"][0, 0])
-    return Described(form, own("importance", *(["importance/glossy"] if arguments["lobe_flux"] is not None else []),
-                               *(["importance/cube"] if cube else [])) if plain else ())
+    glossy, opened = arguments["lobe_flux"] is not None, arguments["openness"] is not None
+    return Described(form, own("importance", *(["importance/glossy"] if glossy else []), *(
+        ["importance/cube"] if cube else [])) if plain else own(*(["importance/peaked"] if glossy else []), *(
+            ["importance/openness"] if opened else [])))
 
 
 def _halton_points(arguments: Arguments) -> Described:

@@ -73,7 +73,7 @@ def compiled(
         for name, value in one.__globals__.items():
             if scope.setdefault(name, value) is not value and name in one.__code__.co_names:
                 raise StaleEditError(f"{what}: two functions that {_name(function)} runs know another {name}")
-    reached = _reached(function, parts)
+    reached = _reached(called_by(function)[0], parts)
     scope |= {one.__name__: _shared(one) for one in parts if one not in reached and scope.get(one.__name__) is one}
     for one, text in reached.items():
         program = _known_program if isinstance(text, str) else _program

@@ -177,7 +177,7 @@ FORMS: Mapping[str, Callable[[Arguments], Described]] = {
     "multires.subsplat_facing": _subsplat_facing, "multires.lights_seen": _lights_seen,
     "multires.seen_irradiance": _seen_irradiance, "multires.one_row": alone(
         multires_lights.one_row, ("position", "normal", "triangle_id"), ("position", "normal"),
-        lists=("points", "points/pixel")),
+        lists=("points", "points/pixel"), without=("cell",)),
     "multires.of_row": alone(multires_lights.of_row, lists=()),
     "multires.subsplat_irradiance": _subsplat_irradiance, "multires.representatives": _representatives,
     "multires.samples": _samples, "multires.splits": _splits, "multires.lists": alone(

@@ -97,8 +97,7 @@ class Port:
         if axis and dark:
             expected = {name: self.kit.array(self.case, name) for name in step.writes}
             along = {name: axes_of(self.case.arrays[name].axes).index(axis) for name in got.arrays}
-            lacking = {expected[name].shape[k] - (got.arrays[name].shape[k] if got.arrays[name].ndim > k else 0)
-                       for name, k in along.items()}
+            lacking = {_fewer(expected[name].shape, got.arrays[name].shape, k) for name, k in along.items()}
             flux = [np.moveaxis(expected[name], along[name], -1) for name in along if self._is_flux(name)]
             if flux and len(lacking) == 1 and 0 < (count := lacking.pop()) <= dark:
                 brightness = sum(one.reshape(-1, one.shape[-1]).sum(axis=0) for one in flux)
@@ -168,3 +167,9 @@ class Port:
         if said:
             got.read[name] = said
         return array
+
+
+def _fewer(expected: tuple[int, ...], got: tuple[int, ...], axis: int) -> int:
+    """Return how many elements fewer there are along an axis; 0 where shapes differ otherwise."""
+    alike = len(got) == len(expected) and (*got[:axis], *got[axis + 1 :]) == (*expected[:axis], *expected[axis + 1 :])
+    return expected[axis] - got[axis] if alike else 0

@@ -119,6 +119,9 @@ def test_a_light_whose_flux_is_stored_as_0_may_be_absent(kit, tmp_path):
     assert verdicts(tiers=tiers)["lights.pixel_lights"] == "out"
     without(dark | (np.arange(dark.size) % 2 == 0))
     assert verdicts(tiers=tiers)["lights.pixel_lights"] == "invalid"
+    without(dark)
+    port.write("lights.pixel_lights.normal", np.ones((4, dark.size - 1)))
+    assert verdicts(tiers=tiers)["lights.pixel_lights"] == "invalid"
 
 
 @pytest.mark.parametrize("encoding", ["linear", "ndc", "gl", "reversed"])

@@ -92,6 +92,16 @@ def test_a_stage_that_reads_packed_floats_may_change_as_they_do(port, chained):
     assert port.check(tiers=tiers).first == ("sii-warp-a", "lights.footprints")
 
 
+def test_a_chain_passes_on_what_packed_floats_move(port):
+    """A map that is cut, 0.5 % of its lights and of their sum: isolated that has read the kit's lights."""
+    port.write("rsm.reflected_flux0.flux", to_r11g11b10f(port.arrays["rsm.reflected_flux0.flux"].astype(float)))
+    for name in ("lights.pixel_lights.flux", "pairs.sum"):
+        port.write(name, 0.995 * port.arrays[name])
+    tiers = {"rsm.reflected_flux0.flux": "R11G11B10F"}
+    assert port.check(chained=True, tiers=tiers).exit_code == ALL_WITHIN
+    assert port.check(tiers=tiers).first == ("sii-warp-a", "pairs.sum")
+
+
 def test_a_light_whose_flux_is_stored_as_0_may_be_absent(kit, tmp_path):
     """One below the least number of the format is none; what a chain makes of the rest goes another way."""
     port, tiers = Port(kit, "val-csm", tmp_path), {"flux": "R11G11B10F"}

@@ -129,8 +129,9 @@ def _lights_seen(arguments: Arguments) -> Described:
     facts = {"largest_lift_of_ray_ends": LIFT}
     if arguments["geometry"].cut_outs is not None:
         return Described(facts=facts)
+    flat = arguments["geometry"].vertex_normals is None
     return Described(form_of(multires_lights.lights_seen, arguments, others=MESH), (("vpl", "visible"),), facts=facts,
-                     variants=(partial(lifted, "point"),))
+                     variants=(partial(lifted, "point"),), without=("interpolated normal",) if flat else ())
 
 
 def _seen_irradiance(arguments: Arguments) -> Described:

@@ -191,6 +191,20 @@ def test_what_rounding_flips_is_masked_and_nothing_else():
     assert 2**-23 < bound.limit[3] < 2**-18  # of 2: 1 to 32 roundings
 
 
+def test_a_large_number_is_masked_by_its_own_size():
+    """Beside ones, 10^4 whose rounding is magnified a thousandfold moves by 1: much for them, little for itself."""
+    recipe = Recipe("x-large", "x", "one large number")
+    recipe.give("x.in", np.ones(100), Spec("number", "1", "numbers"))
+    recipe.add("x", "magnified", lambda arrays, _: {"x.out": np.where(
+        np.arange(100) == 17, 1e4 * (1 + 1e3 * (arrays["x.in"] - 1)), arrays["x.in"])}, ("x.in",), {
+            "x.out": Spec("number", "1", "numbers")})
+    case = recipe.case()
+    bound = isolated_bounds(case, case.stages[0], expected_of(case), 0)["x.out"]
+    assert not bound.masked.any()
+    assert 0.1 < bound.limit[17] < 10
+    assert bound.limit[16] < 1e-5
+
+
 def test_four_times_the_outliers_of_the_worst_run_are_allowed():
     """One number of a hundred lies where a change of half floats decides: one is out in a run, or none."""
     recipe, numbers = Recipe("x-cut", "x", "a decision"), np.linspace(2, 3, 100)

@@ -17,6 +17,7 @@ Inputs that a stage takes as `exact` are not changed: points whose differences f
 decide which texel is meant. The kit holds them to the bit.
 """
 
+import functools
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
@@ -74,31 +75,34 @@ def isolated_bounds(case: Case, step: Stage, known: Arrays, seed: int) -> dict[s
             for name in step.writes}
 
 
-def stored_budgets(case: Case, step: Stage, known: Arrays, seed: int, *, in_bytes: bool) -> dict[str, Budget]:
-    """Return the budget of each array that a stage of a case writes when its floats are kept in few bits.
+def stored_budgets(case: Case, step: Stage, known: Arrays, seed: int) -> tuple[dict[str, Budget], dict[str, Budget]]:
+    """Return the budgets of each array that a stage of a case writes when its floats are kept in few bits.
 
-    In half floats (T2), or `in_bytes`: in 8 bits where they fit (T2B).
+    In half floats (T2), and in 8 bits where they fit (T2B); where none fits both rest on the same runs.
     """
     if is_estimate(case, step):
-        return dict.fromkeys(step.writes, NO_BUDGET)
-    steps = {name: byte_step(case, name, known[name]) if in_bytes else 0.0 for name in (*step.reads, *step.writes)}
+        return dict.fromkeys(step.writes, NO_BUDGET), dict.fromkeys(step.writes, NO_BUDGET)
+    steps = {name: byte_step(case, name, known[name]) for name in (*step.reads, *step.writes)}
+    large = {name: _large(case, name, known[name]) for name in step.writes}
 
-    def change(name: str, array: Array, random: np.random.Generator) -> Array:
-        if steps[name]:
+    def run(number: int, in_bytes: bool) -> dict[str, Array]:
+        def change(name: str, array: Array, random: np.random.Generator) -> Array:
+            if not (in_bytes and steps[name]):
+                return _rounded_at_random(name, array, random, HALF_ROUNDING / CHANGE)
             stored_near = steps[name] * np.floor(array / steps[name] + random.uniform(0.0, 1.0, array.shape))
             return np.asarray(np.where(array < 1.0, np.minimum(stored_near, BELOW_1), stored_near))
-        return _rounded_at_random(name, array, random, HALF_ROUNDING / CHANGE)
 
-    def stored_run(number: int) -> dict[str, Array]:
-        return {name: _to_bytes(array, steps[name]) if steps[name] else _to_half(array)
+        return {name: _to_bytes(array, steps[name]) if in_bytes and steps[name] else _to_half(array)
                 for name, array in _run(step, _changed(step, known, seed, change, number)).items()}
 
-    def measures(name: str) -> Measures:
-        large = _large(case, name, known[name])
-        rounding = 0.5 * steps[name] / large if steps[name] and large else HALF_ROUNDING
-        return Measures(known[name], rounding, large, DECIDED_IN_BYTES if in_bytes else DECIDED)
-
-    return _budgets({name: measures(name) for name in step.writes}, stored_run)
+    half_run = functools.cache(functools.partial(run, in_bytes=False))
+    byte_run = functools.partial(run, in_bytes=True) if any(steps.values()) else half_run
+    rounding = {name: 0.5 * steps[name] / large[name] if steps[name] and large[name] else HALF_ROUNDING
+                for name in step.writes}
+    halves, in_bytes = ({name: Measures(known[name], share[name], large[name], decided) for name in step.writes}
+                        for share, decided in ((dict.fromkeys(step.writes, HALF_ROUNDING), DECIDED),
+                                               (rounding, DECIDED_IN_BYTES)))
+    return _budgets(halves, half_run), _budgets(in_bytes, byte_run)
 
 
 def byte_step(case: Case, name: str, array: Array) -> float:
@@ -195,7 +199,7 @@ def _large(case: Case, name: str, expected: Array) -> float:
 def _bound(expected: Array, runs: list[Array], large: float) -> Bound:
     if any(run.shape != expected.shape for run in runs):
         return Bound(np.zeros(expected.shape, np.float32), np.ones(expected.shape, np.bool_))
-    off = np.max([distance(run, expected) for run in runs], axis=0, initial=0.0)
+    off = distance(np.stack(runs), expected).max(axis=0, initial=0.0)
     if expected.dtype.kind != "f":
         return Bound(np.zeros(expected.shape, np.float32), off > 0)
     magnitude = np.where(np.isfinite(expected), np.abs(expected), 0.0).astype(np.float64)
@@ -238,14 +242,15 @@ def _budget(measures: Measures, runs: list[Array]) -> Budget:
     if not same or expected.size == 0:
         return Budget(0.0, large, 1.0 if expected.size else 0.0)
     if expected.dtype.kind != "f":
-        budget = Budget(0.0, 0.0, 0.0)
+        budget, beyond = Budget(0.0, 0.0, 0.0), _beyond(expected, same, Budget(0.0, 0.0, 0.0))
     else:
         if not large:  # nothing but 0 is expected: what a run has instead is rounding
             large = max(large_value(run) for run in same) / rounding if not expected.any() else 0.0
         share = _shares(expected, same, large)
         usual = share[share < decided]
         budget = Budget(SAFETY * (rounding + (float(np.quantile(usual, USUAL)) if usual.size else 0.0)), large, 0.0)
-    worst = max(int(np.count_nonzero(one)) for one in _beyond(expected, same, budget))
+        beyond = share > budget.relative
+    worst = max(int(np.count_nonzero(one)) for one in beyond)
     if not worst and budget.relative:
         budget = budget._replace(relative=max(budget.relative, LARGEST * float(usual.max(initial=0.0))))
     return budget._replace(outliers=_allowed(worst, expected.size))
@@ -264,7 +269,7 @@ def _masked(measures: Measures, budget: Budget, runs: list[Array]) -> Budget:
 
 def _shares(expected: Array, runs: list[Array], large: float) -> Array:
     """Return how far runs are off, beside an element and the array's large values."""
-    off = np.array([distance(run, expected) for run in runs])
+    off = distance(np.stack(runs), expected)
     size = np.where(np.isfinite(expected), np.abs(expected), 0.0).astype(np.float64) + large
     return np.asarray(np.divide(off, size, out=np.where(off > 0, np.inf, 0.0), where=size > 0))
 

@@ -316,7 +316,10 @@ def _judged(port: Port, name: str, got: Got, tier: str) -> Judged:
         other = judged if array is None else _of_array(port, name, {**got.arrays, name: array}, tier)
         if array is not None and other.verdict.verdict != "out":
             judged, got.arrays[name], got.read[name] = other, array, IN_ORDER
-    more = {"read": got.read[name]} if name in got.read else {}
+    more: dict[str, Any] = {"read": got.read[name]} if name in got.read else {}
+    if name in port.loose and judged.verdict.verdict in WRONG:
+        return Judged(judged.verdict.model_copy(update={
+            **more, "verdict": "not-judged", "said": "made from a list without lights whose flux is stored as 0"}))
     if judged.verdict.verdict == "out" and _may_be_buffer(port, name, got.arrays[name]):
         more["said"] = "a depth buffer? --depth says how it is stored"
     return judged._replace(verdict=judged.verdict.model_copy(update=more))

@@ -4,6 +4,7 @@ Of a scene, its lamps and views, which no stage makes, `INPUTS` says it.
 """
 
 import ast
+import functools
 import inspect
 import re
 import sys
@@ -52,6 +53,7 @@ def returned(function: Callable[..., Any]) -> dict[str, Told]:
     return entries(function, RETURNED)
 
 
+@functools.cache
 def entries(thing: Any, form: re.Pattern[str]) -> dict[str, Told]:
     """Return what the lines of one form in a stage's docstring, or the list in a module's, say below its first line."""
     text = re.split(r"\n\w+\n--", (inspect.getdoc(thing) or "").partition("\n")[2])[0]

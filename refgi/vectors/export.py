@@ -4,18 +4,21 @@ A kit is written to a folder beside its own and renamed when it is whole. Its by
 the last bit on the platform's libm where a stage uses it.
 """
 
+import functools
 import hashlib
 import io
 import math
 import secrets
 import shutil
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 
 from refgi.errors import InputError, expect
+from refgi.jit import threads
 from refgi.types import Array
 from refgi.vectors.bounds import Bound, Budget, chained_budgets, distance, isolated_bounds, stored_budgets
 from refgi.vectors.cases import kit_cases
@@ -38,7 +41,8 @@ from refgi.vectors.manifest import (
     schema_text,
     text_of,
 )
-from refgi.vectors.spec import Arrays, Bug, Case, Stage, expected_of, kind_of, outputs_of, stored
+from refgi.vectors.rows import sharing
+from refgi.vectors.spec import Arrays, Bug, Case, Stage, as_read, expected_of, kind_of, stored
 from refgi.vectors.standalone import is_plain, standalone_text, write_scene
 from refgi.vectors.wiring import ANOTHER, wirings
 
@@ -79,7 +83,8 @@ def export_kit(kit: str, out: Path, tell: Tell = lambda _, __: None, only: str |
     """
     cases = {name: make for name, make in kit_cases(kit).items() if only is None or name.startswith(only)}
     expect(bool(cases), "case", f"the start of one of {', '.join(kit_cases(kit))}", only)
-    return _write_kit(kit, cases, out, tell, whole=only is None)
+    with threads(1):  # pictures of a few hundred pixels are done before a second thread has woken
+        return _write_kit(kit, cases, out, tell, whole=only is None)
 
 
 def export_case(case: Case, out: Path, tell: Tell = lambda _, __: None, most: float = math.inf) -> KitManifest:
@@ -171,10 +176,13 @@ class _Told:
             f"../{known.relative_to(home.parent).as_posix()}")
 
     def wiring(self, method: str, stage: str, cause: str) -> bool:
-        """Return whether a wrong wiring is to be tried in a further case, and count it."""
+        """Return whether a wrong wiring is to be tried in a further case."""
+        return self._wirings.get(_wiring_key(method, stage, cause), 0) < WIRING_TRIED
+
+    def tried(self, method: str, stage: str, cause: str) -> None:
+        """Count a case in which a wrong wiring is tried."""
         key = _wiring_key(method, stage, cause)
         self._wirings[key] = self._wirings.get(key, 0) + 1
-        return self._wirings[key] <= WIRING_TRIED
 
     def wired(self, method: str, stage: str, cause: str) -> None:
         """Mark a wrong wiring that a case tells."""
@@ -220,20 +228,21 @@ def write_case(case: Case, folder: Path, told: _Told, tell: Tell) -> CaseManifes
     for number, step in enumerate(case.stages):
         tell(step.name, number / len(case.stages))
         bounds = isolated_bounds(case, step, known, SEED)
-        halves, in_bytes = (stored_budgets(case, step, known, SEED, in_bytes=bytes_) for bytes_ in (False, True))
+        halves, in_bytes = stored_budgets(case, step, known, SEED)
         for name in step.writes:
             entry = _entry(case, name, known[name], _save(home, f"out/{name}.npy", known[name]))
             arrays[name] = entry.model_copy(update=_tolerances(home, name, entry, bounds[name], {
                 "chained": chained[name], "half": halves[name], "bytes": in_bytes[name],
                 "chained_half": chained_half[name]}, told))
-        for bug in step.bugs:
-            if not told.enough(case.method, step.name, bug.cause):
-                blind = _keep_bug(bugs, step, known, bounds, bug)
-                told.add(case.method, step.name, bug.cause, not blind)
-        for bug in wirings(case, step, known):
-            if told.wiring(case.method, step.name, bug.cause) and not _keep_bug(bugs, step, known, bounds, bug,
-                                                                                wired=True):
-                told.wired(case.method, step.name, bug.cause)
+        right = _Right(step, as_read(known, step.reads, np.float64), known, bounds)
+        with sharing():
+            for bug in step.bugs:
+                if not told.enough(case.method, step.name, bug.cause):
+                    told.add(case.method, step.name, bug.cause, not _keep_bug(bugs, right, bug))
+            for bug in wirings(case, step, known, functools.partial(told.wiring, case.method, step.name)):
+                told.tried(case.method, step.name, bug.cause)
+                if not _keep_bug(bugs, right, bug, wired=True):
+                    told.wired(case.method, step.name, bug.cause)
         stages.append(StageEntry(name=step.name, what=step.what, paper=step.paper, reads=step.reads,
                                  writes=step.writes, exact=step.exact))
     content = bugs.content()
@@ -274,16 +283,26 @@ def _tolerances(
     return more
 
 
-def _keep_bug(
-    bugs: BugWriter, step: Stage, known: Arrays, bounds: Mapping[str, Bound], bug: Bug, *, wired: bool = False
-) -> bool:
+@dataclass(frozen=True)
+class _Right:
+    """A stage without a bug: what it reads in float64, all arrays of its case, its bounds."""
+
+    step: Stage
+    read: Arrays
+    known: Arrays
+    bounds: Mapping[str, Bound]
+
+
+def _keep_bug(bugs: BugWriter, right: _Right, bug: Bug, *, wired: bool = False) -> bool:
     """Run a stage with a likely bug and keep elements that tell it; return whether none does.
 
     `wired`: a wrong wiring, of which fewer elements are kept, and none where none tells it, or a few numbers alone,
     which nearly any array can lead to.
     """
+    step, known, bounds = right.step, right.known, right.bounds
     try:
-        made = outputs_of(step, known, np.float64, bug.run)
+        made = bug.run(dict(right.read), np.float64)
+        made = {name: stored(made[name]) for name in step.writes}
     except Exception:  # whatever a wrong buffer leads to: it is seen at once
         if wired:
             return True
@@ -295,8 +314,11 @@ def _keep_bug(
         if array.shape != expected.shape:
             blind = False
             continue
+        elements += array.size
+        if np.array_equal(array, expected):
+            continue
         off = (distance(array, expected) > bounds[name].limit) & ~bounds[name].masked
-        elements, differing = elements + off.size, differing + int(np.count_nonzero(off))
+        differing += int(np.count_nonzero(off))
         if off.any():
             blind = False
             places = np.concatenate([_spread(np.flatnonzero(one), count) for one, count in zip((off, ~off), counts,
@@ -314,7 +336,12 @@ def _spread(indices: Array, count: int) -> Array:
     """Return at most so many of some indices, evenly spread."""
     if len(indices) <= count:
         return indices
-    return np.asarray(indices[np.linspace(0, len(indices) - 1, count).astype(np.int64)])
+    return np.asarray(indices[_evenly(len(indices), count)])
+
+
+@functools.cache
+def _evenly(size: int, count: int) -> Array:
+    return np.linspace(0, size - 1, count).astype(np.int64)
 
 
 def _save(home: Path, file: str, array: Array) -> tuple[str, str]:

@@ -260,6 +260,8 @@ class BugWriter:
         self._index: dict[str, list[BugEntry]] = {}
         self._places: list[Array] = []
         self._bits: list[Array] = []
+        self._values: list[Array] = []
+        self._limits: list[Array] = []  # bounds of floats, 0 of other numbers
         self._count = 0
 
     def add(
@@ -271,8 +273,10 @@ class BugWriter:
         for name, (places, values) in told.items():
             pieces[name] = Piece(start=self._count, count=len(places))
             self._places.append(places)
-            bits = _words(values) ^ _words(expected[name].reshape(-1)[places])
-            self._bits.append(bits & _seen(values, limits[name].reshape(-1)[places]))
+            self._bits.append(_words(values) ^ _words(expected[name].reshape(-1)[places]))
+            floats = values.dtype.kind == "f"
+            self._values.append(values if floats else np.zeros(len(places), np.float32))
+            self._limits.append(limits[name].reshape(-1)[places] if floats else np.zeros(len(places), np.float32))
             self._count += len(places)
         self._index.setdefault(stage, []).append(entry.model_copy(update={"arrays": pieces}))
 
@@ -282,8 +286,10 @@ class BugWriter:
                  for stage, entries in self._index.items()}
         text = np.frombuffer(json.dumps(index, ensure_ascii=False).encode(), np.uint8)
         stream = io.BytesIO()
-        places, bits = (np.concatenate([np.zeros(0, np.int64), *parts]) for parts in (self._places, self._bits))
-        np.savez_compressed(stream, index=text, places=_planes(np.diff(places, prepend=0)), bits=_planes(bits))
+        places, bits, values, limits = (np.concatenate([np.zeros(0, kind), *parts]) for kind, parts in (
+            (np.int64, self._places), (np.uint32, self._bits), (np.float32, self._values), (np.float32, self._limits)))
+        np.savez_compressed(stream, index=text, places=_planes(np.diff(places, prepend=0)),
+                            bits=_planes(bits & _seen(values, limits)))
         return stream.getvalue()
 
 
@@ -314,9 +320,7 @@ class Bugs:
 
 
 def _seen(values: Array, limit: Array) -> Array:
-    """Return which bits of floats move them by more than `UNSEEN` of their bounds; all of other numbers."""
-    if values.dtype.kind != "f":
-        return np.full(values.shape, 0xFFFFFFFF, np.uint32)
+    """Return which bits of floats move them by more than `UNSEEN` of their bounds; all where those are 0."""
     with np.errstate(all="ignore"):  # what a bug makes may be any number
         unseen = np.floor(np.log2(UNSEEN * limit / np.spacing(np.abs(values)).astype(np.float64)))
     unseen = np.where(np.isfinite(unseen), np.clip(unseen, 0, MANTISSA), 0).astype(np.uint32)

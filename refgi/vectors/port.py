@@ -2,7 +2,8 @@
 
 Texels become planes, stored depth becomes m, lists get the kit's order. An array in few bits may be a step of its
 format off; a stage that reads it may change by what a rounding of its inputs to half floats changes it by (tier T2),
-times the ratio of both roundings.
+times the ratio of both roundings. A light whose flux is stored as 0 may be absent from a list that is made of it: the
+expected one stands for it, and what a chain makes of such a list is not judged where it is out.
 """
 
 from pathlib import Path
@@ -14,7 +15,19 @@ from refgi.types import Array
 from refgi.vectors.bounds import HALF_ROUNDING, SAFETY, large_value
 from refgi.vectors.kit import Asked, DamagedError, Kit, find_array, fits, read_array
 from refgi.vectors.manifest import CaseManifest, StageEntry, Tolerance
-from refgi.vectors.storage import PACKED, PACKED_ROUNDING, can_pack, order_of, packed_steps, planes_of, reordered
+from refgi.vectors.spec import axes_of
+from refgi.vectors.storage import (
+    LEAST_HALF,
+    PACKED,
+    PACKED_ROUNDING,
+    can_pack,
+    component_axis,
+    list_axis,
+    order_of,
+    packed_steps,
+    planes_of,
+    reordered,
+)
 
 IN_ORDER = "its elements matched with those of the kit, as --unordered says"
 
@@ -41,6 +54,9 @@ class Port:
         self.kit, self.case, self.output, self.asked = kit, case, output, asked
         self.few: dict[str, Few] = {}  # arrays that storage moves
         self.halved: set[str] = set()  # chained: arrays in half floats, and those made from them
+        self.loose: set[str] = set()  # chained: arrays made from lists without the lights whose flux is stored as 0
+        self._filled: set[str] = set()  # such lists
+        self._dark: dict[str, int] = {}  # texels and lights whose flux storage may round to 0, by the flux's name
         self._rounding: dict[str, float] = {}  # of arrays in few bits, relative
         self._orders: dict[str, dict[str, tuple[Array, str]]] = {}  # array -> axis of a list -> its order, its stage
 
@@ -55,6 +71,7 @@ class Port:
                 got.arrays[name] = self._in_form(name, read_array(file), got)
             except DamagedError as error:
                 got.damaged[name] = str(error)
+        self._fill(step, got)
         orders = {axis: order for name in step.reads for axis, order in self._orders.get(name, {}).items()}
         if self.asked.unordered and fits(step.name, self.asked.unordered):
             expected = {name: self.kit.array(self.case, name) for name in step.writes}
@@ -71,6 +88,34 @@ class Port:
                 got.arrays[name] = own
                 got.read[name] = f"{got.read[name]}; {IN_ORDER}" if name in got.read else IN_ORDER
         return got
+
+    def _fill(self, step: StageEntry, got: Got) -> None:
+        """Put the darkest of a list's expected lights where a port has none, as many as storage may round to 0."""
+        if self.asked.chained and (self._filled | self.loose) & {*step.reads}:
+            self.loose.update(step.writes)
+        axis, dark = list_axis(self.case, step), sum(self._dark.get(name, 0) for name in step.reads)
+        if axis and dark:
+            expected = {name: self.kit.array(self.case, name) for name in step.writes}
+            along = {name: axes_of(self.case.arrays[name].axes).index(axis) for name in got.arrays}
+            lacking = {_fewer(expected[name].shape, got.arrays[name].shape, k) for name, k in along.items()}
+            flux = [np.moveaxis(expected[name], along[name], -1) for name in along if self._is_flux(name)]
+            if flux and len(lacking) == 1 and 0 < (count := lacking.pop()) <= dark:
+                brightness = sum(one.reshape(-1, one.shape[-1]).sum(axis=0) for one in flux)
+                places = np.sort(np.argsort(brightness, kind="stable")[:count])
+                for name, k in along.items():
+                    got.arrays[name] = np.insert(got.arrays[name], places - np.arange(count),
+                                                 np.take(expected[name], places, k), k)
+                    got.read[name] = f"without {count} whose flux is stored as 0"
+                self._filled.update(step.writes)
+        for name in filter(self._is_flux, step.writes):
+            tier, entry, right = self.asked.tier_of(step.name, name), self.case.arrays[name], self.kit.array(
+                self.case, name)
+            steps = packed_steps(tier, entry, right) if tier in PACKED else LEAST_HALF if tier == "T2" else 0.0
+            off = ((right < steps).all(axis=(k := component_axis(entry) or 0))) & (right > 0).any(axis=k)
+            self._dark[name] = int(np.count_nonzero(off))
+
+    def _is_flux(self, name: str) -> bool:
+        return self.case.arrays[name].unit == "W" and can_pack(self.case.arrays[name])
 
     def note_storage(self, step: StageEntry) -> None:
         """Note what storage in few bits does to a stage's arrays."""
@@ -122,3 +167,9 @@ class Port:
         if said:
             got.read[name] = said
         return array
+
+
+def _fewer(expected: tuple[int, ...], got: tuple[int, ...], axis: int) -> int:
+    """Return how many elements fewer there are along an axis; 0 where shapes differ otherwise."""
+    alike = len(got) == len(expected) and (*got[:axis], *got[axis + 1 :]) == (*expected[:axis], *expected[axis + 1 :])
+    return expected[axis] - got[axis] if alike else 0

@@ -276,8 +276,9 @@ def rebuilt(value: Any, name: str, handed: Callable[[str, Array], Array], real: 
     """Return a value with other arrays: what `handed` returns for each one's name and the array that was there."""
     if isinstance(value, np.ndarray):
         return handed(name, value) if value.dtype.kind in "fiub" else value
-    parts = {field: rebuilt(part, f"{name}.{field}", handed, real) for field, part in _parts(value)}
-    if not any(True for _ in leaves(value)):
+    before = dict(_parts(value))
+    parts = {field: rebuilt(part, f"{name}.{field}", handed, real) for field, part in before.items()}
+    if all(parts[field] is part for field, part in before.items()):
         return value
     if hasattr(value, "recorded"):
         return value.with_channels(parts, np.dtype(real))

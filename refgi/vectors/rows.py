@@ -13,10 +13,14 @@ that take a wrong one.
 import ast
 import dataclasses
 import functools
+import hashlib
 import inspect
+import time
 import types
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from importlib import resources
 from typing import Any, NamedTuple
@@ -69,22 +73,91 @@ def compiled(
         for name, value in one.__globals__.items():
             if scope.setdefault(name, value) is not value and name in one.__code__.co_names:
                 raise StaleEditError(f"{what}: two functions that {_name(function)} runs know another {name}")
-    for one, text in _reached(parts).items():
+    reached = _reached(called_by(function)[0], parts)
+    scope |= {one.__name__: _shared(one) for one in parts if one not in reached and scope.get(one.__name__) is one}
+    for one, text in reached.items():
+        program = _known_program if isinstance(text, str) else _program
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", SyntaxWarning)  # of a change, such as a number that is called
-                exec(compile(text, one.__code__.co_filename, "exec"), scope)
+            exec(program(text, one.__code__.co_filename), scope)
         except SyntaxError as error:
             raise StaleEditError(f"{_name(one)}: {what}: no program is left: {error}") from error
     return scope[function.__name__]  # type: ignore[no-any-return]
 
 
-def _reached(parts: Mapping[Function, str | ast.Module]) -> dict[Function, str | ast.Module]:
-    """Return the texts that differ, and of functions that call those; others stay as they are, caches too."""
-    reached = {one for one, text in parts.items() if text != code_of(one)}
+def _program(text: str | ast.Module, file: str) -> types.CodeType:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SyntaxWarning)  # of a change, such as a number that is called
+        return compile(text, file, "exec")
+
+
+_known_program = functools.cache(_program)
+
+
+def _reached(function: Function, parts: Mapping[Function, str | ast.Module]) -> dict[Function, str | ast.Module]:
+    """Return the texts of a function, of those that differ, and of functions that call those; others keep caches."""
+    reached = {one for one, text in parts.items() if text != code_of(one)} | {function}
     while above := {one for one in parts if one not in reached and not reached.isdisjoint(_literal_names(one))}:
         reached |= above
     return {one: text for one, text in parts.items() if one in reached}
+
+
+_results: ContextVar[dict[bytes, Any] | None] = ContextVar("refgi_literal_results", default=None)
+WORTH = 2e-4  # s that a literal function takes, on average, from which on its results are kept
+TRIALS = 4  # of which that is seen
+
+
+@contextmanager
+def sharing() -> Iterator[None]:
+    """Let edited functions inside the block share what unedited ones that they call return for equal arguments."""
+    token = _results.set({})
+    try:
+        yield
+    finally:
+        _results.reset(token)
+
+
+@functools.cache
+def _shared(function: Function) -> Callable[..., Any]:
+    """Return a function that gives copies of what it returned before, inside `sharing`, if it is slow."""
+    taken: list[float] = []
+
+    @functools.wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        results = _results.get()
+        if results is None or (len(taken) >= TRIALS and sum(taken) < WORTH * len(taken)):
+            return function(*args, **kwargs)
+        total = hashlib.blake2b(_name(function).encode(), digest_size=20)
+        if not _hashed(total, (args, sorted(kwargs.items()))):
+            return function(*args, **kwargs)
+        key = total.digest()
+        if key not in results:
+            begun = time.perf_counter()
+            made = function(*args, **kwargs)
+            taken.append(time.perf_counter() - begun)
+            results[key] = _copied(made)
+            return made
+        return _copied(results[key])
+
+    return call
+
+
+def _hashed(total: Any, value: Any) -> bool:
+    """Add a value to a hash, arrays with how they lie in memory; return whether its kind is known."""
+    if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
+        total.update(f"{value.dtype.str}{value.shape}{value.strides}".encode())
+        total.update(np.ascontiguousarray(value))
+        return True
+    if isinstance(value, list | tuple):
+        total.update(f"{type(value).__name__}{len(value)}".encode())
+        return all(_hashed(total, one) for one in value)
+    total.update(f"{type(value).__name__}{value!r};".encode())
+    return value is None or isinstance(value, bool | int | float | str | np.generic)
+
+
+def _copied(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.copy(order="K")
+    return type(value)(map(_copied, value)) if type(value) in (list, tuple) else value
 
 
 @functools.cache
@@ -167,6 +240,10 @@ class Form:
         made = function(**read, **self.numbers)
         made = dict(zip(self.writes, made if isinstance(made, list | tuple) else (made,), strict=True))
         return made | {name: arrays[array] for name, array in self.kept.items()}
+
+    def sharing(self) -> "Form":
+        """Return the form with a function that shares what those that it calls return."""
+        return dataclasses.replace(self, function=edited(self.function, ()))
 
     def named(self, reads: Mapping[str, str], writes: Mapping[str, str]) -> "Form":
         """Return the form by the names that a case has for its arrays."""

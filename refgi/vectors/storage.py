@@ -25,6 +25,7 @@ LAYOUTS = ("planes", "rgba")
 PACKED = {"R11G11B10F": (6, 6, 5), "RGB9E5": (9, 9, 9)}  # bits of each component's mantissa
 PACKED_ROUNDING = {"R11G11B10F": 2.0**-6, "RGB9E5": 2.0**-9}  # relative, of the coarsest and of the largest component
 LARGEST_EXPONENT, LEAST_EXPONENT = 15, -14  # of R11G11B10F: 5 bits, bias 15; below LEAST_EXPONENT steps stay the same
+LEAST_HALF = 2.0**-24  # step of half floats below 2^-14
 LEAST_SHARED = -15  # of RGB9E5, whose mantissas have no hidden 1: numbers are mantissa 2^(exponent - 9)
 ROUNDED_UP = 512 / 511.5  # from 511.5 / 512 on the largest component is rounded to the next power of two
 ENCODINGS = ("linear", "ndc", "gl", "reversed")

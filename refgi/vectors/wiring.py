@@ -25,43 +25,52 @@ from refgi.vectors.spec import Arrays, Bug, Case, Run, Stage, axes_of, kind_of
 
 Layout = Callable[[Array], Array]
 Fits = Callable[[str, Array], bool]  # whether a stage runs with an array in the place of an input
+Left = Callable[[str], bool]  # whether a cause is still to be told
 ANOTHER = "that of another lamp, level or round"
 NUMBER = re.compile(r"\d+(?=(\.[a-z_]\w*)*$)")  # of a lamp, level or round in the name of an array
 
 
-def wirings(case: Case, step: Stage, known: Arrays) -> Iterator[Bug]:
-    """Yield the wrong wirings of a stage, each cause once; the bug runs its literal form, or the stage itself."""
+def wirings(
+    case: Case, step: Stage, known: Arrays, wanted: Callable[[str], bool] = lambda _: True
+) -> Iterator[Bug]:
+    """Yield the wrong wirings of a stage whose causes are `wanted`, each once.
+
+    The bug runs the stage's literal form, or the stage itself.
+    """
     if is_estimate(case, step) or NO_BUGS in case.facts.get(step.name, {}):
         return
     form = next((one for one in step.variants if isinstance(one, Form)), None)
-    run = step.run if form is None else form  # NumPy says where an index is none, a kernel reads what lies there
+    run = step.run if form is None else form.sharing()  # NumPy says where an index is none, a kernel reads beyond
     several = {kind for kind, count in Counter(map(kind_of, step.reads)).items() if count > 1}
     told = set()
 
     def fits(name: str, wrong: Array) -> bool:
         return _fits(known[name], wrong, decides=form is None and name in step.exact)
 
-    for cause, wrong in chain(_one_by_one(case, step, known, fits, several), _together(case, step, known, fits)):
-        if cause not in told:
-            told.add(cause)
-            yield Bug(cause, partial(_bound_to, run, wrong))
+    def left(cause: str) -> bool:
+        return cause not in told and wanted(cause)
+
+    for cause, wrong in chain(_one_by_one(case, step, known, fits, left, several),
+                              _together(case, step, known, fits, left)):
+        told.add(cause)
+        yield Bug(cause, partial(_bound_to, run, wrong))
     for name in step.reads:
         if _is_pictures(case, name, known[name]) and (cause := f"{kind_of(name)} {PIXEL_BY_PIXEL}") not in told:
             told.add(cause)
             yield Bug(cause, partial(_laid_out, run, name, lambda a: _read_in_steps(a, len(a))))
         for said, layout in LAYOUTS.items():
             cause = f"{kind_of(name)} {said}"
-            if _is_planes(case, name, known[name]) and name not in step.exact and cause not in told:
+            if left(cause) and _is_planes(case, name, known[name]) and name not in step.exact:
                 told.add(cause)
                 yield Bug(cause, partial(_laid_out, run, name, layout))
 
 
 def _one_by_one(
-    case: Case, step: Stage, known: Arrays, fits: Fits, several: set[str]
+    case: Case, step: Stage, known: Arrays, fits: Fits, left: Left, several: set[str]
 ) -> Iterator[tuple[str, Arrays]]:
     """Yield causes, and the array that takes an input's place: first its kind, also what is made later; then its field.
 
-    Of kinds that the stage reads `several` of, causes say which.
+    Of kinds that the stage reads `several` of, causes say which. Those that are not `left` to tell are passed over.
     """
     at = case.stages.index(step)
     before = [*case.given, *(name for one in case.stages[:at] for name in one.writes)]
@@ -74,11 +83,11 @@ def _one_by_one(
             read = [known[other]] if _leaf(other) != _leaf(name) else _read_by(known[other], known[name].shape)
             cause = f"{name} is bound to {other}" if kind in several and other in alike else _cause(name, other)
             for wrong, how in zip(read, ("", ", by its index"), strict=False):
-                if fits(name, wrong):
+                if left(cause + how) and fits(name, wrong):
                     yield cause + how, {name: wrong}
 
 
-def _together(case: Case, step: Stage, known: Arrays, fits: Fits) -> Iterator[tuple[str, Arrays]]:
+def _together(case: Case, step: Stage, known: Arrays, fits: Fits, left: Left) -> Iterator[tuple[str, Arrays]]:
     """Yield causes, and the arrays that take the places of several inputs at once."""
     groups: dict[str, dict[str, list[str]]] = {}
     for name in step.reads:
@@ -99,6 +108,8 @@ def _together(case: Case, step: Stage, known: Arrays, fits: Fits) -> Iterator[tu
                   for names in fields.values() if len(names) > 2]
     wrong += _of_another(step, known)
     for cause, taken in wrong:
+        if not left(cause):
+            continue
         differing = {name: other for name, other in taken.items()
                      if other in known and not np.array_equal(known[name], known[other])}
         if {*taken.values()} <= known.keys() and differing and all(

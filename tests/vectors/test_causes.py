@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from refgi.vectors.causes import SEEN
+from refgi.vectors.causes import SEEN, Difference, explained
 from refgi.vectors.kit import Asked
 from tests.vectors.port import Port
 
@@ -164,3 +164,14 @@ def test_noise_has_no_cause(kit, tmp_path):
     (only,) = port.first().causes
     assert only.cause.startswith("no known cause fits; ")
     assert only.share == 0.0
+
+
+@pytest.mark.parametrize(("told", "wrong", "share"), [(10, 0, 1.0), (20, 0, 0.5), (5, 0, 0.5), (10, 3, 0.7)])
+def test_a_hypothesis_is_as_good_as_its_weaker_side(told, wrong, share):
+    """Ten of a thousand elements are doubled, `wrong` of these threefold; the hypothesis doubles the first `told`."""
+    expected = np.arange(1, 1001, dtype=np.float64)
+    ranks = np.arange(1000)
+    got = expected * np.where(ranks < 10 - wrong, 2, np.where(ranks < 10, 3, 1))
+    difference = Difference("x", None, expected, got, ranks < 10, np.full(1000, 1e-3))
+    predicted = np.where(ranks < told, 2, 1) * expected
+    assert explained(difference, predicted) == pytest.approx(share)

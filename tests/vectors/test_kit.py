@@ -13,7 +13,7 @@ from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.splat import SiiSettings, sii
 from refgi.vectors import export
-from refgi.vectors.bounds import isolated_bounds
+from refgi.vectors.bounds import isolated_bounds, stored_budgets
 from refgi.vectors.cases import kit_cases
 from refgi.vectors.cases.scenes import SPOT, room
 from refgi.vectors.check import Asked, Kit, check_output
@@ -189,6 +189,33 @@ def test_what_rounding_flips_is_masked_and_nothing_else():
     bound = isolated_bounds(case, case.stages[0], expected_of(case), 0)["x.out"]
     assert bound.masked.tolist() == [False, True, True, False]
     assert 2**-23 < bound.limit[3] < 2**-18  # of 2: 1 to 32 roundings
+
+
+def test_a_large_number_is_masked_by_its_own_size():
+    """Beside ones, 10^4 whose rounding is magnified a thousandfold moves by 1: much for them, little for itself."""
+    recipe = Recipe("x-large", "x", "one large number")
+    recipe.give("x.in", np.ones(100), Spec("number", "1", "numbers"))
+    recipe.add("x", "magnified", lambda arrays, _: {"x.out": np.where(
+        np.arange(100) == 17, 1e4 * (1 + 1e3 * (arrays["x.in"] - 1)), arrays["x.in"])}, ("x.in",), {
+            "x.out": Spec("number", "1", "numbers")})
+    case = recipe.case()
+    bound = isolated_bounds(case, case.stages[0], expected_of(case), 0)["x.out"]
+    assert not bound.masked.any()
+    assert 0.1 < bound.limit[17] < 10
+    assert bound.limit[16] < 1e-5
+
+
+def test_four_times_the_outliers_of_the_worst_run_are_allowed():
+    """One number of a hundred lies where a change of half floats decides: one is out in a run, or none."""
+    recipe, numbers = Recipe("x-cut", "x", "a decision"), np.linspace(2, 3, 100)
+    numbers[17] = 1.0
+    recipe.give("x.in", numbers, Spec("number", "1", "numbers"))
+    recipe.add("x", "what is above 1", lambda arrays, _: {"x.out": arrays["x.in"] > 1}, ("x.in",), {
+        "x.out": Spec("number", "1", "whether")})
+    case = recipe.case()
+    for budgets in stored_budgets(case, case.stages[0], expected_of(case), 0):
+        assert budgets["x.out"].outliers == pytest.approx(0.04)
+        assert budgets["x.out"].masked is None
 
 
 def test_manifests_speak_plainly(kit):

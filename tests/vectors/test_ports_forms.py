@@ -92,6 +92,48 @@ def test_a_stage_that_reads_packed_floats_may_change_as_they_do(port, chained):
     assert port.check(tiers=tiers).first == ("sii-warp-a", "lights.footprints")
 
 
+def test_a_chain_passes_on_what_packed_floats_move(port):
+    """A map that is cut, 0.5 % of its lights and of their sum: isolated that has read the kit's lights."""
+    port.write("rsm.reflected_flux0.flux", to_r11g11b10f(port.arrays["rsm.reflected_flux0.flux"].astype(float)))
+    for name in ("lights.pixel_lights.flux", "pairs.sum"):
+        port.write(name, 0.995 * port.arrays[name])
+    tiers = {"rsm.reflected_flux0.flux": "R11G11B10F"}
+    assert port.check(chained=True, tiers=tiers).exit_code == ALL_WITHIN
+    assert port.check(tiers=tiers).first == ("sii-warp-a", "pairs.sum")
+
+
+def test_a_light_whose_flux_is_stored_as_0_may_be_absent(kit, tmp_path):
+    """One below the least number of the format is none; what a chain makes of the rest goes another way."""
+    port, tiers = Port(kit, "val-csm", tmp_path), {"flux": "R11G11B10F"}
+    maps = [to_r11g11b10f(port.arrays[f"rsm.reflected_flux{k}.flux"].astype(float)) for k in (0, 1)]
+    for k, packed in enumerate(maps):
+        port.write(f"rsm.reflected_flux{k}.flux", packed)
+    own, texel, index = (port.arrays[f"lights.pixel_lights.{key}"] for key in ("flux", "texel", "map_index"))
+    dark = np.array([not maps[k].reshape(3, -1)[:, at].any() for at, k in zip(texel, index, strict=True)])
+    assert 0 < dark.sum() < 4
+
+    def without(lights):
+        for name, array in port.arrays.items():
+            if name.startswith("lights.pixel_lights.") or name in ("lights.footprints", "cluster.kmeans_assign0.of"):
+                port.write(name, array[..., ~lights])
+
+    def verdicts(**asked):
+        return {one.stage: one.verdict for one in port.check(chained=True, **asked).stages}
+
+    without(dark)
+    assert verdicts()["lights.pixel_lights"] == "invalid"
+    found = verdicts(tiers=tiers)
+    assert (found["lights.pixel_lights"], found["cluster.kmeans_assign0"]) == ("exact", "not-judged")
+    assert port.check(chained=True, tiers=tiers).exit_code == ALL_WITHIN
+    without(np.arange(dark.size) == own.sum(axis=0).argmax())
+    assert verdicts(tiers=tiers)["lights.pixel_lights"] == "out"
+    without(dark | (np.arange(dark.size) % 2 == 0))
+    assert verdicts(tiers=tiers)["lights.pixel_lights"] == "invalid"
+    without(dark)
+    port.write("lights.pixel_lights.normal", np.ones((4, dark.size - 1)))
+    assert verdicts(tiers=tiers)["lights.pixel_lights"] == "invalid"
+
+
 @pytest.mark.parametrize("encoding", ["linear", "ndc", "gl", "reversed"])
 def test_stored_depth_is_judged_in_metres(port, encoding):
     near, far = 0.1, 100.0

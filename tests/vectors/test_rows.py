@@ -13,6 +13,8 @@ from refgi import literal
 from refgi.literal import pairs
 from refgi.vectors import rows
 from refgi.vectors.forms import lights as forms
+from refgi.vectors.spec import outputs_of
+from tests.vectors.made import made, stage_of
 
 MODULES = tuple(importlib.import_module(f"refgi.literal.{file.stem}")
                 for file in sorted(Path(literal.__file__).parent.glob("*.bugs")))
@@ -122,8 +124,56 @@ def test_misprints_of_importance_are_rows_of_its_kinds(kind, opened, wrong):
     known = {name: one for name, one in arrays.items() if one is not None}
     right = 5 * (max(0.05, 1 - opened) if kind == "openness" else 1)
     assert described.form(known, float)[""] == pytest.approx(right)
-    made = {bug.cause: bug.run(known, float)[""] for _, one in described.lists for bug in described.form.bugs(one)}
-    assert len(made) == len(wrong)
+    wrongly = {bug.cause: bug.run(known, float)[""] for _, one in described.lists for bug in described.form.bugs(one)}
+    assert len(wrongly) == len(wrong)
     for said, expected in wrong.items():
-        (got,) = [value for cause, value in made.items() if said in cause]
+        (got,) = [value for cause, value in wrongly.items() if said in cause]
         assert got == pytest.approx(expected), said
+
+
+@pytest.mark.parametrize("stage", ["rsm.reflected_flux0", "pairs.sum", "lights.warp0"])
+def test_what_rows_share_changes_none_of_them(stage, monkeypatch):
+    """All rows of a stage, whatever their literal functions share: to the bit what each makes by itself."""
+    monkeypatch.setattr(rows, "WORTH", 0.0)
+    known, step = made("sii-warp-a")[1], stage_of("sii-warp-a", stage)
+    runs = {bug.cause: bug.run for bug in step.bugs}
+    alone = {cause: outputs_of(step, known, np.float64, run) for cause, run in runs.items()}
+    with rows.sharing():
+        for cause, run in [*runs.items(), *reversed(runs.items())]:
+            for name, array in outputs_of(step, known, np.float64, run).items():
+                np.testing.assert_array_equal(array, alone[cause][name], err_msg=f"{cause}: {name}")
+
+
+def test_shared_are_copies_of_equal_arguments_results_alone(monkeypatch):
+    monkeypatch.setattr(rows, "WORTH", 0.0)
+    calls = []
+
+    def total(values, factor=1, how=None):
+        calls.append((factor, how))
+        return values * factor, [values.sum()]
+
+    shared, values = rows._shared(total), np.arange(6.0).reshape(2, 3)
+    shared(values)
+    shared(values)
+    assert len(calls) == 2  # outside of `sharing`
+    with rows.sharing():
+        first, rest = shared(values)
+        first += 1
+        rest.clear()
+        again, rest = shared(values.copy())
+        again += 1
+        assert len(calls) == 3
+        np.testing.assert_array_equal(shared(values)[0], values)
+        assert rest == [15.0]
+        others = (values + 1, values.astype(np.float32), values.T, np.asfortranarray(values), values.reshape(3, 2))
+        for count, other in enumerate(others, 4):
+            np.testing.assert_array_equal(shared(other)[0], other)
+            assert len(calls) == count
+        for count, other in enumerate(({"factor": 2}, {"factor": 2.0}, {"how": "2"}, {"how": object()}), 9):
+            shared(values, **other)
+            assert len(calls) == count
+        shared(values, how=object())  # of no known kind
+        assert len(calls) == 13
+    with rows.sharing():
+        shared(values)
+        assert len(calls) == 14

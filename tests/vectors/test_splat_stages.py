@@ -11,6 +11,7 @@ from refgi.pairs.settings import PairSettings
 from refgi.stages import observe
 from refgi.vectors.cases.scenes import Planned
 from refgi.vectors.recorded import leaves
+from refgi.vectors.spec import as_read
 from tests.literal.whole.pairs import contributions
 from tests.naive.crossings import LIFT, corners_of, face_normals, free
 from tests.vectors.made import (
@@ -150,3 +151,12 @@ def test_subsplats_see_what_plane_geometry_says():
     each = contributions(place, normal, lights, PairSettings(clamp=None))
     total = (each * known[seen_by.writes[0]][..., None]).sum(axis=0).T
     expect_within(RAYS, light.name, {light.writes[0]: total})
+
+
+@pytest.mark.parametrize("id", ["multires-soft", "multires-rays", "multires-lights", "multires-rate"])
+def test_likely_bugs_of_the_forms_that_the_full_kit_adds_run(id):
+    """An exporter ends at one that does not: what a list edits must be what the stage runs."""
+    known = made(id)[1]
+    for name in stages_of(id, "multires"):
+        for bug in stage_of(id, name).bugs:
+            assert bug.run(as_read(known, stage_of(id, name).reads, np.float64), np.float64), (name, bug.cause)

@@ -3,11 +3,14 @@
 import shutil
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import refgi
+from refgi import testing
 from refgi.errors import InputError
 from refgi.image import read_exr
 from refgi.testing import assert_image_close, assert_stage_close, kit_folder, stages
@@ -74,6 +77,21 @@ def test_pictures_without_noise_have_a_tolerance():
 def test_a_kit_of_ones_own_is_used(monkeypatch, tmp_path):
     monkeypatch.setenv("REFGI_KIT", str(tmp_path))
     assert kit_folder() == tmp_path
+
+
+def test_a_kit_is_made_anew_for_what_makes_it_alone(monkeypatch, tmp_path):
+    """Imports run one way: what lies above refgi.vectors changes no kit."""
+    monkeypatch.setattr(refgi, "__file__", str(tmp_path / "__init__.py"))
+    files = [tmp_path / one for one in ("vectors/cases.py", "literal/pairs.bugs", "scene/cli.py", "cli/vectors.py",
+                                        "testing.py")]
+    for file in files:
+        file.parent.mkdir(exist_ok=True)
+        file.write_text("")
+    digests = [testing._digest()]
+    for file in files:
+        file.write_text(file.name)
+        digests.append(testing._digest())
+    assert [one != other for one, other in pairwise(digests)] == [True, True, True, False, False]
 
 
 @pytest.mark.usefixtures("kit")

@@ -129,8 +129,9 @@ def _lights_seen(arguments: Arguments) -> Described:
     facts = {"largest_lift_of_ray_ends": LIFT}
     if arguments["geometry"].cut_outs is not None:
         return Described(facts=facts)
+    flat = arguments["geometry"].vertex_normals is None
     return Described(form_of(multires_lights.lights_seen, arguments, others=MESH), (("vpl", "visible"),), facts=facts,
-                     variants=(partial(lifted, "point"),))
+                     variants=(partial(lifted, "point"),), without=("interpolated normal",) if flat else ())
 
 
 def _seen_irradiance(arguments: Arguments) -> Described:
@@ -177,7 +178,7 @@ FORMS: Mapping[str, Callable[[Arguments], Described]] = {
     "multires.subsplat_facing": _subsplat_facing, "multires.lights_seen": _lights_seen,
     "multires.seen_irradiance": _seen_irradiance, "multires.one_row": alone(
         multires_lights.one_row, ("position", "normal", "triangle_id"), ("position", "normal"),
-        lists=("points", "points/pixel")),
+        lists=("points", "points/pixel"), without=("cell",)),
     "multires.of_row": alone(multires_lights.of_row, lists=()),
     "multires.subsplat_irradiance": _subsplat_irradiance, "multires.representatives": _representatives,
     "multires.samples": _samples, "multires.splits": _splits, "multires.lists": alone(

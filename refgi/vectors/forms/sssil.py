@@ -72,7 +72,8 @@ def _level_of_means(arguments: Arguments) -> Described:
 
 def _first_mean_radiance(arguments: Arguments) -> Described:
     form = form_of(hssil_levels.first_mean_radiance, arguments, (*PLANES, "count"), CAMERA)
-    return _kept(form, own("mean_radiance"), arguments["depth"].shape) if not arguments["as_published"] else Described()
+    return Described() if arguments["as_published"] else _kept(
+        form, own("mean_radiance"), arguments["depth"].shape, without=("texels of the finer level",))
 
 
 def _coarser_mean_radiance(arguments: Arguments) -> Described:

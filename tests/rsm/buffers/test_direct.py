@@ -1,10 +1,12 @@
 """Direct light against closed forms, and the map's shadows against rays."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
+from refgi import Frame
 from refgi.errors import InputError
 from refgi.rsm import direct_irradiance, gbuffer, reflective_shadow_map, shadow_map_visibility
 from refgi.rsm.raster.projection import PARABOLOID
@@ -52,6 +54,19 @@ def test_irradiance_equals_its_definition(name, dtype):
         np.testing.assert_allclose(out[:, row, column], expected, rtol=rounding, atol=rounding * 1e-2)
     assert (out[:, ~seen.covered] == 0).all()
     assert out.dtype == dtype
+
+
+def test_lamps_of_a_frame_add_up():
+    box = load_scene("cornell_box")
+    lamps = (DirectionalLight((0.3, -0.2, 1.0), (0.3, 0.2, 0.1)), PointLight((0.1, 0.3, 0.4), (0.3, 0.2, 0.1)),
+             *box.lights)
+
+    def direct(*lit):
+        return Frame(dataclasses.replace(box, lights=lit), width=12, height=9, dtype=np.float64, shadows="exact").direct
+
+    parts = [direct(lamp) for lamp in lamps]
+    assert all(part.any() for part in parts)
+    np.testing.assert_allclose(direct(*lamps), np.sum(parts, axis=0), rtol=1e-12)
 
 
 def test_what_is_not_visible_gets_nothing():

@@ -54,12 +54,15 @@ kit-score: $(VENV)/dev.stamp
 records: $(VENV)/dev.stamp
 	$(BIN)/python -m benchmarks records --make
 
-docs: $(VENV)/dev.stamp
+docs: $(VENV)/dev.stamp docs/extra
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 	@echo "open docs/_build/html/index.html"
 
+docs/extra: | $(VENV)/dev.stamp
+	$(BIN)/python docs/gallery_page.py --pages
+
 clean:
-	rm -rf $(VENV) out docs/_build
+	rm -rf $(VENV) out docs/_build docs/extra
 
 $(VENV)/bin/python:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "refgi needs Python 3.11 or newer")'

@@ -52,6 +52,7 @@ RECORDS = {
     "papers": Record((*(("-m", "benchmarks", "paper", name, "--out", f"out/papers/{name}") for name in PAPERS),
                       ("docs/papers_page.py", *(f"out/papers/{name}/results.json" for name in PAPERS))),
                      "docs/papers.md", ("refgi/**/*.py", "benchmarks/papers/**/*.py")),
+    "gallery": Record((("docs/gallery_page.py",),), "docs/gallery.md", ("refgi/**/*.py", "docs/gallery_page.py")),
     "stability": Record((("-m", "benchmarks", "stability", "--out", "out/stability", "--page", "docs/precision.md"),),
                         "docs/precision.md", ("refgi/**/*.py", "benchmarks/stability/*.py")),
     "sameness": Record((("-m", "benchmarks.sameness", "--write", "benchmarks/sameness/ledger.json"),),

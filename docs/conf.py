@@ -23,6 +23,7 @@ autodoc_typehints = "none"
 html_theme = "furo"
 html_title = f"refgi {release}"
 html_static_path = ["_static"]
+html_extra_path = [name for name in ("extra",) if (Path(__file__).parent / name).is_dir()]  # pages of the gallery
 html_css_files = ["book.css"]
 html_copy_source = False
 html_show_copyright = False

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from runpy import run_path
 
 import pytest
 
@@ -109,6 +110,17 @@ def laid_out(folder, page, width):
              "code": found["code"] if width == max(WIDTHS) else [],
              "formulas": text.count("<math") - found["formulas"]}
     return {name: one for name, one in wrong.items() if one}
+
+
+def test_every_tile_of_the_gallery_opens_a_comparison():
+    text = (DOCS / "gallery.md").read_text("utf-8")
+    tiles = re.findall(r":::\{figure\} (\S+)\n:alt: .*\n:target: (\S+)\n(.+)", text)
+    assert len(tiles) == text.count(":::{figure}") >= 20
+    scenes = run_path(str(DOCS / "gallery_page.py"))["SCENES"]
+    assert {page for _, page, _ in tiles} == {f"gallery/{scene}.html" for scene in scenes}  # that `make docs` makes
+    for picture, _, said in tiles:
+        assert (DOCS / picture).is_file()
+        assert re.search(r"[\d.]+ m?s$", said)
 
 
 def test_code_is_at_most_88_columns_wide():

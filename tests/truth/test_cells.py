@@ -12,7 +12,7 @@ from refgi.frame import Frame
 from refgi.rays import Tracer
 from refgi.scene import DirectionalLight, Material, PointLight, SpotLight, load_scene
 from refgi.truth import TruthSettings, trace_truth
-from refgi.truth.cell_densities import even_density, receiver_at
+from refgi.truth.cell_densities import even_density, image_of, receiver_at
 from refgi.truth.cell_pass import beside_of
 from refgi.truth.cell_rays import pick_cells, picks_for
 from refgi.truth.cell_walk import cell_at, fill_tops, found_up
@@ -115,6 +115,24 @@ def test_rays_fall_as_densely_as_their_weights_say(lamps, lobes, evidence):
     off = np.abs(got - expected) / np.sqrt(expected + (0.05 * expected) ** 2 + 1)
     evidence(f"{len(lamps)} lamps: parts off by {off.max():.1f} at most")
     assert off.max() < 5
+
+
+def test_images_are_aimed_at_as_their_density_says(evidence):
+    """D = s c^(s - 1) / (2 pi), c the cosine from a light's image: c^s is even in 0 to 1, -s ln c has a mean of 1."""
+    task = task_for(shiny(load_scene("cornell_box"), 20.0, LIGHTS["spot"]), lobes=True)
+    r, first, passes = 53, task.counts.cells, 5000  # a receiver whose images stand high above its horizon
+    beside, count, logs, exponents = beside_of(task, r), first + task.counts.mirrors, [], []
+    rays = picks_for(count)
+    for seed in range(passes):
+        pick_cells(beside, (r, r + 1), seed, task.tracer.grain, rays)
+        for ray in first + np.flatnonzero(rays.paths.reach[first:] > 0):
+            image, s = image_of(task.cells, rays.light[ray], rays.mirror[ray], tuple(task.receivers.position[:, r]))
+            logs.append(-s * np.log(image @ rays.paths.direction[ray]))
+            exponents.append(s)
+    assert len(logs) > 0.999 * passes * task.counts.mirrors
+    assert np.mean(2 / np.array(exponents)) > 5 / math.sqrt(len(logs))  # what an exponent off by 2 moves the mean by
+    evidence(f"mean of {len(logs)} rays: {np.mean(logs):.3f}")
+    assert np.mean(logs) == pytest.approx(1, abs=4 / math.sqrt(len(logs)))
 
 
 def test_cells_are_split_where_mirrors_bend():

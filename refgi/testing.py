@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from refgi.vectors.check import Kit
 
 KIT_FOLDER = "REFGI_KIT"  # environment variable: a kit to use in place of one made here
-ABOVE = ("cli", "testing.py", "batch", "stress", "bench", "compare", "report")  # of refgi: what no kit depends on
+ABOVE = ("cli", "testing.py", "batch", "stress", "bench", "compare")  # of refgi: what no kit depends on
 
 try:
     import pytest

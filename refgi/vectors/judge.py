@@ -39,7 +39,7 @@ def judge(
 
     `limit` bounds each element, or `tolerance` the whole array, with a share of outliers; with both, errors of stages
     before and of this one are independent: their squares add. `few` is what storage in few bits allows beside; `masked`
-    elements may differ at will. Not judged where more than MOST_SPARED are beyond, but allowed to be. The worst element
+    elements may differ at will. Not judged where MOST_SPARED or more are beyond, but allowed to be. The worst element
     is the farthest beyond its bound; one that is not finite where a finite number is expected is beyond any.
     """
     off = distance(got, expected)
@@ -61,7 +61,7 @@ def judge(
     blunt = bool(large and np.mean(allowed >= large) > MOST_SPARED)
     verdict: Verdict = "exact"
     if off.any():
-        fine: Verdict = "within" if every <= MOST_SPARED * out.size and not blunt else "not-judged"
+        fine: Verdict = "within" if every < max(1.0, MOST_SPARED * out.size) and not blunt else "not-judged"
         verdict = fine if count <= outliers * out.size else "out"
     worst, place = _worst(off, allowed, out if count else ~masked, expected)
     said = ArrayVerdict(name=name, verdict=verdict, tier=tier, worst=worst, element=place, outside=count,
@@ -120,8 +120,8 @@ def _worst(
     floor = np.finfo(np.float64).tiny
     with np.errstate(over="ignore"):
         ratio = np.where(off > 0, off / np.maximum(allowed, floor), 0.0)
+        beside = off / (allowed + WORTH * large_value(expected) + floor) if expected.dtype.kind == "f" else off
     worst = float(ratio[among].max())
-    beside = off / (allowed + WORTH * large_value(expected) + floor) if expected.dtype.kind == "f" else off
     at = np.unravel_index(int(np.argmax(np.where(among, beside, -1.0))), off.shape)
     return (worst if np.isfinite(worst) and worst < 1e30 else None), tuple(int(k) for k in at)
 

@@ -15,7 +15,6 @@ import dataclasses
 import functools
 import hashlib
 import inspect
-import time
 import types
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -102,8 +101,6 @@ def _reached(function: Function, parts: Mapping[Function, str | ast.Module]) -> 
 
 
 _results: ContextVar[dict[bytes, Any] | None] = ContextVar("refgi_literal_results", default=None)
-WORTH = 2e-4  # s that a literal function takes, on average, from which on its results are kept
-TRIALS = 4  # of which that is seen
 
 
 @contextmanager
@@ -118,24 +115,15 @@ def sharing() -> Iterator[None]:
 
 @functools.cache
 def _shared(function: Function) -> Callable[..., Any]:
-    """Return a function that gives copies of what it returned before, inside `sharing`, if it is slow."""
-    taken: list[float] = []
-
+    """Return a function that gives copies of what it returned before, inside `sharing`."""
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
-        results = _results.get()
-        if results is None or (len(taken) >= TRIALS and sum(taken) < WORTH * len(taken)):
-            return function(*args, **kwargs)
-        total = hashlib.blake2b(_name(function).encode(), digest_size=20)
-        if not _hashed(total, (args, sorted(kwargs.items()))):
+        results, total = _results.get(), hashlib.blake2b(_name(function).encode(), digest_size=20)
+        if results is None or not _hashed(total, (args, sorted(kwargs.items()))):
             return function(*args, **kwargs)
         key = total.digest()
         if key not in results:
-            begun = time.perf_counter()
-            made = function(*args, **kwargs)
-            taken.append(time.perf_counter() - begun)
-            results[key] = _copied(made)
-            return made
+            results[key] = function(*args, **kwargs)
         return _copied(results[key])
 
     return call

@@ -55,12 +55,10 @@ def wirings(
         told.add(cause)
         yield Bug(cause, partial(_bound_to, run, wrong))
     for name in step.reads:
-        if _is_pictures(case, name, known[name]) and (cause := f"{kind_of(name)} {PIXEL_BY_PIXEL}") not in told:
-            told.add(cause)
-            yield Bug(cause, partial(_laid_out, run, name, lambda a: _read_in_steps(a, len(a))))
-        for said, layout in LAYOUTS.items():
-            cause = f"{kind_of(name)} {said}"
-            if left(cause) and _is_planes(case, name, known[name]) and name not in step.exact:
+        planes = LAYOUTS if _is_planes(case, name, known[name]) and name not in step.exact else {}
+        pictures = {PIXEL_BY_PIXEL: _pixel_by_pixel} if _is_pictures(case, name, known[name]) else {}
+        for said, layout in (pictures | planes).items():
+            if left(cause := f"{kind_of(name)} {said}"):
                 told.add(cause)
                 yield Bug(cause, partial(_laid_out, run, name, layout))
 
@@ -195,6 +193,10 @@ def _read_in_steps(planes: Array, step: int) -> Array:
     numbers = np.zeros(step * count, planes.dtype)
     numbers[: planes.size] = planes.reshape(-1)[: numbers.size]
     return numbers.reshape(count, step)[:, : len(planes)].T.reshape(planes.shape)
+
+
+def _pixel_by_pixel(pictures: Array) -> Array:
+    return _read_in_steps(pictures, len(pictures))
 
 
 PIXEL_BY_PIXEL = "is read pixel by pixel, (h, w, n), not picture by picture, (n, h, w)"

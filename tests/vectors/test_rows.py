@@ -132,9 +132,8 @@ def test_misprints_of_importance_are_rows_of_its_kinds(kind, opened, wrong):
 
 
 @pytest.mark.parametrize("stage", ["rsm.reflected_flux0", "pairs.sum", "lights.warp0"])
-def test_what_rows_share_changes_none_of_them(stage, monkeypatch):
+def test_what_rows_share_changes_none_of_them(stage):
     """All rows of a stage, whatever their literal functions share: to the bit what each makes by itself."""
-    monkeypatch.setattr(rows, "WORTH", 0.0)
     known, step = made("sii-warp-a")[1], stage_of("sii-warp-a", stage)
     runs = {bug.cause: bug.run for bug in step.bugs}
     alone = {cause: outputs_of(step, known, np.float64, run) for cause, run in runs.items()}
@@ -144,8 +143,7 @@ def test_what_rows_share_changes_none_of_them(stage, monkeypatch):
                 np.testing.assert_array_equal(array, alone[cause][name], err_msg=f"{cause}: {name}")
 
 
-def test_shared_are_copies_of_equal_arguments_results_alone(monkeypatch):
-    monkeypatch.setattr(rows, "WORTH", 0.0)
+def test_shared_are_copies_of_equal_arguments_results_alone():
     calls = []
 
     def total(values, factor=1, how=None):

@@ -55,10 +55,20 @@ def write_inner(folder: Path, expression: str) -> None:
         f"from refgi.jit import kernel\n\n@kernel\ndef inner(x):\n    return {expression}\n")
 
 
+def surroundings(folder: Path) -> dict[str, str]:
+    """A place of kernels beside the package, and no bytecode: within a second Python takes the old one for the new."""
+    return os.environ | {"REFGI_CACHE_DIR": str(folder.parent / "cache"), "PYTHONPATH": str(folder.parent),
+                         "PYTHONDONTWRITEBYTECODE": "1"}
+
+
+def process(folder: Path, code: str, **also: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", code], env=surroundings(folder) | also, capture_output=True, text=True,
+                          check=False)
+
+
 def run(folder: Path, said: str = "", call: str = CALL) -> str:
     """Return what a new process computes and how many kernels it found; it says one line of `said`, or nothing."""
-    environment = os.environ | {"REFGI_CACHE_DIR": str(folder.parent / "cache"), "PYTHONPATH": str(folder.parent)}
-    done = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=False)
+    done = process(folder, call)
     assert done.returncode == 0, done.stderr
     warned = [line for line in done.stderr.splitlines() if "Warning" in line]
     assert len(warned) == bool(said), done.stderr
@@ -81,8 +91,7 @@ def test_a_caller_imported_after_an_edit_does_not_pass_for_the_edited_one(packag
         import package_a.outer as o
         o.outer(1.5)
         """
-    environment = os.environ | {"REFGI_CACHE_DIR": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
-    subprocess.run([sys.executable, "-c", textwrap.dedent(code)], env=environment, check=True)
+    assert process(package, textwrap.dedent(code)).returncode == 0
     assert run(package) == "7.0 0"
 
 
@@ -103,16 +112,14 @@ def test_only_entry_points_are_kept(once):
 def test_a_folder_that_cannot_be_written_is_named(package):
     (package.parent / "cache").write_text("a file, not a folder")
     call = "import warnings; warnings.simplefilter('always'); import package_a.outer as o; print(o.outer(1.5))"
-    environment = os.environ | {"REFGI_CACHE_DIR": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
-    done = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=False)
+    done = process(package, call)
     assert done.stdout.strip() == "5.0"
     assert done.stderr.count("compiled kernels cannot be kept") == 1
 
 
 def test_kernels_run_as_plain_python(package):
-    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(package.parent)}
     call = "import package_a.outer as o; print(o.outer(1.5))"
-    done = subprocess.run([sys.executable, "-c", call], env=environment, capture_output=True, text=True, check=False)
+    done = process(package, call, NUMBA_DISABLE_JIT="1")
     assert done.stdout.strip() == "5.0", done.stderr
 
 
@@ -213,9 +220,8 @@ def test_of_two_processes_at_once_one_compiles(package):
         """
     here = package.parent / "here"
     here.mkdir()
-    environment = os.environ | {"REFGI_CACHE_DIR": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
-    both = [subprocess.Popen([sys.executable, "-c", textwrap.dedent(code), str(here), name], env=environment, text=True,
-                             stdout=subprocess.PIPE) for name in "ab"]
+    both = [subprocess.Popen([sys.executable, "-c", textwrap.dedent(code), str(here), name], env=surroundings(package),
+                             text=True, stdout=subprocess.PIPE) for name in "ab"]
     assert sorted(one.communicate()[0].strip() for one in both) == ["5.0 0", "5.0 1"]
 
 
@@ -230,8 +236,7 @@ def test_processes_that_compile_ahead_share_the_folder_that_takes_the_place(pack
             "    warnings.simplefilter('error')\n"
             "    compile_ahead(few, processes=1)\n"
             "    print(len(missing(few)))\n")
-    environment = os.environ | {"REFGI_CACHE_DIR": str(package.parent / "cache")}
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    done = process(package, code)
     assert (done.stdout.strip(), done.stderr) == ("0", "")
 
 
@@ -265,10 +270,9 @@ def test_every_kind_of_result_comes_back_from_the_disk(package):
             "p, (total, (count, larger), column) = r.pair(a), r.mixed(a)\n"
             "print(type(p) is r.Pair, p.sums, p.sums.dtype, p.count, total, count, larger, column.shape, r.text(a),\n"
             "      [sum(one.stats.cache_hits.values()) for one in (r.pair, r.mixed, r.text)])\n")
-    environment = os.environ | {"REFGI_CACHE_DIR": str(package.parent / "cache"), "PYTHONPATH": str(package.parent)}
 
     def said(hits):
-        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        done = process(package, code)
         assert done.stdout.strip() == f"True [0. 2. 4.] float32 3 3.0 3 [False False  True] (3, 1) 3 {hits}"
         assert done.stderr.count("a compiled kernel cannot be kept (unicode_type: no text for this type)") == 1
 

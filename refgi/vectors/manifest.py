@@ -19,7 +19,7 @@ import pydantic
 from refgi.errors import InputError, shortened
 from refgi.types import Array
 
-VERSION = "2.2.0"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
+VERSION = "2.2.1"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
 # a case, a major changes what an array means or its name
 LONGEST_LINE = 118  # characters of JSON
 KIT, CASE, RESULT = "kit.json", "manifest.json", "result.json"

@@ -6,7 +6,7 @@ from refgi.literal import hssil_crown, hssil_levels, temporal, upsampling
 from refgi.sampling import FIRST_STEP, SECOND_STEP
 from refgi.sssil.settings import Bilateral
 from refgi.types import Array
-from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, own
+from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, own, written
 from refgi.vectors.rows import Form
 from refgi.vectors.spec import Arrays, Bug, Run, reading, writing
 
@@ -19,6 +19,13 @@ OFFSETS = {"axes": "row modulo tile, column modulo tile, sample, (right, down)"}
 WEIGHT = {"axes": "row modulo tile, column modulo tile, sample", "paper": AREA}
 POINTS = {"axes": "sample, (u, cos 2 pi v, sin 2 pi v)", "space": ""}
 SHIFTS = {"axes": "row of the tile, column of the tile, uv"}
+# the variance in one pass, as Salvi 2016 has it, pixel by pixel: from the first on, and from the last
+MEAN = "(around * known).sum(axis=-1) / count"
+VARIANCE = "((around - mean[..., None]) ** 2 * known).sum(axis=-1) / count"
+MOMENTS = tuple((
+    (f"mean = {MEAN}", f"order = np.s_[..., ::{step}]; around, known = around[order], known[order]; "
+                       "mean = np.cumsum(around * known, axis=-1)[..., -1] / count"),
+    (VARIANCE, "np.maximum(0, np.cumsum(around**2 * known, axis=-1)[..., -1] / count - mean**2)")) for step in (1, -1))
 
 
 def _first_level(arguments: Arguments) -> Described:
@@ -193,6 +200,11 @@ def _blend(arguments: Arguments) -> Described:
     return Described(form, own("blend", *(f"blend/{kind}" for kind, name in kinds if arguments[name] is not None)))
 
 
+def _clamp(arguments: Arguments) -> Described:
+    form = form_of(temporal.clamp, arguments)
+    return Described(form, own("clamp"), variants=written(form, *MOMENTS))
+
+
 FORMS = {"sssil.first_level": _first_level, "sssil.coarser_level": _coarser_level, "sssil.first_mean": _first_mean,
          "sssil.level_of_means": _level_of_means, "sssil.first_mean_radiance": _first_mean_radiance,
          "sssil.coarser_mean_radiance": _coarser_mean_radiance, "sssil.points_and_shifts": _points_and_shifts,
@@ -203,4 +215,4 @@ FORMS = {"sssil.first_level": _first_level, "sssil.coarser_level": _coarser_leve
                                others=VIEW, specs={"speed": {"unit": "pixels"}}),
          "sssil.reprojection": _reprojection,
          "sssil.entering": alone(temporal.entering, ("made", "share"), ("position", "projection.origin"), others=VIEW),
-         "sssil.clamp": alone(temporal.clamp), "sssil.blend": _blend}
+         "sssil.clamp": _clamp, "sssil.blend": _blend}

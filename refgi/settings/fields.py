@@ -119,14 +119,21 @@ def is_choice(hint: Any) -> bool:
     return len(found) > 1 or (len(found) == 1 and may_be_none(hint))
 
 
-def expected(field: Any, hint: Any) -> str:
-    """Say what a field of some type takes, such as "a whole number, 1 to 64"."""
+def expected(owner: type[Settings], field: Any) -> str:
+    """Say what a field takes, such as "a whole number, 1 to 64"."""
+    hint = hints(owner)[field.name]
     none = "none or " if may_be_none(hint) else ""
     if kinds := choices_of(hint):
         return f"{none}{' or '.join(kinds)}"
     kind = members(hint)[0]
     if get_origin(kind) is Literal:
         return none + " or ".join(map(repr, get_args(kind)))
+    if get_origin(kind) is frozenset:
+        return f"{none}names out of {', '.join(sorted(names_of(owner, hint)))}"
+    if get_origin(kind) is tuple:
+        what = get_args(kind)[0]
+        inside = dataclasses.fields(what) if dataclasses.is_dataclass(what) else ()
+        return f"{none}a list in JSON" + (f" of {{{', '.join(part.name for part in inside)}}}" if inside else "")
     if kind is bool:
         return f"{none}true or false"
     if kind in (Path, str):
@@ -169,7 +176,7 @@ def checked(owner: type[Settings], field: Any, value: Any) -> Any:
     elif get_origin(kind) is frozenset:
         value, known = frozenset({value} if isinstance(value, str) else value), names_of(owner, hint)
         expect(value <= known, field.name, f"names out of {sorted(known)}", sorted(map(str, value)))
-    expect(fits, field.name, expected(field, hint), value)
+    expect(fits, field.name, expected(owner, field), value)
     return value
 
 
@@ -214,7 +221,7 @@ class Leaf(NamedTuple):
     @property
     def expected(self) -> str:
         """What it takes."""
-        return expected(self.field, self.hint)
+        return expected(self.owner, self.field)
 
 
 def leaves(kind: type[Settings]) -> tuple[Leaf, ...]:
@@ -282,5 +289,7 @@ def _property(leaf: Leaf) -> dict[str, Any]:
         return made | {"enum": [*get_args(kind), *([None] if may_be_none(leaf.hint) else [])]}
     name = {bool: "boolean", int: "integer", float: "number"}.get(kind, "array" if get_origin(kind) else "string")
     made["type"] = [name, "null"] if may_be_none(leaf.hint) else name
+    if get_origin(kind) is frozenset:
+        made["items"] = {"enum": sorted(names_of(leaf.owner, leaf.hint))}
     bounds = {"minimum": about.get("least"), "maximum": about.get("most"), "exclusiveMinimum": about.get("above")}
     return made | {word: bound for word, bound in bounds.items() if bound is not None}

@@ -194,7 +194,7 @@ def _rebuilt(settings: Any, tree: dict[str, Any], prefix: str, errors: list[Inpu
         hint, key = hints(type(settings))[name], prefix + name
         inner = {part: value for part, value in node.items() if part}
         try:
-            changes[name] = _value(getattr(settings, name), node, field, hint, key)
+            changes[name] = _value(settings, node, field, hint, key)
             changes[name] = checked(type(settings), field, changes[name])
         except InputError as error:
             errors.append(_with_prefix(prefix, error))
@@ -218,8 +218,9 @@ def _rebuilt(settings: Any, tree: dict[str, Any], prefix: str, errors: list[Inpu
         return settings
 
 
-def _value(now: Any, node: dict[str, Any], field: Any, hint: Any, key: str) -> Any:
+def _value(settings: Settings, node: dict[str, Any], field: Any, hint: Any, key: str) -> Any:
     """Return what a field is set to, before what is set inside it."""
+    now = getattr(settings, field.name)
     if "" not in node:
         return now
     value, kinds = node[""], choices_of(hint)
@@ -227,7 +228,7 @@ def _value(now: Any, node: dict[str, Any], field: Any, hint: Any, key: str) -> A
         if value == "none" and may_be_none(hint):
             return None
         if value not in kinds:
-            raise InputError(f"{key}: expected {expected(field, hint)}, got {value!r}", key=key)
+            raise InputError(f"{key}: expected {expected(type(settings), field)}, got {value!r}", key=key)
         return now if isinstance(now, kinds[value]) else kinds[value]()
     return value
 

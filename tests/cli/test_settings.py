@@ -123,6 +123,18 @@ def test_the_verb_lists_every_key(method):
         assert leaf.about != "threshold", leaf.key
 
 
+@pytest.mark.parametrize(("key", "takes", "items"), [
+    ("as_published", "names out of hss_disc_pi, hss_level_factor, hss_tan_f",
+     {"enum": ["hss_disc_pi", "hss_level_factor", "hss_tan_f"]}),
+    ("cameras.views", "a list in JSON of {eye, target, up, vfov, width, height}", None)])
+def test_the_verb_says_what_names_and_lists_take(key, takes, items):
+    lines = CliRunner().invoke(VerbGroup.refgi(), ["settings", "hssil", "--all"]).output.splitlines()
+    line, = (line for line in lines if line.startswith(f"{key} "))
+    assert takes in line
+    content = json.loads(CliRunner().invoke(VerbGroup.refgi(), ["settings", "hssil", "--json"]).stdout)
+    assert content["schema"]["properties"][key].get("items") == items
+
+
 def test_settings_sorted_by_method():
     assert by_method(["sii.lights=3", "truth.samples=4", "sii.seed=1"], ["sii", "vpl", "truth"]) == {
         "sii": ["lights=3", "seed=1"], "vpl": [], "truth": ["samples=4"]}

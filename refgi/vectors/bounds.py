@@ -115,7 +115,8 @@ def packed_masks(case: Case, step: Stage, known: Arrays, seed: int) -> dict[str,
     def at_ends(_: str, array: Array, random: np.random.Generator) -> Array:
         if array.dtype.kind != "f":
             return array
-        return np.asarray(array * (1.0 + PACKED_STEP * random.choice((-1.0, 1.0), array.shape)))
+        moved = array * (1.0 + PACKED_STEP * random.choice((-1.0, 1.0), array.shape))
+        return np.asarray(np.where(array < 1.0, np.minimum(moved, BELOW_1), moved))
 
     whole = [name for name in step.writes if known[name].dtype.kind != "f" and known[name].size]
     if not whole or is_estimate(case, step):

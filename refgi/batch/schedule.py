@@ -6,18 +6,12 @@ may have ended it run again, each in a process of its own; over machines dask gi
 
 import contextlib
 import math
-import os
-import signal
-import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from importlib import import_module
 from itertools import groupby
-from multiprocessing import Pipe, get_context
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,6 +23,7 @@ from refgi.bench.grid import TRUTH
 from refgi.errors import InputError, RefgiError, RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import METHODS
+from refgi.processes import pool
 from refgi.types import Tell
 
 SECONDS_BETWEEN_LOOKS = 0.5
@@ -64,8 +59,8 @@ def run_in_processes(chunks: Sequence[Chunk], workers: int, tell: Tell, written:
     waiting = list(chunks)
     while waiting:
         try:
-            with _pool(workers) as pool:
-                follow([(chunk, pool.submit(run_chunk, chunk)) for chunk in waiting], tell, written)
+            with pool(workers) as processes:
+                follow([(chunk, processes.submit(run_chunk, chunk)) for chunk in waiting], tell, written)
                 return
         except BrokenExecutor:
             waiting = unfinished(waiting)
@@ -110,36 +105,10 @@ def fail_first(chunk: Chunk) -> None:
 
 def _alone(chunk: Chunk) -> None:
     try:
-        with _pool(1) as pool:
-            pool.submit(run_chunk, chunk).result()
+        with pool(1) as processes:
+            processes.submit(run_chunk, chunk).result()
     except BrokenExecutor:
         fail_first(chunk)
-
-
-@contextmanager
-def _pool(workers: int) -> Iterator[Executor]:
-    """Start processes that end at once when this one does, however it ends, and when the block is left by an error."""
-    reader, writer = Pipe(duplex=False)
-    pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with, (reader,))
-    try:
-        yield pool
-    except BaseException:
-        writer.close()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
-        writer.close()
-        reader.close()
-
-
-def _end_with(parent: Connection) -> None:
-    """End this process when the other end of a pipe is closed; leave interrupts to the process that holds it."""
-    def watch() -> None:
-        parent.poll(None)
-        os._exit(1)
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=watch, daemon=True).start()
 
 
 SCHEME = "dask:"

@@ -43,6 +43,7 @@ def _export(session: Session, asked: Asked) -> None:
 
 
 def _of_kit(asked: Asked, out: Path, tell: Any) -> "KitManifest":
+    from refgi.jit.ahead import cores
     from refgi.vectors.export import export_kit
 
     ctx = click.get_current_context()
@@ -50,7 +51,7 @@ def _of_kit(asked: Asked, out: Path, tell: Any) -> "KitManifest":
         given = ctx.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
         if given and parameter.name not in ("kit", "case", "out", "debug", "as_json", "json"):
             raise click.UsageError(f"{parameter.opts[0]}: expected a SCENE, which it is said of, got none", ctx)
-    return export_kit(asked.kit or "quick", out, tell, asked.case)
+    return export_kit(asked.kit or "quick", out, tell, asked.case, cores())
 
 
 def _of_scene(asked: Asked, out: Path, tell: Any) -> "KitManifest":

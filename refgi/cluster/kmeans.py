@@ -108,7 +108,7 @@ def cluster(
     expect(0 < diagonal < math.inf or total == 0, "diagonal", "a length above 0 m", diagonal)
     if start is not None:
         expect(start.center.shape[1] == count, "start", f"{count} clusters", start.center.shape[1])
-        areas = np.vstack([start.center, start.normal]).astype(np.float64)
+        areas = np.vstack([start.center, start.normal]).astype(np.float64, order="C")
     else:
         if count > total:
             skip("cluster.kmeans", f"{count - total} of {count} area lights: there are {total} pixel lights")
@@ -131,7 +131,7 @@ def first_lights(total: int, count: int) -> Array:
 
 def _lights(position: Array, normal: Array) -> Array:
     """Return positions and unit normals, (6, N)."""
-    lights = np.vstack([_finite(position, "position"), _finite(normal, "normal")])
+    lights = np.ascontiguousarray(np.vstack([_finite(position, "position"), _finite(normal, "normal")]))
     length = np.sqrt((lights[3:] ** 2).sum(axis=0))
     lights[3:] /= np.where(length > 0, length, 1)
     return lights
@@ -215,7 +215,7 @@ def kmeans_assign(
     -> of (light,) int: Nearest cluster.
     -> distance (light,): Its distance d.
     """
-    state = _state(_lights(position, normal), np.vstack([center, axis]).astype(np.float64), 1)
+    state = _state(_lights(position, normal), np.vstack([center, axis]).astype(np.float64, order="C"), 1)
     iterate(state, _metric(distance, (w_x, w_a), _diagonal(illuminated), _span(state)), 0, np.zeros(1))
     return state.of, state.own
 
@@ -229,7 +229,7 @@ def kmeans_means(position: Array, normal: Array, of: Array, center: Array, axis:
     -> center (3, cluster): Means of the lights' places, m.
     -> axis (3, cluster): Mean directions of their normals, unit vectors.
     """
-    state = _state(_lights(position, normal), np.vstack([center, axis]).astype(np.float64), 1)
+    state = _state(_lights(position, normal), np.vstack([center, axis]).astype(np.float64, order="C"), 1)
     state.of[:] = of
     sort_lights(state)
     move_to_means(state)

@@ -33,6 +33,7 @@ MORE_RUNS = 8  # where the first ones have many outliers
 MOST_SPARED = 0.05  # share of an array beyond its bounds from which on it is not judged
 ROUNDING = 2.0**-24  # of float32, relative
 HALF_ROUNDING = 2.0**-11  # of float16
+PACKED_STEP = 2.0**-5  # of R11G11B10F, relative, at its coarsest
 BYTE, SIGNED_BYTE = 1 / 255, 1 / 127  # steps of [0, 1] and [-1, 1] in 8 bits
 TYPICAL = 0.5  # quantile of an array's relative changes: an element that a few runs hardly move has been lucky
 LARGEST = 2.0  # times the largest change that runs have shown, where none is an outlier: one more run may have more
@@ -70,7 +71,8 @@ def isolated_bounds(case: Case, step: Stage, known: Arrays, seed: int) -> dict[s
     if is_estimate(case, step):
         return {name: _spread_bound(known, name) for name in step.writes}
     runs = [outputs_of(step, known, np.float32, run) for run in (step.run, *step.variants)]
-    runs += [_run(step, _changed(step, known, seed, _rounded_at_random, number)) for number in range(RUNS)]
+    changed = _changed_runs(step, known, seed, _rounded_at_random)
+    runs += [changed(number) for number in range(RUNS)]
     return {name: _bound(known[name], [run[name] for run in runs], _large(case, name, known[name]))
             for name in step.writes}
 
@@ -85,24 +87,47 @@ def stored_budgets(case: Case, step: Stage, known: Arrays, seed: int) -> tuple[d
     steps = {name: byte_step(case, name, known[name]) for name in (*step.reads, *step.writes)}
     large = {name: _large(case, name, known[name]) for name in step.writes}
 
-    def run(number: int, in_bytes: bool) -> dict[str, Array]:
-        def change(name: str, array: Array, random: np.random.Generator) -> Array:
-            if not (in_bytes and steps[name]):
-                return _rounded_at_random(name, array, random, HALF_ROUNDING / CHANGE)
-            stored_near = steps[name] * np.floor(array / steps[name] + random.uniform(0.0, 1.0, array.shape))
-            return np.asarray(np.where(array < 1.0, np.minimum(stored_near, BELOW_1), stored_near))
+    def in_half(name: str, array: Array, random: np.random.Generator) -> Array:
+        return _rounded_at_random(name, array, random, HALF_ROUNDING / CHANGE)
 
-        return {name: _to_bytes(array, steps[name]) if in_bytes and steps[name] else _to_half(array)
-                for name, array in _run(step, _changed(step, known, seed, change, number)).items()}
+    def in_few_bits(name: str, array: Array, random: np.random.Generator) -> Array:
+        if not steps[name]:
+            return in_half(name, array, random)
+        stored_near = steps[name] * np.floor(array / steps[name] + random.uniform(0.0, 1.0, array.shape))
+        return np.asarray(np.where(array < 1.0, np.minimum(stored_near, BELOW_1), stored_near))
 
-    half_run = functools.cache(functools.partial(run, in_bytes=False))
-    byte_run = functools.partial(run, in_bytes=True) if any(steps.values()) else half_run
+    half_run = _changed_runs(step, known, seed, in_half, lambda _, array: _to_half(array))
+    byte_run = half_run if not any(steps.values()) else _changed_runs(
+        step, known, seed, in_few_bits, lambda name, array: _to_bytes(array, steps[name]))
     rounding = {name: 0.5 * steps[name] / large[name] if steps[name] and large[name] else HALF_ROUNDING
                 for name in step.writes}
     halves, in_bytes = ({name: Measures(known[name], share[name], large[name], decided) for name in step.writes}
                         for share, decided in ((dict.fromkeys(step.writes, HALF_ROUNDING), DECIDED),
                                                (rounding, DECIDED_IN_BYTES)))
     return _budgets(halves, half_run), _budgets(in_bytes, byte_run)
+
+
+def packed_masks(case: Case, step: Stage, known: Arrays, seed: int) -> dict[str, Array]:
+    """Return which whole numbers that a stage writes change where the floats it reads do by a step of packed floats.
+
+    By name; those of which none does are left out. Each float is moved to either end of its step.
+    """
+    def at_ends(_: str, array: Array, random: np.random.Generator) -> Array:
+        if array.dtype.kind != "f":
+            return array
+        moved = array * (1.0 + PACKED_STEP * random.choice((-1.0, 1.0), array.shape))
+        return np.asarray(np.where(array < 1.0, np.minimum(moved, BELOW_1), moved))
+
+    whole = [name for name in step.writes if known[name].dtype.kind != "f" and known[name].size]
+    if not whole or is_estimate(case, step):
+        return {}
+    run = _changed_runs(step, known, seed, at_ends)
+    with np.errstate(all="ignore"):  # what no stage is handed
+        runs = [run(number) for number in range(RUNS + MORE_RUNS)]
+    masks = {name: np.logical_or.reduce([made[name] != known[name] for made in runs
+                                         if made[name].shape == known[name].shape] or [
+                                             np.zeros(known[name].shape, np.bool_)]) for name in whole}
+    return {name: mask for name, mask in masks.items() if mask.any()}
 
 
 def byte_step(case: Case, name: str, array: Array) -> float:
@@ -158,12 +183,22 @@ def _spread_bound(known: Arrays, name: str) -> Bound:
     return Bound((SIGMAS * np.sqrt(2.0 * variance.astype(np.float64))).astype(np.float32), nowhere)
 
 
-def _changed(
-    step: Stage, known: Arrays, seed: int, change: Callable[[str, Array, np.random.Generator], Array], number: int
-) -> dict[str, Array]:
-    random = np.random.default_rng([seed, number])
-    return {name: array if name in step.exact else change(name, array, random)
-            for name, array in as_read(known, step.reads, np.float64).items()}
+def _changed_runs(
+    step: Stage, known: Arrays, seed: int, change: Callable[[str, Array, np.random.Generator], Array],
+    keep: Callable[[str, Array], Array] = lambda _, array: array,
+) -> Callable[[int], dict[str, Array]]:
+    """Return what makes a stage's arrays of changed inputs, by number, as `keep` stores them; once if none changes."""
+    read = as_read(known, step.reads, np.float64)
+    changes = any(array.dtype.kind == "f" for name, array in read.items() if name not in step.exact)
+
+    @functools.cache
+    def run(number: int) -> dict[str, Array]:
+        random = np.random.default_rng([seed, number])
+        made = _run(step, {name: array if name in step.exact else change(name, array, random)
+                           for name, array in read.items()})
+        return {name: keep(name, array) for name, array in made.items()}
+
+    return run if changes else lambda _: run(0)
 
 
 def _run(step: Stage, inputs: Arrays, real: type = np.float64) -> dict[str, Array]:
@@ -188,6 +223,8 @@ def _to_half(array: Array) -> Array:
 
 
 def _to_bytes(array: Array, step: float) -> Array:
+    if not step:
+        return _to_half(array)
     least = 0.0 if step == BYTE else -1.0
     return (step * np.rint(np.clip(array, least, 1.0) / step)).astype(np.float32)
 

@@ -53,7 +53,7 @@ FORMATS = (*TIERS, *PACKED)
 WRONG = ("out", "invalid")
 FOLLOWS = "made from stages that are expected to fail"
 DOUBTED = "made from inputs in doubt: not judged are "
-OF_A_KIT = ("cases", "scenes", "schema")  # folders beside the cases where a kit itself is checked
+OF_A_KIT = ("bounds", "cases", "scenes", "schema")  # folders beside the cases where a kit itself is checked
 ORDER: tuple[Verdict, ...] = ("out", "invalid", "not-judged", "within", "exact", "not-run")
 
 
@@ -353,6 +353,8 @@ def _of_array(port: Port, name: str, arrays: Mapping[str, Array], tier: str) -> 
         outliers = max(few_bits.outliers, 0.0 if tolerance is None else tolerance.outliers)
         tolerance = few_bits.model_copy(update={"outliers": outliers})
         masks.add(few_bits.masked)
+    if name in port.few and PACKED.keys() & {*asked.tiers.values()}:
+        masks.add(entry.packed)
     alone = entry.bound is None or few_bits is not None
     limit = None if alone else kit.extra(case, entry.bound)  # type: ignore[arg-type]
     masked = [kit.extra(case, file) for file in sorted(file for file in masks if file is not None)]

@@ -19,7 +19,7 @@ import pydantic
 from refgi.errors import InputError, shortened
 from refgi.types import Array
 
-VERSION = "2.2.1"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
+VERSION = "2.3.0"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
 # a case, a major changes what an array means or its name
 LONGEST_LINE = 118  # characters of JSON
 KIT, CASE, RESULT = "kit.json", "manifest.json", "result.json"
@@ -58,6 +58,7 @@ class ArrayEntry(_Strict):
     bound: str | None = None  # file of (...) absolute bounds, one an element, maybe another case's; None: equal
     masked: str | None = None  # file of bool: elements that may differ at will
     masked_count: int = 0
+    packed: str | None = None  # file of bool: whole numbers that packed floats among what they are made of may change
     chained: Tolerance | None = None
     half: Tolerance | None = None  # tier T2
     bytes: Tolerance | None = None  # tier T2B

@@ -11,7 +11,7 @@ import hashlib
 import inspect
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +26,8 @@ from refgi.types import Array
 from refgi.vectors.docstrings import field_description, input_spec, returned, spec_of, summary, taken
 from refgi.vectors.forms import described
 from refgi.vectors.forms.beside import MOST_WORK, NO_BUGS, Described, ways
-from refgi.vectors.spec import Arrays, Bug, Case, Recipe, Run, Spec
+from refgi.vectors.leaves import leaves, named_outputs, rebuilt, run_of
+from refgi.vectors.spec import Bug, Case, Recipe, Run, Spec
 
 LEFT_OUT = frozenset({"scene.load", "rays.build", "rsm.resolve", "rsm.rasterize", "rsm.solid_angles", "rays.openness",
                       "rsm.lamp_irradiance", "lights.shares", "lights.map_flux", "cluster.blockers",
@@ -93,19 +94,12 @@ def _made(ran: list[stages.Run], only: str) -> tuple[dict[int, dict[str, Array]]
     made, first, seen = dict[int, dict[str, Array]](), dict[int, int](), dict[tuple[Any, ...], int]()
     for k, run in enumerate(ran):
         if run.name.startswith(only) and run.name not in LEFT_OUT and run.steps is None:
-            outputs = _named_outputs(inspect.unwrap(stages.STAGES[run.name]), run.output)
+            outputs = named_outputs(inspect.unwrap(stages.STAGES[run.name]), run.output)
             if outputs:
                 made[k] = outputs
                 read = dict(leaves(run.arguments)).values()
                 first[k] = seen.setdefault((run.name, *map(_content, read), *map(_content, outputs.values())), k)
     return made, first
-
-
-def _named_outputs(function: Callable[..., Any], output: Any) -> dict[str, Array]:
-    names = tuple(returned(function))
-    if type(output) is tuple and len(names) == len(output) and "" not in names:
-        output = dict(zip(names, output, strict=True))
-    return dict(leaves(output))
 
 
 class _Known:
@@ -226,69 +220,6 @@ def plain(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values that JSON can say."""
     return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items() if all(
         isinstance(one, bool | int | float | str) for one in (value if isinstance(value, tuple) else (value,)))}
-
-
-def run_of(
-    function: Callable[..., Any], arguments: Mapping[str, Any], reads: Mapping[str, str], writes: Mapping[str, str]
-) -> Run:
-    """Return a stage on arrays by name: its function with the arguments as they were, but for the arrays."""
-    def run(arrays: Arrays, real: Any) -> Arrays:
-        def handed(leaf: str, array: Array) -> Array:
-            new = arrays[reads[leaf]]
-            if array.dtype == np.bool_ and new.dtype != np.bool_:
-                return np.ascontiguousarray(new >= 0)
-            return np.ascontiguousarray(new, real if array.dtype.kind == "f" else array.dtype)
-
-        floats = {key for key, value in arguments.items() if isinstance(value, type | np.dtype)
-                  and np.dtype(value).kind == "f"}
-        changed = {key: np.dtype(real) if key in floats else rebuilt(value, key, handed, real)
-                   for key, value in arguments.items()}
-        made = _named_outputs(function, stages.recorded(function(**changed)))
-        return {array: made[leaf] for leaf, array in writes.items()}
-
-    return run
-
-
-def leaves(value: Any, name: str = "") -> Iterator[tuple[str, Array]]:
-    """Yield the arrays in a value and where they are: names of fields and indices, joined by dots."""
-    if isinstance(value, np.ndarray):
-        if value.dtype.kind in "fiub":
-            yield name, value
-    else:
-        for field, part in _parts(value):
-            yield from leaves(part, f"{name}.{field}" if name else field)
-
-
-def _parts(value: Any) -> Iterator[tuple[str, Any]]:
-    if hasattr(value, "recorded"):
-        yield from stages.recorded(value).items()
-    elif isinstance(value, Mapping):
-        yield from ((str(key), part) for key, part in value.items())
-    elif isinstance(value, tuple) and hasattr(value, "_fields"):
-        yield from zip(value._fields, value, strict=True)
-    elif isinstance(value, list | tuple):
-        yield from ((str(index), part) for index, part in enumerate(value))
-    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
-        yield from ((field.name, getattr(value, field.name)) for field in dataclasses.fields(value) if field.init)
-
-
-def rebuilt(value: Any, name: str, handed: Callable[[str, Array], Array], real: Any) -> Any:
-    """Return a value with other arrays: what `handed` returns for each one's name and the array that was there."""
-    if isinstance(value, np.ndarray):
-        return handed(name, value) if value.dtype.kind in "fiub" else value
-    before = dict(_parts(value))
-    parts = {field: rebuilt(part, f"{name}.{field}", handed, real) for field, part in before.items()}
-    if all(parts[field] is part for field, part in before.items()):
-        return value
-    if hasattr(value, "recorded"):
-        return value.with_channels(parts, np.dtype(real))
-    if isinstance(value, Mapping):
-        return {key: parts[str(key)] for key in value}
-    if hasattr(value, "_fields"):
-        return value._replace(**parts)
-    if isinstance(value, list | tuple):
-        return type(value)(parts.values())
-    return dataclasses.replace(value, **parts)
 
 
 class Timed(NamedTuple):

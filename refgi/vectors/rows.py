@@ -13,7 +13,6 @@ that take a wrong one.
 import ast
 import dataclasses
 import functools
-import hashlib
 import inspect
 import types
 import warnings
@@ -100,7 +99,7 @@ def _reached(function: Function, parts: Mapping[Function, str | ast.Module]) -> 
     return {one: text for one, text in parts.items() if one in reached}
 
 
-_results: ContextVar[dict[bytes, Any] | None] = ContextVar("refgi_literal_results", default=None)
+_results: ContextVar[dict[Any, Any] | None] = ContextVar("refgi_literal_results", default=None)
 
 
 @contextmanager
@@ -118,28 +117,26 @@ def _shared(function: Function) -> Callable[..., Any]:
     """Return a function that gives copies of what it returned before, inside `sharing`."""
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
-        results, total = _results.get(), hashlib.blake2b(_name(function).encode(), digest_size=20)
-        if results is None or not _hashed(total, (args, sorted(kwargs.items()))):
+        results = _results.get()
+        given = None if results is None else _key((args, sorted(kwargs.items())))
+        if results is None or given is None:
             return function(*args, **kwargs)
-        key = total.digest()
-        if key not in results:
+        if (key := (function, given)) not in results:
             results[key] = function(*args, **kwargs)
         return _copied(results[key])
 
     return call
 
 
-def _hashed(total: Any, value: Any) -> bool:
-    """Add a value to a hash, arrays with how they lie in memory; return whether its kind is known."""
-    if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
-        total.update(f"{value.dtype.str}{value.shape}{value.strides}".encode())
-        total.update(np.ascontiguousarray(value))
-        return True
+def _key(value: Any) -> Any:
+    """Return what equal values share, of arrays with how they lie in memory; None of what is of no known kind."""
+    if isinstance(value, np.ndarray):
+        return (value.dtype, value.shape, value.strides, value.tobytes()) if value.dtype.kind in "fiub" else None
     if isinstance(value, list | tuple):
-        total.update(f"{type(value).__name__}{len(value)}".encode())
-        return all(_hashed(total, one) for one in value)
-    total.update(f"{type(value).__name__}{value!r};".encode())
-    return value is None or isinstance(value, bool | int | float | str | np.generic)
+        parts = tuple(map(_key, value))
+        return None if None in parts else (type(value), parts)
+    known = value is None or isinstance(value, bool | int | float | str | np.generic)
+    return (type(value), repr(value)) if known else None
 
 
 def _copied(value: Any) -> Any:

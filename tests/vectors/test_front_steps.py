@@ -12,7 +12,7 @@ from refgi.splat import sii
 from refgi.splat.sii.settings import SiiSettings
 from refgi.vectors.cases.scenes import AWAY, BULB, SPOT, SUN, room
 from refgi.vectors.cases.splat import RANGE, SII, SII_FULL
-from refgi.vectors.recorded import leaves
+from refgi.vectors.leaves import leaves
 from refgi.vectors.rows import Form
 from tests.vectors.made import made
 

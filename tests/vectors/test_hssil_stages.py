@@ -11,7 +11,7 @@ from refgi.sssil.hssil import hssil
 from refgi.stages import observe
 from refgi.vectors.bounds import isolated_bounds, large_value
 from refgi.vectors.cases import hssil as cases
-from refgi.vectors.recorded import leaves
+from refgi.vectors.leaves import leaves
 from tests.vectors import made as shared
 
 CASES = {**cases.QUICK, **cases.FULL}

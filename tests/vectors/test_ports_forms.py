@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 from refgi.errors import InputError
+from refgi.vectors.cases import kit_cases
 from refgi.vectors.check import ALL_WITHIN, NOT_COMPARABLE, OUT
+from refgi.vectors.spec import outputs_of, stored
 from refgi.vectors.storage import Depth
+from tests.vectors.literal_port import written
 from tests.vectors.port import Port
 
 
@@ -38,11 +41,11 @@ def test_readbacks_of_texels_are_taken_where_they_are_asked_for(port):
     assert "order bgr" in port.first(layout="rgba").causes[0].cause
 
 
-def to_r11g11b10f(colours):
-    """Return the numbers of the format below colours: 6, 6 and 5 bits of mantissa."""
+def to_r11g11b10f(colours, rounded=np.floor):
+    """Return the numbers of the format below colours, or the nearest: 6, 6 and 5 bits of mantissa."""
     bits = np.array([6, 6, 5]).reshape(3, *[1] * (colours.ndim - 1))
     step = 2.0 ** (np.floor(np.log2(np.maximum(colours, 2.0**-14))) - bits)
-    return np.floor(colours / step) * step
+    return rounded(colours / step) * step
 
 
 @pytest.mark.parametrize("tiers", [{"rsm.reflected_flux0.flux": "R11G11B10F"}, {"flux": "R11G11B10F"},
@@ -100,6 +103,27 @@ def test_a_chain_passes_on_what_packed_floats_move(port):
     tiers = {"rsm.reflected_flux0.flux": "R11G11B10F"}
     assert port.check(chained=True, tiers=tiers).exit_code == ALL_WITHIN
     assert port.check(tiers=tiers).first == ("sii-warp-a", "pairs.sum")
+
+
+@pytest.mark.parametrize("rounded", [np.floor, np.rint])
+def test_decisions_on_packed_floats_may_be_others_and_bugs_show(kit, tmp_path, rounded):
+    """Pairs near a threshold, in a chain of the literal text that stores flux in few bits."""
+    port, tiers = Port(kit, "sii-range-length", tmp_path), {"flux": "R11G11B10F"}
+    known = {name: kit.array(port.case, name) for name in port.case.arrays}
+    for step in kit_cases("quick")["sii-range-length"]().stages:
+        made = written(step, known) or outputs_of(step, known, np.float64)
+        for name, array in made.items():
+            packed = name in ("rsm.reflected_flux0.flux", "lights.pixel_lights.flux")
+            known[name] = stored(to_r11g11b10f(array, rounded) if packed else array)
+            port.write(name, known[name])
+    kept, strength = "sii.kept.diffuse_kept", known["sii.strengths.diffuse_strength"]
+    moved = known[kept] != port.arrays[kept]
+    assert 0 < moved.mean() < 0.01
+    assert port.check(chained=True).exit_code == OUT
+    assert port.check(chained=True, tiers=tiers).exit_code == ALL_WITHIN
+    for share in (0.5, 0.8, 1.25):
+        port.write(kept, (strength >= share * known["sii.low_irradiance"]) & (strength > 0))
+        assert port.check(chained=True, tiers=tiers).first == ("sii-range-length", "sii.kept")
 
 
 def test_a_light_whose_flux_is_stored_as_0_may_be_absent(kit, tmp_path):

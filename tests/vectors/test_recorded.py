@@ -19,7 +19,8 @@ from refgi.vectors.check import Asked, check_output
 from refgi.vectors.docstrings import returned, taken
 from refgi.vectors.export import export_case
 from refgi.vectors.kit import Kit
-from refgi.vectors.recorded import leaves, recorded_case
+from refgi.vectors.leaves import leaves
+from refgi.vectors.recorded import recorded_case
 from refgi.vectors.rows import Form
 from refgi.vectors.spec import expected_of, kind_of, outputs_of
 

@@ -10,7 +10,7 @@ from refgi.methods import find_method
 from refgi.pairs.settings import PairSettings
 from refgi.stages import observe
 from refgi.vectors.cases.scenes import Planned
-from refgi.vectors.recorded import leaves
+from refgi.vectors.leaves import leaves
 from refgi.vectors.spec import as_read
 from tests.literal.whole.pairs import contributions
 from tests.naive.crossings import LIFT, corners_of, face_normals, free

@@ -10,7 +10,7 @@ from refgi.frame import Frame
 from refgi.stages import observe
 from refgi.vectors.bounds import distance, isolated_bounds
 from refgi.vectors.cases.visibility import VAL, VAL_FULL, val_settings
-from refgi.vectors.recorded import leaves
+from refgi.vectors.leaves import leaves
 from refgi.vectors.rows import Form
 from refgi.vectors.spec import kind_of, outputs_of
 from tests.vectors import made as shared

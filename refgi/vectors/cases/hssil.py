@@ -1,6 +1,7 @@
 """Hierarchical screen-space light, from the buffers to the picture, and its temporal filter."""
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -15,6 +16,7 @@ from refgi.settings import of, replaced
 from refgi.sssil.settings import PRESETS, HssilSettings, TemporalSettings
 from refgi.sssil.temporal import Sequence, SequenceFrame
 from refgi.sssil.temporal_filter import History, history_of, with_frames
+from refgi.types import Array
 from refgi.vectors.cases.scenes import (
     BULB,
     DOWN,
@@ -59,6 +61,7 @@ def settings_of(plan: Plan) -> HssilSettings:
 
 def with_other_light(case: Case) -> Case:
     """Return a case with likely bugs of sums of levels that take another light of the case than they should."""
+    known = functools.cache(functools.partial(expected_of, case))
     stages, made_by = list(case.stages), {name: step for step in case.stages for name in step.writes}
     for place, step in enumerate(case.stages):
         added = step.reads[-1] if kind_of(step.name) == "sssil.upsample" else ""
@@ -75,16 +78,15 @@ def with_other_light(case: Case) -> Case:
         if coarse.startswith("sssil.upsample"):
             wrong["only the next coarser level's own light is added, not the sum of all coarser ones"] = {
                 coarse: made_by[coarse].reads[-1]}
-        bugs = tuple(Bug(cause, _taking(case, step.run, others), LEVELS) for cause, others in wrong.items())
+        bugs = tuple(Bug(cause, _taking(known, step.run, others), LEVELS) for cause, others in wrong.items())
         stages[place] = dataclasses.replace(step, bugs=(*step.bugs, *bugs))
     return dataclasses.replace(case, stages=tuple(stages))
 
 
-def _taking(case: Case, run: Run, others: Mapping[str, str]) -> Run:
-    """Return a stage that reads other arrays of the case in place of some."""
+def _taking(known: Callable[[], Arrays], run: Run, others: Mapping[str, str]) -> Run:
+    """Return a stage that reads other arrays of its case, which `known` gives, in place of some."""
     def wrong(arrays: Arrays, real: Any) -> Arrays:
-        known = expected_of(case)
-        return run({**arrays, **{name: known[other].astype(real) for name, other in others.items()}}, real)
+        return run({**arrays, **{name: known()[other].astype(real) for name, other in others.items()}}, real)
 
     return wrong
 
@@ -98,6 +100,7 @@ def coherent(id: str, what: str) -> Case:
     recipe.scene = scenes[-1]
     with diagnosing(False):  # few samples are what the case is made of
         *_, before = sequence(id, scenes[:-1])
+        own, = sequence(id, scenes).over(scenes[-2:-1], FRAMES - 2)
         history = _history(before, scenes[-2])
 
         def last() -> Any:
@@ -105,21 +108,25 @@ def coherent(id: str, what: str) -> Case:
             return next(iter(sequence(id, scenes[-1:]).over(scenes[-1:], FRAMES - 1, left)))
 
         record(recipe, last)
-    add_other_camera(recipe, scenes[-1])
+    add_of_frames(recipe, scenes[-1], own.irradiance)
     recipe.facts["temporal"] = {key: value for key, value in dataclasses.asdict(TEMPORAL[id]).items()
                                 if value is not None}
     return with_other_light(recipe.case())
 
 
-def add_other_camera(recipe: Recipe, scene: Scene) -> None:
-    """Add the likely bug of a look-up in the frame before that it is made with this frame's camera, of `scene`."""
+def add_of_frames(recipe: Recipe, scene: Scene, own: Array) -> None:
+    """Add likely bugs of the look-up in the frame before: this frame's camera, of `scene`; that frame's `own` light."""
     now = camera_projection(scene.camera, *TEMPORAL_SIZE)
     place, step = next((k, one) for k, one in enumerate(recipe.stages) if one.name == "sssil.reprojection")
-    cameras = {name.replace(".", "__"): getattr(now, field) for name in step.reads
-               if "projection" in name and (field := name.rpartition(".")[2]) in ("origin", "frame", "half")}
-    bug = Bug("this frame's camera in place of that of the frame before", reading(step.run, **{
-        name: lambda a, one=one: np.asarray(one, a.dtype) for name, one in cameras.items()}), WARP)
-    recipe.stages[place] = dataclasses.replace(step, bugs=(bug, *step.bugs))
+    wrong = {"this frame's camera in place of that of the frame before": {
+        name: getattr(now, field) for name in step.reads
+        if "projection" in name and (field := name.rpartition(".")[2]) in ("origin", "frame", "half")},
+        "the earlier frame's own light, as printed, not its filtered one": {
+            name: own for name in step.reads if name.endswith(".irradiance")}}
+    bugs = (Bug(cause, reading(step.run, **{
+        name.replace(".", "__"): lambda a, one=one: np.asarray(one, a.dtype) for name, one in taken.items()}), WARP)
+        for cause, taken in wrong.items())
+    recipe.stages[place] = dataclasses.replace(step, bugs=(*bugs, *step.bugs))
 
 
 def _history(before: SequenceFrame, scene: Scene) -> History:

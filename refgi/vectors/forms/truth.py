@@ -12,6 +12,7 @@ from refgi.literal import imperfect, vpl
 from refgi.settings import flat, replaced
 from refgi.types import Array
 from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, own
+from refgi.vectors.leaves import run_of
 from refgi.vectors.spec import Arrays, Bug, Change, Run, reading, writing
 
 RADIOMETRY = "docs/radiometry: E = integral of L cos over the hemisphere, L = albedo/pi of the direct irradiance there"
@@ -75,7 +76,6 @@ def _once(stage: Run) -> Run:
 def of_settings(arguments: Arguments, _: Run, reads: Names, writes: Names) -> tuple[Bug, ...]:
     """Return bugs of how many bounces there are, and of what emits and blocks."""
     from refgi.truth.steps import path_traced as traced
-    from refgi.vectors.recorded import run_of
 
     settings = arguments["settings"]
 

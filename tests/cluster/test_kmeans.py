@@ -281,8 +281,11 @@ def test_a_warm_start_loses_clusters_and_a_restart_keeps_them(mode, evidence):
     sequence = frames()
     kept, warm = None, []
     for position, normal in sequence + sequence[::-1]:
-        kept = cluster(position, normal, AREAS, distance=mode, diagonal=DIAGONAL, start=kept)
+        before, kept = kept, cluster(position, normal, AREAS, distance=mode, diagonal=DIAGONAL, start=kept)
         warm.append(in_use(kept))
+        if before is not None and len(warm) % 10 == 0:
+            _, _, of = kmeans_rounds(position, normal, box(DIAGONAL), before.center, before.normal, mode, *WEIGHTS, 50)
+            np.testing.assert_array_equal(kept.of, of)
     restarted = [in_use(cluster(*lights, AREAS, distance=mode, diagonal=DIAGONAL)) for lights in sequence]
     evidence(f"{mode}: warm start {warm[:FRAMES:5]} of {AREAS} clusters wall to ceiling, {warm[-1]} when back; "
              f"restart {min(restarted)} at least")

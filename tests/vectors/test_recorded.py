@@ -103,6 +103,7 @@ def test_own_arrays_pass_and_a_flipped_one_fails_at_its_stage(kit_of, tmp_path, 
     assert caught >= 3
 
 
+@pytest.mark.feature("REF-33")
 def test_the_last_stage_is_the_picture_of_a_render(kit_of):
     kit = kit_of("sii")
     manifest, = kit.cases(Asked())
@@ -112,6 +113,7 @@ def test_the_last_stage_is_the_picture_of_a_render(kit_of):
     assert kit.array(manifest, manifest.stages[-1].writes[0]) == pytest.approx(picture, rel=1e-4, abs=1e-6)
 
 
+@pytest.mark.feature("REF-33")
 def test_arrays_that_stages_made_are_not_given():
     case = recorded("sii")
     assert all(name.startswith(("scene.", "materials.")) or ".projection." in name or ".lamp." in name
@@ -136,6 +138,7 @@ def test_a_case_of_indirect_light_ends_there():
     np.testing.assert_array_equal(expected_of(case)["pairs.sum"], expected_of(picture)["pairs.sum"])
 
 
+@pytest.mark.feature("REF-33")
 @pytest.mark.parametrize(("method", "stage", "changed"), [
     ("sii", "pairs.sum", "lights.pixel_lights.flux"),
     ("hssil", "sssil.gather_samples0", "sssil.senders.0.radiance"),

@@ -132,11 +132,12 @@ def test_a_small_picture_runs_what_the_one_that_it_stands_for_runs():
         assert ("error_target.error_driven" in {run.name for run in log.runs if run.status == "ran"}) is ran
 
 
+@pytest.mark.feature("REF-32")
 @pytest.mark.usefixtures("any_size")
 @pytest.mark.parametrize("kept", [True, False])
 @pytest.mark.parametrize("how", EACH_KIND, ids=str)
 def test_subsplats_without_an_error_are_every_pixel_to_the_bit(how, kept, monkeypatch):
-    """Oracle: every light at every pixel in one pass; lists read kept shadows, or filter maps anew."""
+    """Oracle: every light at every pixel of a smooth ball in one pass; lists read kept shadows, or filter maps anew."""
     if not kept:
         monkeypatch.setattr(shadows, "MOST_KEPT", 0)
     box = frame(width=80, height=60)

@@ -120,6 +120,8 @@ def test_arrays_that_stages_made_are_not_given():
                or name.endswith(".shifts") for name in case.given)
     total = next(step for step in case.stages if step.name == "pairs.sum")
     assert {"rsm.surface.position", "lights.pixel_lights.flux", "lights.footprints"} <= set(total.reads)
+    assert "cluster.visibility.points" not in recorded("val").given  # a copy of what a stage made
+    assert "pairs.glossy_sum.points.position" not in recorded("multires").given
 
 
 def test_some_stages_alone_are_given_what_they_read():

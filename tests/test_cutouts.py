@@ -62,11 +62,13 @@ def test_a_strip_that_is_cut_out_is_a_strip(method: str, evidence: Callable[[str
     assert effect > 0.02
 
 
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("method", METHODS)
 def test_a_hole_as_a_whole_changes_no_bit(method: str) -> None:
     np.testing.assert_array_equal(picture(method, pierced("hole")), picture(method, pierced("none")))
 
 
+@pytest.mark.feature("REF-28")
 @pytest.mark.slow("extra2")
 @pytest.mark.parametrize("extra", [
     {"source": "walk"}, {"maps_renderer": "rays"}, {"maps": "imperfect", "maps_points": 2000}])
@@ -129,6 +131,7 @@ def test_the_ledger_closes_on_leaves(settings: dict[str, Any], evidence: Callabl
     assert np.abs(ledger.reflected - whole.reflected).max() > 0.01 * whole.reflected.max()
 
 
+@pytest.mark.feature("REF-28")
 def test_light_paths_meet_what_is_there() -> None:
     scene = load_scene("leaf_grid:leaves=200")
     lights = walk_lights(Tracer(scene.geometry), scene.geometry, material_table(scene.materials),

@@ -109,6 +109,7 @@ def test_a_light_that_hits_nothing_gives_darkness(ball):
         assert not val(dark, small(how)).any()
 
 
+@pytest.mark.feature("VAL-04")
 def test_more_area_lights_than_lights_are_hard_shadows_of_each(ball):
     each = val(ball, small({"clusters_count": 1000}))
     hard = val(ball, small({"clusters_count": 64, "visibility": "hard"}))
@@ -261,6 +262,7 @@ def test_memory_of_maps_is_counted():
     assert counted(visibility="none") < hard
 
 
+@pytest.mark.feature("VAL-05", "VAL-17", "VAL-23", "VAL-24")
 def test_the_preset_of_the_paper_has_the_printed_values(ball):
     paper = PRESETS["paper"]
     assert (paper.lights.count, paper.clusters.count, paper.visibility.terms) == (1024, 30, 4)

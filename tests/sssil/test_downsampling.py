@@ -52,6 +52,7 @@ def test_means_keep_the_flux(evidence):
     evidence(f"average: flux equal to {FLOAT64:g}; closest: {', '.join(f'{share:.2f}' for share in closest)} of it")
 
 
+@pytest.mark.feature("HSS-09")
 def test_a_texel_without_area_shows_its_closest_pixel():
     """Normals that look away send nothing, but receive."""
     depth, normal, albedo, direct = random_picture(4, 4, behind=0.0)

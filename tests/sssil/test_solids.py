@@ -67,6 +67,7 @@ def test_the_motion_fits_best(strain, evidence):
     evidence(f"strained by {strain:g}: off by {off:.0e} m")
 
 
+@pytest.mark.feature("HSS-21")
 def test_normals_turn_with_it_and_what_rests_stays():
     now, solids = cloud(3)
     normals = np.random.default_rng(4).normal(size=now.vertices.shape)
@@ -80,6 +81,7 @@ def test_normals_turn_with_it_and_what_rests_stays():
     np.testing.assert_array_equal(rests.vertex_normals, now.vertex_normals)
 
 
+@pytest.mark.feature("HSS-21")
 def test_a_mirrored_pose_is_not_mirrored():
     now, solids = cloud(6)
     then = dataclasses.replace(now, vertices=now.vertices * (1, 1, -1))

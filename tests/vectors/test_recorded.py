@@ -124,6 +124,7 @@ def test_arrays_that_stages_made_are_not_given():
     assert "pairs.glossy_sum.points.position" not in recorded("multires").given
 
 
+@pytest.mark.feature("REF-33")
 def test_some_stages_alone_are_given_what_they_read():
     case = recorded_case("sii-heap", heap(), "sii", only="pairs.sum", **SIZE)
     assert [step.name for step in case.stages] == ["pairs.sum"]
@@ -208,6 +209,7 @@ def test_likely_bugs_and_the_search_know_stages_that_have_a_literal_form(kit_of,
     assert "over the hemisphere: 1/(2 pi)" in result.findings[0].causes[0].cause
 
 
+@pytest.mark.feature("REF-33")
 @pytest.mark.parametrize(("method", "kinds"), [
     ("sii", {"pairs.sum", "rsm.direct_irradiance"}),
     ("hssil", {"sssil.gather_samples", "sssil.blur", "sssil.upsample"}),

@@ -120,6 +120,7 @@ def test_rays_are_asked_for():
         visibility(maps, areas, 0, points, normals, of(ValSettings, visibility="rays_vpls"))
 
 
+@pytest.mark.feature("VAL-03")
 def test_light_without_extent_casts_the_hard_shadow():
     plates = [(-0.5, 0.2, -0.4, 0.4, 1.0)]
     points, normals = on_plane(3.0, 2.0, 30)

@@ -51,6 +51,7 @@ def test_the_curve_is_exact_at_every_code(codes: int) -> None:
     assert (table[0], table[-1]) == (0.0, 1.0)
 
 
+@pytest.mark.feature("REF-22")
 def test_texels_are_decoded_one_by_one_and_16_bits_hold_those_of_8() -> None:
     eight, sixteen = Image(CODES), Image(CODES.astype(np.uint16) * 257)
     assert np.array_equal(eight.linear(), srgb_table(256).astype(np.float32)[CODES])
@@ -65,6 +66,7 @@ def test_eight_bits_in_colour_with_and_without_alpha() -> None:
         assert np.array_equal(decoded(content, "a").pixels, CODES)
 
 
+@pytest.mark.feature("REF-22")
 @pytest.mark.parametrize("channels", [1, 3, 4])
 def test_sixteen_bits_keep_their_lower_byte(channels: int) -> None:
     codes = RNG.integers(0, 65536, (4, 3, channels), np.uint16)
@@ -106,6 +108,7 @@ def test_one_texel_and_sizes_that_are_no_powers_of_two() -> None:
     assert level_sizes(1, 6) == [(1, 6), (1, 3), (1, 1)]
 
 
+@pytest.mark.feature("REF-23")
 @pytest.mark.parametrize("shape", [(5, 7), (4, 6), (3, 1), (1, 1), (2, 9), (13, 11)])
 def test_levels_are_means_of_areas_and_keep_the_whole(shape: tuple[int, int]) -> None:
     level = image = RNG.random((*shape, 3))

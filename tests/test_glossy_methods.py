@@ -343,7 +343,7 @@ def texel(level, i, j):
             "area": level.area[i : i + 1, j : j + 1]}
 
 
-@pytest.mark.feature("REF-27", "HSS-04")
+@pytest.mark.feature("REF-27", "HSS-04", "HSS-07")
 @pytest.mark.parametrize("changes", [(), ("form_factor=point",), ("form_factor=texel",), ("disc_share=1",),
                                      ("only_level=1",), ("visibility=rays",), ("downsample=closest", "start=full")],
                          ids=str)

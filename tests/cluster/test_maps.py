@@ -77,7 +77,7 @@ def test_what_a_map_says_of_itself():
         np.testing.assert_allclose(getattr(single, name)[finite], getattr(maps, name)[finite], rtol=1e-6)
 
 
-@pytest.mark.feature("VAL-21")
+@pytest.mark.feature("VAL-11", "VAL-21")
 def test_the_hemisphere_behind_is_that_of_the_opposite_light():
     both = maps_of(SCENE, LIGHTS, behind="dual_paraboloid", occluders_alone=False)
     turned = LIGHTS._replace(frame=LIGHTS.frame * np.array([[-1.0], [1.0], [-1.0]]))  # the same lift

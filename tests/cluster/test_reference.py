@@ -166,6 +166,22 @@ def test_near_geometry_is_left_out_or_kept(box, evidence):
     assert np.mean(mean["planes"]) > np.mean(mean["keep"]) + 0.01
 
 
+@pytest.mark.feature("VAL-21", "VAL-22")
+def test_rays_from_behind_end_where_the_kind_of_shadow_ignores_what_is_near(box):
+    """Wiring: PCF's 0.6 of the radius where none is given, not 0.4, which is best for the series."""
+    frame, _, areas, points, facing = box
+
+    def seen(near):
+        settings = replaced(SETTINGS, {"behind": "raytrace", "visibility": "pcf", "near_geometry": "ball",
+                                       "near_distance": near})
+        maps = shadow_maps(frame.scene.geometry, areas, settings.drawn_maps, np.float64)
+        share = visibility_by(areas, maps, settings, None, frame.tracer)
+        return np.concatenate([share(m, points, facing)[height_above(areas, m, points) < 0] for m in range(6)])
+
+    np.testing.assert_array_equal(seen(None), seen(0.6))
+    assert (seen(None) != seen(0.4)).any()
+
+
 def test_same_bits_for_any_threads_and_any_split(box):
     frame, lights, areas, points, facing = box
     maps = shadow_maps(frame.scene.geometry, areas, SETTINGS.maps, np.float64)

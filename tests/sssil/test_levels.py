@@ -52,7 +52,7 @@ def assert_equal_to(expected, level, rtol):
         assert not plane[:, level.pixel < 0].any()
 
 
-@pytest.mark.feature("HSS-01", "HSS-02", "HSS-08", "HSS-09")
+@pytest.mark.feature("HSS-01", "HSS-02", "HSS-08", "HSS-09", "HSS-10")
 @pytest.mark.parametrize("mode", MODES)
 def test_levels_are_those_of_the_literal_text(mode, evidence):
     """Odd sizes, ties, background, normals that look away; all three starts."""

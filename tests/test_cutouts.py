@@ -13,6 +13,7 @@ from refgi.cluster.settings import ValSettings
 from refgi.frame import Frame
 from refgi.lights.refraction import refracted
 from refgi.lights.walk import walk_lights
+from refgi.literal import imperfect
 from refgi.methods import find_method
 from refgi.rays import Tracer
 from refgi.rsm import reflective_shadow_map
@@ -27,6 +28,7 @@ from refgi.truth.imperfect import Imperfect, imperfect_maps
 from refgi.truth.truth import trace_truth
 from tests.cluster.lights import area_lights
 from tests.cutouts import half_plate, heap, opaque, pierced
+from tests.literal.whole.vpl import STREAM, draw
 from tests.naive import cutouts as naive
 from tests.naive.textures import barycentric
 from tests.test_ledger import WHOLE, balance
@@ -60,11 +62,13 @@ def test_a_strip_that_is_cut_out_is_a_strip(method: str, evidence: Callable[[str
     assert effect > 0.02
 
 
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("method", METHODS)
 def test_a_hole_as_a_whole_changes_no_bit(method: str) -> None:
     np.testing.assert_array_equal(picture(method, pierced("hole")), picture(method, pierced("none")))
 
 
+@pytest.mark.feature("REF-28")
 @pytest.mark.slow("extra2")
 @pytest.mark.parametrize("extra", [
     {"source": "walk"}, {"maps_renderer": "rays"}, {"maps": "imperfect", "maps_points": 2000}])
@@ -127,6 +131,7 @@ def test_the_ledger_closes_on_leaves(settings: dict[str, Any], evidence: Callabl
     assert np.abs(ledger.reflected - whole.reflected).max() > 0.01 * whole.reflected.max()
 
 
+@pytest.mark.feature("REF-28")
 def test_light_paths_meet_what_is_there() -> None:
     scene = load_scene("leaf_grid:leaves=200")
     lights = walk_lights(Tracer(scene.geometry), scene.geometry, material_table(scene.materials),
@@ -183,6 +188,25 @@ def test_points_of_imperfect_maps_lie_on_what_is_there() -> None:
     assert seen.sum() == pytest.approx(0.5 * both.sum(), rel=0.1)
     rows, columns = np.nonzero(seen)
     assert min(columns.min(), rows.min()) < 14 <= max(columns.min(), rows.min()) == 32  # the half x > 0 alone
+
+
+@pytest.mark.feature("REF-17", "REF-28")
+def test_imperfect_maps_hold_the_points_that_are_there() -> None:
+    """Oracle: the literal text's points, without those where alpha is below the cutoff, on the literal text's map."""
+    scene, settings = heap(), Imperfect(points=600, resolution=32)
+    shape, lights = scene.geometry, _one_light((0.1, -0.3, 0.2), (0.0, 0.6, 0.8))
+    given = np.asarray(shape.vertices, float), shape.faces
+    shift = np.array([[draw(0, STREAM, c) for c in range(3)]])
+    place, face, radius = imperfect.scattered_points(*given, shift, settings.points)
+    corner = given[0][shape.faces[face[0]]]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    uv = [barycentric(*one) @ shape.uv[f] for *one, f in zip(corner, place[0] + normal, -normal, face[0], strict=True)]
+    there = np.array([naive.excess(scene.materials[shape.material_of_face[f]], *at) >= 0
+                      for f, at in zip(face[0], uv, strict=True)])
+    assert 0.2 < there.mean() < 0.9
+    expected = imperfect.depth_maps(*given, place[:, there], face[:, there], radius, lights.position,
+                                    imperfect.map_frames(lights.normal), settings.resolution)
+    np.testing.assert_allclose(imperfect_maps(shape, lights, settings).depth, expected, rtol=1e-6)
 
 
 @pytest.mark.feature("REF-28")

@@ -19,14 +19,18 @@ from refgi.literal.pairs import pair
 from refgi.method import _WARNED
 from refgi.methods import METHODS, render
 from refgi.rays import Tracer
+from refgi.rsm.buffers.leaving import glossy_points
 from refgi.settings import from_text, of, replaced
 from refgi.skips import without_skip
 from refgi.splat.multires.multires import glossy_subsplats
 from refgi.splat.sii import SiiSettings
 from refgi.sssil import HssilSettings
+from refgi.sssil.cameras import frame_through
 from refgi.sssil.glossy import warped
+from refgi.sssil.hssil import view_lobes
 from refgi.sssil.levels import pyramid, sender_pyramid
 from refgi.sssil.pattern import chosen_radius
+from refgi.sssil.reprojection import SourceView, reproject
 from refgi.sssil.temporal import Sequence
 from tests.glossy import SIZE, defined, glossy_box
 from tests.literal.whole import gather
@@ -106,7 +110,7 @@ def test_direct_light_is_reflected_with_its_shadows(shadows):
     close(frame.direct_lobes, expected.reshape(3, 13, 17))
 
 
-@pytest.mark.feature("REF-27")
+@pytest.mark.feature("REF-27", "HSS-16")
 def test_the_picture_is_diffuse_light_and_lobes():
     frame = Frame(SCENES["lamps"](), **OPTIONS)
     picture = render(frame.scene, "sii", of(SiiSettings, lights=32), **OPTIONS)
@@ -145,13 +149,25 @@ def test_a_cut_leaves_the_same_pairs_out(room):
     plain, cut = lobes(room, "sii", *changes[:1], changes[3]), lobes(room, "sii", *changes)
     assert (cut <= plain * (1 + 1e-12)).all()
     assert cut.sum() < 0.99 * plain.sum()
-    points = room.glossy_points
-    frame = Frame(room.scene, **OPTIONS)
+    assert_even_lobes_are_irradiance(room, "sii", from_text(SiiSettings(), changes))
+
+
+def assert_even_lobes_are_irradiance(room, method, settings, rtol=FLOAT64):
+    points, frame = room.glossy_points, Frame(room.scene, **OPTIONS)
     frame.glossy_points = points._replace(mirrored=points.normal, exponent=np.zeros_like(points.exponent),
                                           specular=np.ones_like(points.specular))
-    settings = from_text(SiiSettings(), changes)
-    irradiance = METHODS["sii"].function(frame, settings).reshape(3, -1)[:, points.pixel]
-    close(METHODS["sii"].lobes(frame, settings).reshape(3, -1)[:, points.pixel], irradiance / math.pi)
+    irradiance = METHODS[method].function(frame, settings).reshape(3, -1)[:, points.pixel]
+    close(METHODS[method].lobes(frame, settings).reshape(3, -1)[:, points.pixel], irradiance / math.pi, rtol)
+
+
+@pytest.mark.feature("REF-17", "REF-25")
+def test_imperfect_maps_shadow_lobes_as_they_do_irradiance(room):
+    """Lobes of exponent 0 around the normals, whose light is the irradiance that tests/wiring/test_vpl has by loops."""
+    changes = ("lights=24", "maps=imperfect", "maps.points=300", "maps.resolution=16")
+    settings = from_text(METHODS["vpl"].settings(), changes)
+    assert_even_lobes_are_irradiance(room, "vpl", settings, RAYS)
+    by_rays = lobes(room, "vpl", *changes[:1])
+    assert np.abs(METHODS["vpl"].lobes(room, settings) - by_rays).max() > 0.01 * by_rays.max()
 
 
 @pytest.mark.feature("AMS-13", "REF-27")
@@ -327,7 +343,7 @@ def texel(level, i, j):
             "area": level.area[i : i + 1, j : j + 1]}
 
 
-@pytest.mark.feature("REF-27", "HSS-04")
+@pytest.mark.feature("REF-27", "HSS-04", "HSS-07")
 @pytest.mark.parametrize("changes", [(), ("form_factor=point",), ("form_factor=texel",), ("disc_share=1",),
                                      ("only_level=1",), ("visibility=rays",), ("downsample=closest", "start=full")],
                          ids=str)
@@ -359,6 +375,18 @@ def test_hssil_sums_every_texel_of_all_levels(room, changes):
                         worth *= unoccluded(room, points.position[:, n], facing[n], level.pixel[i, j])
                     total[:, n] += worth * f * level.radiance[:, i, j]
     close(METHODS["hssil"].lobes(room, settings), spread(room, points, total * points.specular), 1e-9)
+
+
+@pytest.mark.feature("REF-20")
+@pytest.mark.parametrize(("switch", "factor"), [("hss_disc_pi", 1 / math.pi), ("hss_level_factor", 4.0),
+                                                ("hss_tan_f", None)])
+def test_printed_forms_of_hssil_have_their_factor_in_lobes(room, switch, factor):
+    """Section 0, of the second level alone: 1/pi of discs, 4^k, tan f_h tan f_v over those of half the angles."""
+    horizontal, vertical = room.gbuffer.projection.half
+    factor = factor or 4 / ((1 - horizontal**2) * (1 - vertical**2))
+    form = "point" if switch == "hss_tan_f" else "disc"
+    changes = "levels=3", "radius=2", "pattern=all", "only_level=1", f"form_factor={form}"
+    close(lobes(room, "hssil", *changes, f"as_published={switch}"), factor * lobes(room, "hssil", *changes), 1e-12)
 
 
 def unoccluded(frame, x, facing, pixel):
@@ -437,6 +465,12 @@ def test_cameras_join_the_largest_lobes(room):
     settings = from_text(HssilSettings(), ("levels=2", "radius=4", "pattern=all"))
     alone = METHODS["hssil"].lobes(room, settings)
     joined = METHODS["hssil"].lobes(room, replaced(settings, {"cameras.views": (side,)}))
+    other, buffer = frame_through(room, side), room.gbuffer
+    found = view_lobes(other, glossy_points(other.gbuffer, other.materials, room.scene.camera.eye), settings)
+    seen = SourceView(other.gbuffer.projection, other.gbuffer.depth, other.gbuffer.normal)
+    found, _ = reproject(found, seen, buffer.position, buffer.normal, buffer.covered,
+                         depth_tolerance=settings.cameras.depth_tolerance, normal_cosine=settings.cameras.normal_cosine)
+    close(joined, np.where(spread(room, room.glossy_points, 1.0) > 0, np.maximum(alone, found), 0.0))
     assert (joined >= alone).all()
     assert joined.sum() > 1.01 * alone.sum()
     outside = np.ones(13 * 17, bool)

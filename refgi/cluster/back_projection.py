@@ -176,7 +176,7 @@ def _share(hidden: Array, x: Array, up: Array, horizon: Array, i: int, low: Arra
 @stage("cluster.back_projection", kept=False)
 def back_projection(
     places: Places, facing: Array, depth: Array, axes: Array, side: Array, offset: Array, center: Array, normal: Array,
-    scene_far: Array,
+    scene_far: Array, shading: Array | None = None,
 ) -> Array:
     """Project texels back onto the rectangle: V is the share of cells that none hides (docs/methods/val_visibility).
 
@@ -187,15 +187,17 @@ def back_projection(
     center (3, area light): Centres of clusters, m.
     normal (3, area light): Their unit normals.
     scene_far (area light,): To the farthest place there is, m.
-    -> (area light, h, w): V of the cells above the pixel's plane, 0 hidden to 1 seen; 1 behind the light's plane, on
-        empty maps, without surface.
+    shading (3, h, w): Normals that cosines are taken with, where they are not the faces': unit vectors.
+    -> (area light, h, w): V of the cells above the plane of cosines, 0 hidden to 1 seen, the face hides what is below
+        it; 1 behind the light's plane, on empty maps, without surface.
     """
     areas: Any = SimpleNamespace(**{name: np.asarray(one, np.float64) for name, one in (
         ("axes", axes), ("side", side), ("offset", offset), ("center", center), ("normal", normal))})
     maps = maps_of(places, np.asarray(depth, np.float64))._replace(scene_far=np.asarray(scene_far, np.float64))
     visible = back_projection_visibility(areas, maps)
-    points, normals = (np.ascontiguousarray(one.reshape(3, -1), np.float64) for one in (places.position, facing))
     covered, made = places.covered.reshape(-1), planes(places, fill=1)
+    points, faces, normals = (np.ascontiguousarray(one.reshape(3, -1)[:, covered], np.float64)
+                              for one in (places.position, facing, facing if shading is None else shading))
     for k in range(len(made)):
-        made[k].reshape(-1)[covered] = visible(k, points[:, covered], normals[:, covered])
+        made[k].reshape(-1)[covered] = visible(k, points, faces, normals)
     return made

@@ -155,7 +155,8 @@ def _visibility(
     ahead = Places(receivers.position, receivers.covered, maps["center"], maps["frame"], areas.delta, maps["near"])
     if isinstance(kind, BackProjection):
         return back_projection(ahead, facing, maps["depth"], areas.axes, areas.side, areas.offset, areas.center,
-                               areas.normal, maps["scene_far"])
+                               areas.normal, maps["scene_far"],
+                               None if np.may_share_memory(receivers.normal, facing) else receivers.normal)
     share = _by_map(ahead, facing, maps["depth"], maps["far"], maps["scene_far"], settings)
     if "behind" not in maps:
         return share

@@ -102,7 +102,8 @@ def shadows(kind: str, position: Any, triangle_id: Any, facing: Any, areas: Any,
         if kind == "back_projection":
             side, offset, middle, axis = (
                 one[:, k : k + 1] for one in (areas.side, areas.offset, areas.center, areas.normal))
-            v = back_projection(*pixels, depth, center, frame, areas.axes[k : k + 1], side, offset, middle, axis, far)
+            v = back_projection(*pixels, depth, center, frame, areas.axes[k : k + 1], side, offset, middle, axis, far,
+                                soft.get("shading"))
             found.append((v, 0 * v))
         elif kind in ("pcf", "hard") or delta == 0:
             near, _ = val_maps.map_ranges(depth)

@@ -18,26 +18,29 @@ LEAST_SIDE = 1e-9  # of a rectangle, as a share of the farthest place: a point h
 
 def back_projection(
     position: Any, triangle_id: Any, facing: Any, depth: Any, map_center: Any, frame: Any, axes: Any, side: Any,
-    offset: Any, center: Any, normal: Any, scene_far: Any,
+    offset: Any, center: Any, normal: Any, scene_far: Any, shading: Any = None,
 ) -> Any:
     """Return V (K, h, w) of rectangles with axes (K, 2, 3), side and offset (2, K) from their centers (3, K).
 
-    Pixels behind a rectangle see it whole, and so do those with no part of it above their plane.
+    Pixels behind a rectangle see it whole, and so do those with no part of it above their plane. What lies above that
+    of normals `shading` (3, h, w), those of cosines, and below the face counts as hidden.
     """
     share = np.ones((len(depth), *triangle_id.shape), position.dtype)
     for k in range(len(depth)):
         turn = np.stack([*axes[k], normal[:, k]])
         x = np.einsum("ac,cij->aij", turn, position - map_center[k][:, None, None])
         up = np.einsum("ac,cij->aij", turn, facing)
+        horizon = up if shading is None else np.einsum("ac,cij->aij", turn, shading)
         extent = np.maximum(side[:, k], LEAST_SIDE * scene_far[k])
         low = offset[:, k] - extent / 2
         lift = normal[:, k] @ (center[:, k] - map_center[k])
         toward, corners, z = patches(depth[k], frame[k], turn)
         for i, j in np.argwhere((triangle_id >= 0) & (x[2] > 0)):
-            u, v = cells_below(low, extent, x[:, i, j], up[:, i, j], lift)
+            u, v = cells_below(low, extent, x[:, i, j], horizon[:, i, j], lift)
+            below = heights(u, v, x[:, i, j], up[:, i, j], lift) <= 0
             limit = plane_distance(toward, x[:, i, j, None], np.inf, up[:, i, j, None])
             quads = projected(corners[:, :, hides(z, limit)], x[:, i, j], lift)
-            share[k, i, j] = 1 - covered(quads, u, v).mean() if u.size else 1
+            share[k, i, j] = 1 - (covered(quads, u, v) | below).mean() if u.size else 1
     return share
 
 
@@ -60,8 +63,13 @@ def cells_below(low: Any, extent: Any, x: Any, up: Any, lift: Any) -> Any:
     """Return u, v (cells,) of the cells' centres that lie above a pixel's plane."""
     step = (np.arange(CELLS) + 0.5) / CELLS
     u, v = np.meshgrid(*(low[a] + step * extent[a] for a in (0, 1)))
-    above = (u - x[0]) * up[0] + (v - x[1]) * up[1] + (lift - x[2]) * up[2] > 0
+    above = heights(u, v, x, up, lift) > 0
     return u[above], v[above]
+
+
+def heights(u: Any, v: Any, x: Any, up: Any, lift: Any) -> Any:
+    """Return how far places u, v of the light's plane lie above a pixel's."""
+    return (u - x[0]) * up[0] + (v - x[1]) * up[1] + (lift - x[2]) * up[2]
 
 
 def projected(corners: Any, x: Any, lift: Any) -> Any:

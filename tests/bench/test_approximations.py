@@ -209,6 +209,7 @@ def test_a_method_that_declares_none_has_one_part(small, monkeypatch):
     assert chain.alone == {}
 
 
+@pytest.mark.feature("VAL-27")
 def test_kinds_of_visibility_in_val_have_the_maps_of_the_method():
     """Near distances that are best for each kind would be a step of their own: those of the series, 0.4, stay."""
     method = METHODS["val"]

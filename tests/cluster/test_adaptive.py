@@ -121,6 +121,7 @@ class Known:
         return type("Attempt", (), {"trial": Trial(count, 1 / count, 1.25 / count)})()
 
 
+@pytest.mark.feature("VAL-04")
 @pytest.mark.parametrize(("target", "tried", "best"), [
     (2.0, [1], 1), (0.7, [1, 2], 2), (0.35, [1, 2, 4, 3], 4), (0.43, [1, 2, 4, 3], 3), (0.1, [1, 2, 4, 8, 16, 12], 16),
     (0.01, [1, 2, 4, 8, 16, 32, 50], 50)])  # fmt: skip

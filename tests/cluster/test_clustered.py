@@ -168,20 +168,27 @@ def test_an_area_light_for_each_light_is_a_hard_shadow_for_each(scene, evidence)
     evidence(f"{frame.dtype.name}: M = N = {count}: {error:.1e} off the sum of lights with hard shadows")
 
 
-@pytest.mark.parametrize("mode", ["csm", "pcss", "pcf", "hard"])
-def test_tile_by_tile_has_the_bits_of_lists_of_receivers(scene, mode):
-    """Fast = slow: V through `visibility_of` takes the long way."""
+@pytest.mark.feature("VAL-04", "VAL-12", "VAL-14", "VAL-15", "VAL-16", "VAL-17", "VAL-18")
+@pytest.mark.parametrize("how", [
+    {"visibility": "csm"}, {"visibility": "pcss"}, {"visibility": "pcf"}, {"visibility": "hard"}, {"terms": 2},
+    {"depth_scale": "scene", "bias": 0.1}, {"quantisation": "published", "as_published": ("val_search_solid_angle",)},
+    {"depth_scale": "map", "as_published": ("val_alpha_over_pi",)}, {"rescale": "scale2", "attenuation": 1.0},
+    {"visibility": "pcss", "cone": False, "blocker_depth": "axial"}, {"visibility": "pcf", "texels": 3}], ids=str)
+def test_tile_by_tile_has_the_bits_of_lists_of_receivers(scene, how):
+    """Fast = slow: V through `visibility_of` takes the long way, which tests/wiring has by loops for each setting."""
     frame, lights, to, facing = scene
-    settings = of(ValSettings, maps_resolution=32, visibility=mode)
+    settings = of(ValSettings, maps_resolution=32, **how)
     areas, maps = shadowed(frame, lights, 5, settings)
-    for side in (1, 3):
-        fast = clustered_irradiance(to, facing, lights, areas, maps, settings, interleaving=side)
-        slow = clustered_irradiance(to, facing, lights, areas, maps, settings, interleaving=side,
+    blue = lights._replace(flux=lights.flux * np.array([[0], [0], [1]], lights.flux.dtype))
+    for side, some in ((1, lights), (3, blue)):  # what looks at red alone takes the latter for no light
+        fast = clustered_irradiance(to, facing, some, areas, maps, settings, interleaving=side)
+        slow = clustered_irradiance(to, facing, some, areas, maps, settings, interleaving=side,
                                     visibility_of=lambda m, at, up: visibility(maps, areas, m, at, up, settings))
         assert np.array_equal(fast, slow)
         with threads(1):
-            assert np.array_equal(fast, clustered_irradiance(to, facing, lights, areas, maps, settings,
+            assert np.array_equal(fast, clustered_irradiance(to, facing, some, areas, maps, settings,
                                                              interleaving=side))
+        assert fast.any()
         assert (fast[:, ~to.covered] == 0).all()
 
 

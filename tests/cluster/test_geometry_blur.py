@@ -106,6 +106,7 @@ def test_nothing_leaks_across_an_edge(evidence):
     evidence("a step of 1e7 across an edge in depth, in normal: 0 bits leak")
 
 
+@pytest.mark.feature("VAL-24")
 @pytest.mark.parametrize("real", [np.float32, np.float64])
 def test_without_comparisons_where_bounds_decide(real):
     """A tile whose pixels all count has the bits of one that compares them: an edge far below changes none above."""

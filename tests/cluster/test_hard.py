@@ -28,6 +28,7 @@ TIES = 4e-4  # share of pairs: rays are float32, and end a thousandth before fac
 LEAST_ORDER = 0.8
 
 
+@pytest.mark.feature("VAL-03")
 @pytest.mark.parametrize(("dtype", "close_calls"), [(np.float32, CLOSE_CALLS), (np.float64, 0)])
 def test_every_receiver_as_in_the_literal_text(dtype, close_calls):
     rng = np.random.default_rng(5)
@@ -136,6 +137,7 @@ def _near_silhouette(tracer, points, facing, light, normal, angle):
     return found
 
 
+@pytest.mark.feature("VAL-21")
 def test_behind_an_area_light_all_is_visible_unless_there_is_a_map():
     plate = geometry([[-1, -1, -1], [1, -1, -1], [0, -1, 1]], [[0, 1, 2]])
     light, below = area_lights([[0, 0, 0]], [[0, 1, 0]]), np.array([[0.0, -2, 0], [0, 2, 0]]).T

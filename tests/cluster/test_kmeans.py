@@ -147,6 +147,7 @@ def test_normals_keep_clusters_planar(evidence):
     assert mean_angle(normal, both) == pytest.approx(np.concatenate(angles).mean(), abs=ANGLE_ERROR)
 
 
+@pytest.mark.feature("VAL-08")
 def test_angles_are_exact_near_zero_and_near_a_half_turn():
     rng = np.random.default_rng(2)
     worst = 0.0
@@ -165,6 +166,7 @@ def test_angles_are_exact_near_zero_and_near_a_half_turn():
     assert angle(-1.0, 0.0) == math.pi
 
 
+@pytest.mark.feature("VAL-05")
 def test_the_normalised_clusters_do_not_depend_on_the_unit_of_length():
     position, normal, count = random_lights(11)
     metres = cluster(position, normal, count, diagonal=1.5)
@@ -186,6 +188,7 @@ def test_all_lights_in_one_point(mode):
     assert (found.center == 0.3).all()  # the mean has what all have in common; empty clusters stay where they were
 
 
+@pytest.mark.feature("VAL-04")
 def test_as_many_clusters_as_lights_are_the_lights_themselves():
     position, normal, _ = random_lights(4)
     position[:, 5], normal[:, 5] = position[:, 2], normal[:, 2]  # two of them in one place
@@ -200,6 +203,7 @@ def test_as_many_clusters_as_lights_are_the_lights_themselves():
         assert said == ([] if count == total else [f"20 of {count} area lights: there are {total} pixel lights"])
 
 
+@pytest.mark.feature("VAL-07", "VAL-08")
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("turns", [(0, 180), (10, 130, 250)])
 def test_a_cluster_whose_normals_cancel_keeps_its_normal(mode, turns):
@@ -281,8 +285,11 @@ def test_a_warm_start_loses_clusters_and_a_restart_keeps_them(mode, evidence):
     sequence = frames()
     kept, warm = None, []
     for position, normal in sequence + sequence[::-1]:
-        kept = cluster(position, normal, AREAS, distance=mode, diagonal=DIAGONAL, start=kept)
+        before, kept = kept, cluster(position, normal, AREAS, distance=mode, diagonal=DIAGONAL, start=kept)
         warm.append(in_use(kept))
+        if before is not None and len(warm) % 10 == 0:
+            _, _, of = kmeans_rounds(position, normal, box(DIAGONAL), before.center, before.normal, mode, *WEIGHTS, 50)
+            np.testing.assert_array_equal(kept.of, of)
     restarted = [in_use(cluster(*lights, AREAS, distance=mode, diagonal=DIAGONAL)) for lights in sequence]
     evidence(f"{mode}: warm start {warm[:FRAMES:5]} of {AREAS} clusters wall to ceiling, {warm[-1]} when back; "
              f"restart {min(restarted)} at least")

@@ -77,6 +77,7 @@ def test_what_a_map_says_of_itself():
         np.testing.assert_allclose(getattr(single, name)[finite], getattr(maps, name)[finite], rtol=1e-6)
 
 
+@pytest.mark.feature("VAL-11", "VAL-21")
 def test_the_hemisphere_behind_is_that_of_the_opposite_light():
     both = maps_of(SCENE, LIGHTS, behind="dual_paraboloid", occluders_alone=False)
     turned = LIGHTS._replace(frame=LIGHTS.frame * np.array([[-1.0], [1.0], [-1.0]]))  # the same lift
@@ -137,6 +138,7 @@ def test_the_shadow_of_an_object_near_the_centre_is_kept_or_lost(rule, near_one,
     evidence(f"{rule}: shadow of the plate at 0.3 radii {'lost' if near_one else 'kept'}, at 3 radii kept")
 
 
+@pytest.mark.feature("VAL-22")
 def test_a_ball_cuts_surfaces_and_shows_what_lies_beyond():
     sheets = geometry([[-5, 1, -5], [5, 1, -5], [0, 1, 9], [-5, 1.5, -5], [5, 1.5, -5], [0, 1.5, 9]],
                       [[0, 1, 2], [3, 4, 5]])

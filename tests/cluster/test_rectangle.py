@@ -102,6 +102,7 @@ def test_a_turned_square_doubles_its_area_of_fixed_axes(evidence):
              f"{areas['min_area']:.3f} m^2 of least area")
 
 
+@pytest.mark.feature("VAL-09")
 @pytest.mark.parametrize("axes", ["fixed", "pca", "min_area"])
 @pytest.mark.parametrize("extent", ["root", "longer", "shorter"])
 @pytest.mark.parametrize("count", [1, 12])
@@ -128,6 +129,7 @@ def test_frames_are_those_of_the_maps():
     np.testing.assert_allclose(map_frames(normal), expected, rtol=0, atol=1e-15)
 
 
+@pytest.mark.feature("VAL-09")
 def test_a_single_light_is_a_point_or_its_footprint():
     position = np.array([[0.0, 5.0, 6.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     normals = np.repeat([[0.0], [1.0], [0.0]], 3, axis=1)

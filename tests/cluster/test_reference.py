@@ -17,6 +17,7 @@ from refgi.cluster.reference import (
     reference_visibility,
 )
 from refgi.cluster.settings import ValSettings
+from refgi.cluster.val import val
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights
 from refgi.literal.val import Maps, shadows
@@ -24,9 +25,11 @@ from refgi.literal.val_back_projection import CELLS
 from refgi.rsm import facing_normals
 from refgi.scene import load_scene
 from refgi.settings import of, replaced
+from refgi.stages import observe
 from tests.cluster.edge import SETTINGS as EDGE
 from tests.cluster.edge import receivers, square_light
 from tests.cluster.edge import scene as edge_scene
+from tests.literal.whole import val as literal
 from tests.naive import truth
 
 # nothing near six large clusters, so that rays to a rectangle and one view from its centre meet the same surfaces
@@ -163,6 +166,22 @@ def test_near_geometry_is_left_out_or_kept(box, evidence):
     assert np.mean(mean["planes"]) > np.mean(mean["keep"]) + 0.01
 
 
+@pytest.mark.feature("VAL-21", "VAL-22")
+def test_rays_from_behind_end_where_the_kind_of_shadow_ignores_what_is_near(box):
+    """Wiring: PCF's 0.6 of the radius where none is given, not 0.4, which is best for the series."""
+    frame, _, areas, points, facing = box
+
+    def seen(near):
+        settings = replaced(SETTINGS, {"behind": "raytrace", "visibility": "pcf", "near_geometry": "ball",
+                                       "near_distance": near})
+        maps = shadow_maps(frame.scene.geometry, areas, settings.drawn_maps, np.float64)
+        share = visibility_by(areas, maps, settings, None, frame.tracer)
+        return np.concatenate([share(m, points, facing)[height_above(areas, m, points) < 0] for m in range(6)])
+
+    np.testing.assert_array_equal(seen(None), seen(0.6))
+    assert (seen(None) != seen(0.4)).any()
+
+
 def test_same_bits_for_any_threads_and_any_split(box):
     frame, lights, areas, points, facing = box
     maps = shadow_maps(frame.scene.geometry, areas, SETTINGS.maps, np.float64)
@@ -203,6 +222,19 @@ def test_what_cosines_let_through_and_the_face_hides_counts_as_hidden(box):
                 assert (visibility_of(m, at, -look) == 1).all()  # nothing counts
                 assert not visibility_of(m, at, -look, shading=look).any()
     assert min(tried.values()) > 20
+
+
+@pytest.mark.feature("REF-15", "REF-32", "VAL-27")
+def test_a_picture_of_smooth_surfaces_has_the_literal_texts_map_projected_back():
+    """Oracle: the literal picture, and what the steps of the sum make."""
+    frame = Frame(load_scene("cornell_sphere:faces=80"), width=8, height=8, rsm_resolution=16, dtype=np.float64)
+    settings = of(ValSettings, lights=24, clusters_count=2, maps_resolution=12, visibility="back_projection",
+                  clamp="none")
+    expected = literal.picture(frame, replaced(settings, {"interleaving": 1}))
+    with observe(record=True, steps=True) as log:
+        np.testing.assert_allclose(val(frame, settings), expected, rtol=1e-9, atol=1e-12)
+    run = next(run for run in log.runs if run.name == "cluster.irradiance")
+    np.testing.assert_allclose(run.steps, expected, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.feature("REF-32")

@@ -109,6 +109,7 @@ def test_a_light_that_hits_nothing_gives_darkness(ball):
         assert not val(dark, small(how)).any()
 
 
+@pytest.mark.feature("VAL-04")
 def test_more_area_lights_than_lights_are_hard_shadows_of_each(ball):
     each = val(ball, small({"clusters_count": 1000}))
     hard = val(ball, small({"clusters_count": 64, "visibility": "hard"}))
@@ -132,11 +133,12 @@ def test_a_small_picture_runs_what_the_one_that_it_stands_for_runs():
         assert ("error_target.error_driven" in {run.name for run in log.runs if run.status == "ran"}) is ran
 
 
+@pytest.mark.feature("REF-32")
 @pytest.mark.usefixtures("any_size")
 @pytest.mark.parametrize("kept", [True, False])
 @pytest.mark.parametrize("how", EACH_KIND, ids=str)
 def test_subsplats_without_an_error_are_every_pixel_to_the_bit(how, kept, monkeypatch):
-    """Oracle: every light at every pixel in one pass; lists read kept shadows, or filter maps anew."""
+    """Oracle: every light at every pixel of a smooth ball in one pass; lists read kept shadows, or filter maps anew."""
     if not kept:
         monkeypatch.setattr(shadows, "MOST_KEPT", 0)
     box = frame(width=80, height=60)
@@ -260,6 +262,7 @@ def test_memory_of_maps_is_counted():
     assert counted(visibility="none") < hard
 
 
+@pytest.mark.feature("VAL-05", "VAL-17", "VAL-23", "VAL-24")
 def test_the_preset_of_the_paper_has_the_printed_values(ball):
     paper = PRESETS["paper"]
     assert (paper.lights.count, paper.clusters.count, paper.visibility.terms) == (1024, 30, 4)

@@ -50,6 +50,7 @@ def test_each_figure_equals_its_loop_twin(name, evidence):
     evidence(f"{name}: max difference {worst:.1e} over 40 random pictures")
 
 
+@pytest.mark.feature("REF-18", "REF-21")
 @settings(max_examples=40, deadline=None)
 @given(hnp.arrays(np.float32, (4, 3, 3, 5), elements=values), hnp.arrays(np.float32, (4, 3, 3, 5), elements=values))
 def test_flicker_equals_its_loop_twin(images, references):
@@ -59,6 +60,7 @@ def test_flicker_equals_its_loop_twin(images, references):
         assert fast == pytest.approx(slow, rel=ROUND_OFF, nan_ok=True)
 
 
+@pytest.mark.feature("REF-21")
 def test_by_hand():
     """Analytic: two pixels, errors (1, 1, 1) and (-2, 0, 0) against references 1 and 4."""
     reference = np.array([[[1.0, 4.0]]] * 3)
@@ -73,12 +75,14 @@ def test_by_hand():
     assert metrics.ssim(reference, reference) == pytest.approx(1.0)
 
 
+@pytest.mark.feature("REF-18", "REF-21")
 def test_flicker_by_hand():
     still = np.full((3, 2, 2), 2.0)
     assert metrics.flicker([still, still + 1, still]) == pytest.approx(1 / (7 / 3))
     assert metrics.flicker([still + 1, still + 3], [still, still + 2]) == 0.0
 
 
+@pytest.mark.feature("REF-21")
 @pytest.mark.parametrize("name", NAMES)
 def test_only_covered_pixels_count(name):
     rng = np.random.default_rng(3)

@@ -97,6 +97,7 @@ def test_lights_lie_on_surfaces_and_face_the_path():
     assert lights.drawn >= lights.flux.shape[1]
 
 
+@pytest.mark.feature("REF-16")
 def test_glossy_surfaces_leave_lobes_around_the_mirror_direction():
     scene = load_scene("parallel_plates")
     shiny = tuple(dataclasses.replace(m, diffuse=(0.0, 0.0, 0.0), specular=(0.4, 0.4, 0.4), exponent=30.0)
@@ -122,6 +123,7 @@ def test_bad_numbers_are_refused():
             lights_of(scene, **change)
 
 
+@pytest.mark.feature("REF-16", "SII-17")
 def test_paths_are_shared_out_among_lights():
     scene = load_scene("cornell_box")
     lamps = (PointLight((0.278, 0.4, -0.2), (2.0, 2.0, 2.0)), PointLight((0.2, 0.3, -0.2), (1.0, 1.0, 1.0)))
@@ -129,3 +131,13 @@ def test_paths_are_shared_out_among_lights():
     assert both.drawn == 7
     first, second = (lights_of(scene.with_lights(lamp), paths=n) for lamp, n in zip(lamps, (5, 2), strict=True))
     np.testing.assert_array_equal(both.position, np.hstack([first.position, second.position]))
+
+
+@pytest.mark.feature("REF-16", "SII-17")
+def test_fewer_paths_than_lamps_carry_the_flux_of_all():
+    """Closed form: inside a sphere a lamp's path reflects rho 4 pi I; one path of three lamps stands for all."""
+    lamps = (PointLight((0.1 * i, 0.0, 0.0), (i, 2 * i, 0.0)) for i in (1.0, 2.0, 5.0))
+    scene = load_scene("integrating_sphere:faces=320,albedo=0.5").with_lights(*lamps)
+    for seed in range(1, 4):
+        flux = lights_of(scene, paths=1, seed=seed).flux[:, 0]
+        np.testing.assert_allclose(flux, 2 * math.pi * 8 * np.array([1, 2, 0]), rtol=1e-9)

@@ -33,13 +33,15 @@ def shadow(settings, seen, delta, points, facing):
                                               points, facing))
 
 
-def shadows_of(settings, areas, maps, points, facing):
+def shadows_of(settings, areas, maps, points, facing, shading=None):
     """Return V and z_avg (K, n) of pixels (3, n) by the maps of area lights."""
-    ids, found = np.zeros((1, points.shape[1]), int), []
-    planes = points[:, None].astype(float), ids, facing[:, None].astype(float)
+    ids, found, kind = np.zeros((1, points.shape[1]), int), [], settings.visibility.name()
+    planes = (points[:, None].astype(float), ids, *(
+        one[:, None].astype(float) for one in (facing, facing if shading is None else shading)))
     for k in range(0, points.shape[1], AT_ONCE):
-        some = (plane[..., k : k + AT_ONCE] for plane in planes)
-        found.append(shadows(settings.visibility.name(), *some, areas, maps, **soft(settings)))
+        *some, normals = (plane[..., k : k + AT_ONCE] for plane in planes)
+        beside = {"shading": normals} if kind == "back_projection" else soft(settings)
+        found.append(shadows(kind, *some, areas, maps, **beside))
     return tuple(np.concatenate(one, axis=2)[:, 0] for one in zip(*found, strict=True))
 
 

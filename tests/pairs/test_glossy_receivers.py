@@ -70,6 +70,7 @@ def test_it_is_the_sum_of_the_definition(exponent, rng, evidence):
     evidence(f"P = {exponent:g}: {worst:.1e} of the largest")
 
 
+@pytest.mark.feature("REF-27")
 def test_exponents_of_receivers_are_their_own(rng):
     exponents = np.resize([0.0, 3.0, 50.0, 700.0], 260)
     points, lights, w_o = scattered(rng, 260, 70, exponents)
@@ -77,6 +78,7 @@ def test_exponents_of_receivers_are_their_own(rng):
                                atol=1e-13)
 
 
+@pytest.mark.feature("REF-27")
 @pytest.mark.parametrize("name", CLAMPS)
 def test_pairs_are_clamped_as_those_of_irradiance(name, rng):
     points, lights, w_o = scattered(rng, 200, 80, 5.0)
@@ -86,6 +88,7 @@ def test_pairs_are_clamped_as_those_of_irradiance(name, rng):
     assert np.abs(expected - defined(points, lights, w_o, PLAIN)).max() > 1e-3 * expected.max()
 
 
+@pytest.mark.feature("REF-27")
 def test_spheres_keep_the_lobe_of_their_centre(rng):
     points, lights, w_o = scattered(rng, 100, 40, 4.0)
     lights = lights._replace(lobe_flux=None, lobe_axis=None, lobe_exponent=None)
@@ -231,6 +234,7 @@ def test_a_tile_keeps_every_light_that_lies_in_a_lobe_of_it(exponent, real, turn
     assert len(kept) < 150 or exponent < 5e3
 
 
+@pytest.mark.feature("REF-27")
 @pytest.mark.parametrize("outside", [False, True])
 def test_a_range_weighs_pairs_by_what_arrives_at_most(outside, rng):
     """max(1, I_low / B) where B >= xi I_low, B the irradiance without the receiver's cosine; outside, 1 less that."""

@@ -93,6 +93,7 @@ def test_both_backends_agree(monkeypatch: pytest.MonkeyPatch, evidence: Callable
     assert blocked <= 2
 
 
+@pytest.mark.feature("REF-28")
 def test_leaves_in_one_plane_are_all_asked() -> None:
     """Ten quads in the same place, nine of them holes there: Embree's filter misses none, whatever their order."""
     material, hole = Material("there"), Material("hole", alpha=0.2, cutoff=0.5)
@@ -181,6 +182,7 @@ def test_bits_do_not_depend_on_threads() -> None:
     assert all(np.array_equal(one, other) for one, other in zip(*answers, strict=True))
 
 
+@pytest.mark.feature("REF-28")
 @pytest.mark.usefixtures("backend")
 def test_a_light_and_the_sky_shine_through_holes() -> None:
     """A plate over x > 0 alone: points under it are dark and half closed, others are not."""
@@ -196,6 +198,7 @@ def test_a_light_and_the_sky_shine_through_holes() -> None:
     np.testing.assert_allclose(share, 0.5 * (1 - x / np.hypot(1, x)), atol=0.02)
 
 
+@pytest.mark.feature("REF-28")
 def test_points_of_a_triangle_are_there_as_the_mask_says() -> None:
     scene, random, there = heap(18), np.random.default_rng(6), 0
     holes = ray_holes(scene.geometry)

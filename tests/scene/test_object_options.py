@@ -76,6 +76,7 @@ def test_its_light_is_absent_and_all_others_is_there_to_the_bit(evidence):
              + " of the maps'; of all else 0 bits differ")
 
 
+@pytest.mark.feature("HSS-21")
 def test_placed_cameras_and_stated_errors_know():
     """Where cameras look for light, and what lights lack of the light that visible surfaces send."""
     frames = [Frame(painted(**changes), **OPTIONS) for changes in ({"sends": False}, BLACK, {})]
@@ -89,6 +90,7 @@ def test_placed_cameras_and_stated_errors_know():
     assert all(one < other for one, other in zip(silent, plain, strict=True))
 
 
+@pytest.mark.feature("HSS-21")
 def test_the_ledger_knows():
     frames = [Frame(painted(**changes), **OPTIONS) for changes in ({"sends": False}, BLACK)]
     silent, black = (sii_ledger(frame, SiiSettings()) for frame in frames)
@@ -102,6 +104,7 @@ def test_scenes_without_such_objects_have_one_table():
     assert frame.sent_albedo is frame.gbuffer.albedo
 
 
+@pytest.mark.feature("HSS-21")
 def test_files_say_it_of_objects(tmp_path):
     square = SCENE["objects"][0]
     changes = [{}, {"sends": False}, {"rigid": True}, {"rigid": True, "sends": False}]

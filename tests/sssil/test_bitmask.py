@@ -174,6 +174,7 @@ def test_never_above_the_unoccluded_sum(evidence):
     assert shares[0] > shares[1] > shares[2] > 0
 
 
+@pytest.mark.feature("HSS-10", "HSS-17")
 def test_mirror_images_to_the_bit():
     level = seen(12, 15, ((-0.5, -0.2, 2.0), (0.5, 0.9, 2.2)), np.float32)
     level = level._replace(radiance=level.radiance + level.radiance[:, :, ::-1])
@@ -203,6 +204,7 @@ def test_any_scale():
         np.testing.assert_array_equal(bitmask_gather(larger, 0, SETTINGS, DIAGONAL * scale), expected)
 
 
+@pytest.mark.feature("HSS-17")
 @pytest.mark.parametrize("near", [1e-2, 1e-4])
 def test_bars_near_the_eye_cost_no_digits(near):
     """Float32 against float64: heights over a plane are no differences of large squares."""

@@ -97,6 +97,7 @@ def test_it_is_never_above_what_all_surfaces_send(evidence):
     evidence(f"sphere: {one:.3f} of all by one camera, {more:.3f} with two placed ones, at most {highest:.3f}")
 
 
+@pytest.mark.feature("HSS-15")
 def test_the_camera_itself_as_a_further_view_changes_nothing():
     """Property: each point is found where it is, to the bit."""
     frame = Frame(load_scene("cornell_box"), width=45, height=34, rsm_resolution=64)
@@ -104,6 +105,7 @@ def test_the_camera_itself_as_a_further_view_changes_nothing():
                                   hssil(frame, of(HssilSettings, **QUICK)))
 
 
+@pytest.mark.feature("HSS-15")
 def test_the_largest_counts_not_the_last():
     """Property: views in any order, and a view twice, give the same."""
     frame = Frame(load_scene("cornell_box"), width=45, height=34, rsm_resolution=64)
@@ -115,6 +117,7 @@ def test_the_largest_counts_not_the_last():
     np.testing.assert_array_equal(first, twice)
 
 
+@pytest.mark.feature("HSS-15")
 def test_views_of_a_scene_far_from_the_origin_are_moved_with_it(basket):
     """Property: 2^14 m off, where float32 would have no places left; to the bit."""
     far = np.array((2.0**14, 0.0, -(2.0**14)))

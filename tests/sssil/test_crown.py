@@ -49,6 +49,7 @@ def summed(level, sampling, index, form, share):
     return (factor * radiance[:, i, j]).sum(axis=-1)
 
 
+@pytest.mark.feature("HSS-03", "HSS-04", "HSS-06")
 @pytest.mark.parametrize(("form", "share"), [("disc", 1.0), ("disc", 0.25), ("disc", 0.0), ("point", 0.25)])
 @pytest.mark.parametrize("density", ["inverse_distance", "uniform"])
 @pytest.mark.parametrize("pattern", ["interleaved", "row", "fixed", "all", "pixel"])
@@ -64,6 +65,7 @@ def test_equals_the_literal_text(pattern, density, form, share):
                                    atol=ROUNDING[np.float64] * expected.max())
 
 
+@pytest.mark.feature("HSS-04")
 @pytest.mark.parametrize("pattern", ["interleaved", "pixel"])
 def test_a_sample_of_less_than_a_texel_has_no_larger_disc(pattern):
     """Oracle: so many samples that near ones stand for less than a texel, whose disc covers all of it."""
@@ -167,6 +169,7 @@ def test_one_texel_and_none_seen_receive_nothing():
         assert np.isfinite(found).all()
 
 
+@pytest.mark.feature("HSS-04", "HSS-08")
 def test_printed_forms_differ_by_their_factor():
     """Analytic: Eq. 4 without its pi is 1 / pi of it; 2^2k again is 4 per level; Eq. 3 has no pi to lose."""
     level = random_level((6, 8))

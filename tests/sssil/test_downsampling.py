@@ -52,6 +52,7 @@ def test_means_keep_the_flux(evidence):
     evidence(f"average: flux equal to {FLOAT64:g}; closest: {', '.join(f'{share:.2f}' for share in closest)} of it")
 
 
+@pytest.mark.feature("HSS-09")
 def test_a_texel_without_area_shows_its_closest_pixel():
     """Normals that look away send nothing, but receive."""
     depth, normal, albedo, direct = random_picture(4, 4, behind=0.0)
@@ -91,9 +92,10 @@ def test_every_level_sends_the_flux_of_the_pixels(frame, start, evidence):
     evidence(f"from {start}: flux of each level over that of the pixels is 1 to 1e-5; of the closest {grown}")
 
 
-@pytest.mark.feature("HSS-09")
-def test_a_sender_is_one_of_its_pixels(frame):
-    _, senders = levels_of(frame, seed=3)
+@pytest.mark.feature("HSS-01", "HSS-09")
+@pytest.mark.parametrize("start", ["half", "quarter"])
+def test_a_sender_is_one_of_its_pixels(frame, start):
+    _, senders = levels_of(frame, seed=3, start=start)
     position, normal = frame.gbuffer.resolve("position", "normal")
     eye = np.asarray(frame.scene.camera.eye)
     for level in senders:

@@ -83,6 +83,7 @@ def test_a_disc_of_a_share_is_as_dark_as_that(share, evidence):
     evidence(f"a disc of {share} of all: {np.mean(drawn) / expected:.3f} +- {error / expected:.3f} of its sum by hand")
 
 
+@pytest.mark.feature("HSS-04")
 def test_every_texel_is_the_sum_of_eq_4():
     """Where each sample stands for one texel both forms are Eq. 4, and the sum by hand."""
     level, middle = plane_below()

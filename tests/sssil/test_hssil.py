@@ -54,6 +54,7 @@ def test_settings_that_do_not_cover_the_screen_say_so(ball, evidence):
     evidence(str(caught[0].message))
 
 
+@pytest.mark.feature("HSS-07")
 def test_more_levels_than_the_picture_has_are_left_out(ball):
     with observe() as log:
         many = hssil(ball, of(HssilSettings, radius=30.0, levels=16, samples=8))
@@ -88,6 +89,7 @@ def test_memory_is_counted():
     assert method.extra_bytes(changed(visibility="rays"), Extent((1024, 1024))) > plain
 
 
+@pytest.mark.feature("HSS-20")
 @pytest.mark.parametrize(("samples", "least"), [
     ({"samples": 20000}, 20000 * 2 * 8),  # int32 offsets of each row's even and odd columns
     ({"samples": 20000, "visibility": "bitmask"}, 20000 * (8 + 8)),  # offsets and weights
@@ -98,12 +100,14 @@ def test_samples_of_rows_are_counted(samples, least):
     assert many - few > 1024 * least
 
 
+@pytest.mark.feature("HSS-20")
 def test_rows_of_thin_pictures_are_counted():
     """Senders have darkness around each row: a picture of one column takes far more than its pixels."""
     count = find_method("hssil").extra_bytes
     assert count(SMALL, Extent((1, 65536))) > 65536 // 2 * 9 * 32 * 4
 
 
+@pytest.mark.feature("HSS-05")
 def test_all_texels_of_a_huge_radius_are_those_of_the_picture():
     small = frame(width=12, height=9)
     near, far = (of(HssilSettings, pattern="all", start="full", levels=1, radius=radius) for radius in (10.0, 65536.0))
@@ -122,6 +126,10 @@ def test_mip_levels_add_a_third(evidence):
         settings = of(HssilSettings, start=start, levels=5, downsample="closest")
         held = sum(plane.nbytes for level in made(picture, view, first, 5, dtype=np.float32) for plane in level[1:])
         assert held == level_bytes(settings, 128 * 128, 4)
+        one, = made(picture, view, first, 1, dtype=np.float32)
+        more, less = (find_method("hssil").extra_bytes(replaced(settings, {"levels": levels}), Extent((128, 128)))
+                      for levels in (5, 1))
+        assert more - less == held - sum(plane.nbytes for plane in one[1:])
         ratio = held / (BUFFER_BYTES * 128 * 128)
         assert ratio == pytest.approx((4 - 4.0**-4) / 3 / 4**first, rel=1e-12)
         figures.append(f"{start} {ratio:.4f}")

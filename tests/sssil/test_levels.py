@@ -52,7 +52,7 @@ def assert_equal_to(expected, level, rtol):
         assert not plane[:, level.pixel < 0].any()
 
 
-@pytest.mark.feature("HSS-01", "HSS-09")
+@pytest.mark.feature("HSS-01", "HSS-02", "HSS-08", "HSS-09", "HSS-10")
 @pytest.mark.parametrize("mode", MODES)
 def test_levels_are_those_of_the_literal_text(mode, evidence):
     """Odd sizes, ties, background, normals that look away; all three starts."""
@@ -134,6 +134,7 @@ def test_radiance_of_glossy_surfaces_is_the_diffuse_part_alone(evidence):
     assert (lobe[glossy] > 0.1 * expected.max()).any(axis=1).sum() > 20
 
 
+@pytest.mark.feature("HSS-10")
 @pytest.mark.parametrize("mode", MODES)
 def test_mirrored_pictures_have_mirrored_levels(mode, evidence):
     """To the bit, as long as texels mirror each other."""
@@ -153,6 +154,7 @@ def test_mirrored_pictures_have_mirrored_levels(mode, evidence):
     evidence(f"{mode}: equal bits down to texels of 8 x 8 pixels")
 
 
+@pytest.mark.feature("HSS-07")
 def test_a_later_start_has_the_levels_of_an_earlier_one():
     picture, view = random_picture(45, 27), camera(45, 27)
     full = made(picture, view, 0, 4)
@@ -183,6 +185,7 @@ def test_nothing_seen_is_nothing():
             assert not any(plane.any() for plane in (level.area, level.position, level.normal, level.radiance))
 
 
+@pytest.mark.feature("HSS-07")
 def test_levels_whose_crowns_miss_the_picture_are_left_out():
     """A crown from 20 texels on needs a level of more than 20 texels from corner to corner."""
     frame = Frame(load_scene("cornell_box"), width=64, height=64)

@@ -65,6 +65,7 @@ def test_every_offset_is_covered_once(evidence):
              f"{weight[within].min():.2f} to {weight[within].max():.2f}; 0 beyond")
 
 
+@pytest.mark.feature("HSS-05")
 def test_all_has_each_texel_of_the_crown_once():
     """Analytic: by brute force over a square."""
     offsets, weight = row_offsets(replaced(SETTINGS, {"pattern": "all"}).sampling, 1, 1, 3)
@@ -75,6 +76,7 @@ def test_all_has_each_texel_of_the_crown_once():
     assert (weight == 1).all()
 
 
+@pytest.mark.feature("HSS-10")
 @pytest.mark.parametrize(("pattern", "samples"), [("fixed", 12), ("fixed", 7), ("all", 12)])
 def test_symmetric_patterns_are_pairs_of_mirror_images(pattern, samples):
     """Property: partners follow each other; those on the middle line come last."""
@@ -123,6 +125,7 @@ def test_interleaved_samples_repeat_in_tiles(side):
     assert len(set(sets.values())) == side**2
 
 
+@pytest.mark.feature("HSS-06")
 def test_a_tile_holds_one_set_of_low_discrepancy(evidence):
     """Property: of a tile's 16 x 64 points each of 256 cells of equal weight has its four to within two.
 
@@ -138,6 +141,7 @@ def test_a_tile_holds_one_set_of_low_discrepancy(evidence):
     assert counts.max() <= 6
 
 
+@pytest.mark.feature("HSS-05")
 def test_weights_are_those_of_rings():
     """Analytic: 2 pi d r / N texels at the distance d in the crown of N points, as much in the disc."""
     offsets, weight = samples_at(of(HssilSettings, radius=3000.0, samples=32).sampling, 0, 1, 2, 3)
@@ -172,6 +176,7 @@ def test_the_papers_settings_do_not_cover_the_screen(shape, levels, radius, far,
     evidence(f"{shape[1]} x {shape[0]}, r = {radius:g}, K = {levels}: reaches {far} of {diagonal} texels")
 
 
+@pytest.mark.feature("HSS-07")
 @pytest.mark.parametrize("shape", [(1, 1), (1, 7), (90, 160), (361, 641)])
 def test_the_chosen_radius_covers_the_screen(shape):
     """Property: without a radius nothing is warned of, and one texel less would not do."""

@@ -12,7 +12,7 @@ from refgi.settings import of, replaced
 from refgi.sssil.bitmask import bitmask_gather
 from refgi.sssil.levels import pyramid
 from refgi.sssil.pattern import samples_at
-from refgi.sssil.rays import Traced, add_unoccluded, ray_gather
+from refgi.sssil.rays import Surfels, Traced, _transfer, add_unoccluded, ray_gather
 from refgi.sssil.settings import HssilSettings
 from tests.naive import bitmask as naive
 
@@ -45,6 +45,16 @@ def frame():
 
 def traced(frame):
     return Traced(frame.gbuffer, frame.scene.geometry, frame.tracer)
+
+
+@pytest.mark.feature("HSS-03", "REF-32")
+@pytest.mark.parametrize(("faces", "expected"), [((1.0, -1.0), 0.25), ((-1.0, -1.0), 0.0), ((1.0, 1.0), 0.0)])
+def test_what_either_face_hides_is_not_transferred(faces, expected):
+    """By hand: c s A / r^4 of 1 m^2 at 2 m that face each other; 0 where a face looks away under its shading normal."""
+    to, sender = (Surfels(*(np.array([[0.0], [0.0], [z]]) for z in (place, up)), np.ones(1), np.array(
+        [[0.0], [0.0], [face]]), np.zeros((3, 1), np.float32)) for place, up, face in zip(
+            (0.0, 2.0), (1.0, -1.0), faces, strict=True))
+    assert _transfer(to, sender, 0, 0, 1.0, 0.0) == pytest.approx(expected)
 
 
 def around(level, index, settings):
@@ -100,6 +110,7 @@ def test_batches_and_threads_change_no_bit(frame):
         np.testing.assert_array_equal(ray_gather(level, 0, SETTINGS, traced(frame)), expected)
 
 
+@pytest.mark.feature("HSS-10")
 def test_mirror_images_are_added_to_each_other_first():
     """Exchanging the two of each pair of samples changes no bit, whichever of them are blocked."""
     rng = np.random.default_rng(8)

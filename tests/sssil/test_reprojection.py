@@ -55,6 +55,7 @@ def views():
     return [[Frame(s, dtype=dtype) for s in (scene, other)] for dtype in (np.float32, np.float64)]
 
 
+@pytest.mark.feature("HSS-13")
 @pytest.mark.parametrize("single", [True, False])
 def test_equals_the_literal_text(views, single):
     there, here = views[0 if single else 1]
@@ -99,6 +100,7 @@ def test_a_shift_by_whole_and_half_pixels(evidence):
     evidence(f"a ramp shifted by (1/2, 1/4) pixel: {error:.0e} of a step off")
 
 
+@pytest.mark.feature("HSS-13")
 def test_nearest_takes_the_texel_the_point_falls_in():
     there, _ = wall()
     found, weight = reproject(ramp(), there, wall(shift=(0.4, 0.6))[1], there.normal, np.ones((6, 8), np.bool_),
@@ -109,6 +111,7 @@ def test_nearest_takes_the_texel_the_point_falls_in():
     assert set(np.unique(weight)) == {0.0, 1.0}
 
 
+@pytest.mark.feature("HSS-13")
 @pytest.mark.parametrize(("depth", "passes"), [(2.0, True), (2.03, True), (1.97, True), (2.05, False), (1.95, False),
                                                (np.inf, False)])
 def test_another_depth_is_another_surface(depth, passes):
@@ -119,6 +122,7 @@ def test_another_depth_is_another_surface(depth, passes):
     assert np.array_equal(found, ramp() * passes)
 
 
+@pytest.mark.feature("HSS-13")
 @pytest.mark.parametrize(("degrees", "passes"), [(0, True), (17, True), (19, False), (180, False)])
 def test_another_normal_is_another_surface(degrees, passes):  # arccos 0.95 is 18.2 degrees
     there, position = wall()
@@ -146,6 +150,7 @@ def test_points_behind_beside_and_nowhere_find_nothing(distance):
     assert not found.any()
 
 
+@pytest.mark.feature("HSS-13")
 def test_the_origins_of_two_views_may_differ(views):
     there, here = views[1]
     values = np.random.default_rng(5).random((3, 30, 40))

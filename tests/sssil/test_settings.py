@@ -7,7 +7,7 @@ import pytest
 from refgi.errors import InputError
 from refgi.scene import load_scene
 from refgi.scene.model import Camera
-from refgi.settings import from_text, leaves, of, replaced
+from refgi.settings import flat, from_text, leaves, of, replaced
 from refgi.sssil import HssilSettings
 from refgi.sssil.settings import PRESETS, Bilateral, Bitmask, GeometryBlur, Rays, TemporalSettings
 
@@ -51,11 +51,13 @@ def test_a_page_shows_few_keys_and_says_what_each_is(kind):
     assert all(leaf.about for leaf in leaves(kind))
 
 
+@pytest.mark.feature("HSS-04", "HSS-06", "HSS-07", "HSS-18")
 def test_the_papers_values_are_the_defaults_but_for_noise():
     """The paper says neither where samples lie nor who shares them; it blurs no level, and draws no sender."""
     changed = {"sampling.pattern": "interleaved", "sampling.density": "inverse_distance", "blur": GeometryBlur(),
                "senders.downsample": "resampled", "senders.disc_share": 0.25}
-    assert PRESETS["paper"] != HssilSettings()
+    printed = flat(PRESETS["paper"])
+    assert [printed[key] for key in changed] == ["row", "uniform", None, "closest", 1.0]
     assert replaced(PRESETS["paper"], changed) == HssilSettings()
 
 
@@ -71,6 +73,7 @@ def test_the_start_is_a_level(start, first):
     assert of(HssilSettings, start=start).sampling.first_level == first
 
 
+@pytest.mark.feature("HSS-05")
 @pytest.mark.parametrize(("samples", "inner"), [(64, 21), (256, 85), (1, 1), (3, 1)])
 def test_the_first_disc_is_as_dense_as_its_crown(samples, inner):
     """A disc of radius r has a third of the area of the crown from r to 2 r."""
@@ -80,6 +83,7 @@ def test_the_first_disc_is_as_dense_as_its_crown(samples, inner):
     assert of(HssilSettings, samples=samples, inner_samples=7).sampling.counts(0) == (7, samples)
 
 
+@pytest.mark.feature("HSS-05", "HSS-19")
 @pytest.mark.parametrize(("samples", "disc", "crown"), [(64, 32, 32), (9, 5, 4), (1, 1, 1)])
 def test_disc_and_crown_share_samples_whose_density_falls_with_distance(samples, disc, crown):
     """Rings of equal width get equally many: r of them lie within r, and r from there to 2 r."""

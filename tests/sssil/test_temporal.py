@@ -90,6 +90,7 @@ def test_the_printed_form_averages_two_frames(room):
     assert np.allclose(steps[2].irradiance[:, covered], (0.75 * one + 0.25 * two)[:, covered], atol=1e-6)
 
 
+@pytest.mark.feature("HSS-16")
 def test_radiance_is_that_of_the_filtered_light(room):
     for step in Sequence([room] * 2, method=white, **QUICK):
         assert np.array_equal(step.radiance, step.frame.radiance(step.irradiance))

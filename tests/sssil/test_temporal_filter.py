@@ -111,6 +111,7 @@ def test_warming_up_is_the_mean_of_all_frames_until_a_is_less(room, evidence):
     evidence(f"after 10 frames {left[0]:.3f} of the variance is left, {left[1]:.3f} without warm-up (1/10, {cold:.3f})")
 
 
+@pytest.mark.feature("HSS-13")
 def test_a_surface_that_is_new_starts_at_one(room):
     """Frames are counted for each pixel: one that was not found again has its new light alone, and half of it next."""
     looking, away = (Frame(room.with_camera(target=target), dtype=np.float64) for target in
@@ -127,6 +128,7 @@ def test_a_surface_that_is_new_starts_at_one(room):
     np.testing.assert_allclose(second.irradiance[:, new], 2.0, rtol=1e-15)
 
 
+@pytest.mark.feature("HSS-13")
 def test_clamping_bounds_what_lags(evidence):
     """Analytic: mean and deviation of 3 x 3 pixels of which one column in three shines."""
     new = np.zeros((3, 6, 6))
@@ -233,6 +235,7 @@ def test_light_stays_on_a_turning_object(evidence):
              f"{errors[False]:.4f} without")
 
 
+@pytest.mark.feature("HSS-14")
 def test_a_bent_mesh_is_followed_by_its_vertices(room):
     """Skinned motion: each triangle has its own affine map."""
     vertices = np.array(room.geometry.vertices)
@@ -288,6 +291,7 @@ def test_the_weight_falls_with_the_speed(room, evidence):
              f"{expected[found].max():.2f} pixels")
 
 
+@pytest.mark.feature("HSS-14")
 def test_a_camera_that_moves_leaves_the_weight(room):
     x, y, z = room.camera.eye
     frame = Frame(room.with_camera(eye=(x + 0.1, y, z)), dtype=np.float64)

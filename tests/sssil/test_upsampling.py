@@ -89,6 +89,7 @@ def test_equals_its_twin(case, evidence):
     evidence(f"{case}: within {error:.1e} of the twin")
 
 
+@pytest.mark.feature("HSS-11")
 @pytest.mark.parametrize("mode", ["bilinear", "nearest"])
 def test_plain_modes(mode):
     below, here = guides(*rubble((13, 18), 3), 4)
@@ -185,6 +186,7 @@ def test_adding_first_equals_upsampling_apart(evidence):
     evidence(f"three levels added on the way or at the end: {worst:.0e} apart, with each kind of upsampling")
 
 
+@pytest.mark.feature("HSS-12")
 def test_light_is_carried_linearly_whatever_its_scale():
     below, here = guides(*rubble((21, 27), 9), 2)
     light = np.random.default_rng(1).random((3, *below.depth.shape))
@@ -206,6 +208,7 @@ def test_mirrored_pictures_come_out_mirrored_to_the_bit(mode, evidence):
     evidence(f"{mode}: a mirrored picture comes out mirrored to the bit")
 
 
+@pytest.mark.feature("HSS-11")
 def test_nearest_in_depth_where_no_weight_is_left():
     depth, normal = np.full((16, 16), 2.0), np.zeros((3, 16, 16))
     normal[2] = 1

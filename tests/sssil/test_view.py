@@ -96,6 +96,7 @@ def test_tangents_as_printed_need_less_than_90_degrees():
         sample_area(depth, normal, wide, frozenset({"hss_tan_f"}))
 
 
+@pytest.mark.feature("HSS-02")
 def test_grazing_surfaces_are_bounded_and_those_that_look_away_have_none():
     view = camera_projection(Camera((0, 0, 0), (0, 0, -1), vfov=math.pi / 3, width=1, height=1))
     depth = np.full((1, 1), 2.0)

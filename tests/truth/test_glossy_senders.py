@@ -114,7 +114,7 @@ def claimed(name):
 
 
 @pytest.mark.slow
-@pytest.mark.feature("REF-03")
+@pytest.mark.feature("REF-03", "REF-31")
 @pytest.mark.parametrize("level", KNOWN_TO)
 @pytest.mark.parametrize("name", SCENES)
 def test_claimed_variance_is_the_true_one(name, level, evidence):

@@ -37,6 +37,7 @@ def lights(frame):
     return choose_pixel_lights(frame.rsms, count=24, pattern="halton")
 
 
+@pytest.mark.feature("REF-17")
 @pytest.mark.parametrize(("splat", "levels"), [(1.0, 0), (0.5, 1), (0.0, 4), (2.0, 0)])
 def test_maps_are_those_of_the_literal_text(frame, lights, splat, levels):
     geometry, settings = frame.scene.geometry, Imperfect(points=300, resolution=16, splat=splat, levels=levels)
@@ -48,6 +49,7 @@ def test_maps_are_those_of_the_literal_text(frame, lights, splat, levels):
     assert np.isfinite(expected).any()
 
 
+@pytest.mark.feature("REF-17")
 def test_what_is_hidden_is_that_of_the_literal_text(frame, lights):
     pairs = _pairs(frame, lights, Imperfect(points=300, resolution=16, bias=0.5))
     at = [part[:, None].astype(float) for part in (pairs.to.position, pairs.to.normal)]

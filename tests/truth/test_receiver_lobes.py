@@ -266,6 +266,7 @@ def test_a_lobe_of_exponent_0_reflects_as_a_diffuse_surface(case, evidence):
     assert chi2 < 4  # four blocks, whose channels go together
 
 
+@pytest.mark.feature("REF-26", "REF-32")
 @pytest.mark.parametrize("estimator", ["combined", "hemisphere", "light"])
 def test_nothing_comes_from_below_a_face_or_its_normal_nor_goes_to_an_eye_behind(estimator):
     """A lobe that takes from everywhere before a lit wall: below the face, below the normal, above both."""
@@ -415,6 +416,7 @@ def test_few_photons_are_as_true_as_many_and_say_how_far_off_they_are(receiver, 
     assert low < spread < high
 
 
+@pytest.mark.feature("REF-26")
 @pytest.mark.slow("40.0", "30000.0")
 @pytest.mark.parametrize("receiver", [40.0, 7490.0, 7510.0, 3e4, 1e6])
 def test_photons_and_directions_share_out_sharp_senders(receiver, evidence):

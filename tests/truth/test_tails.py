@@ -67,6 +67,7 @@ def test_the_shape_of_a_uniform_distribution_is_below_nothing():
     assert tail_index(counted(np.random.default_rng(1).random(5000)))[0] < -0.5  # k = -1, but a bin is all of its tail
 
 
+@pytest.mark.feature("REF-31")
 def test_each_value_counts_in_its_bin():
     values = np.array([2.0**-16, 0.999 * 2.0**-16, 0.3, 1.0, 1.124, 1.126, 1.99, 2.0, 16777215.0, 1e30, -3.0, np.inf])
     found = counted(values)[0]
@@ -80,6 +81,7 @@ def test_each_value_counts_in_its_bin():
     assert found[-1] == 2
 
 
+@pytest.mark.feature("REF-31")
 def test_counts_are_of_deviations_over_the_first_light_block_by_block():
     moments, block = no_passes(5, 2), np.array([1, 0, 1])
     for values in ([6, 0, 0], [np.nan, 0, 3], [3, 9, 0], [12, 9, 6]):
@@ -92,6 +94,7 @@ def test_counts_are_of_deviations_over_the_first_light_block_by_block():
     assert found[1] == {0: 1, one - 8: 2, one + 2: 1, one - 8 + 5: 1}
 
 
+@pytest.mark.feature("REF-31")
 @pytest.mark.parametrize("alpha", [0.6, 1.4, 4.0])
 def test_the_fit_is_that_of_as_many_values_in_the_middle_of_their_bins(alpha):
     tails = counted(np.random.default_rng(11).pareto(alpha, 900) + 1)
@@ -102,6 +105,7 @@ def test_the_fit_is_that_of_as_many_values_in_the_middle_of_their_bins(alpha):
     assert tail_index(tails)[0] == pytest.approx(shape(np.repeat(middles, tails[0, first:])), abs=1e-9)
 
 
+@pytest.mark.feature("REF-31")
 @pytest.mark.parametrize("burst", [0, 1, 5])
 def test_of_two_passes_either_may_hold_the_burst(burst):
     values = np.random.default_rng(3).normal(10, 0.1, (8, 3, 320))
@@ -191,6 +195,7 @@ def test_lobes_met_by_chance_are_not_trusted(passes, evidence):
     assert found.is_trusted is False
 
 
+@pytest.mark.feature("REF-31")
 def test_an_untrusted_error_is_never_met():
     frame = Frame(load_scene("cornell_box"), width=64, height=64)
     light = TruthSettings(estimator="light", samples=16 * 6, target_error=0.5)

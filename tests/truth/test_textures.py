@@ -60,6 +60,7 @@ def test_both_estimators_and_several_bounces_see_the_texture() -> None:
         np.testing.assert_allclose(one, other, rtol=1e-6)
 
 
+@pytest.mark.feature("REF-24")
 def test_light_paths_take_the_colour_of_the_point_they_meet() -> None:
     picture = np.random.default_rng(2).random((6, 9, 3)).astype(np.float32)
     scene = room("trilinear", Image(picture))

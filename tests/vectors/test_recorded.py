@@ -104,6 +104,7 @@ def test_own_arrays_pass_and_a_flipped_one_fails_at_its_stage(kit_of, tmp_path, 
     assert caught >= 3
 
 
+@pytest.mark.feature("REF-33")
 def test_the_last_stage_is_the_picture_of_a_render(kit_of):
     kit = kit_of("sii")
     manifest, = kit.cases(Asked())
@@ -113,14 +114,18 @@ def test_the_last_stage_is_the_picture_of_a_render(kit_of):
     assert kit.array(manifest, manifest.stages[-1].writes[0]) == pytest.approx(picture, rel=1e-4, abs=1e-6)
 
 
+@pytest.mark.feature("REF-33")
 def test_arrays_that_stages_made_are_not_given():
     case = recorded("sii")
     assert all(name.startswith(("scene.", "materials.")) or ".projection." in name or ".lamp." in name
                or name.endswith(".shifts") for name in case.given)
     total = next(step for step in case.stages if step.name == "pairs.sum")
     assert {"rsm.surface.position", "lights.pixel_lights.flux", "lights.footprints"} <= set(total.reads)
+    assert "cluster.visibility.points" not in recorded("val").given  # a copy of what a stage made
+    assert "pairs.glossy_sum.points.position" not in recorded("multires").given
 
 
+@pytest.mark.feature("REF-33")
 def test_some_stages_alone_are_given_what_they_read():
     case = recorded_case("sii-heap", heap(), "sii", only="pairs.sum", **SIZE)
     assert [step.name for step in case.stages] == ["pairs.sum"]
@@ -137,6 +142,7 @@ def test_a_case_of_indirect_light_ends_there():
     np.testing.assert_array_equal(expected_of(case)["pairs.sum"], expected_of(picture)["pairs.sum"])
 
 
+@pytest.mark.feature("REF-33")
 @pytest.mark.parametrize(("method", "stage", "changed"), [
     ("sii", "pairs.sum", "lights.pixel_lights.flux"),
     ("hssil", "sssil.gather_samples0", "sssil.senders.0.radiance"),
@@ -204,6 +210,7 @@ def test_likely_bugs_and_the_search_know_stages_that_have_a_literal_form(kit_of,
     assert "over the hemisphere: 1/(2 pi)" in result.findings[0].causes[0].cause
 
 
+@pytest.mark.feature("REF-33")
 @pytest.mark.parametrize(("method", "kinds"), [
     ("sii", {"pairs.sum", "rsm.direct_irradiance"}),
     ("hssil", {"sssil.gather_samples", "sssil.blur", "sssil.upsample"}),

@@ -54,9 +54,10 @@ MULTIRES = {
 }
 HSSIL = {
     "samples": "HSS-06", "pattern": "HSS-05 HSS-06", "tile": "HSS-06", "inner_samples": "HSS-05", "blur": "HSS-06",
-    "radius": "HSS-05 HSS-07", "levels": "HSS-07 HSS-08", "start": "HSS-07", "only_level": "HSS-07",
+    "radius": "HSS-05 HSS-07", "levels": "HSS-07 HSS-08 HSS-12", "start": "HSS-07", "only_level": "HSS-07",
     "density": "HSS-05", "downsample": "HSS-09", "form_factor": "HSS-04", "disc_share": "HSS-04",
-    "depth_sigma": "HSS-11", "normal_power": "HSS-11", "upsampling": "HSS-11 HSS-12", "visibility": "HSS-17",
+    "depth_sigma": "HSS-11 HSS-12", "normal_power": "HSS-11 HSS-12", "upsampling": "HSS-11 HSS-12",
+    "visibility": "HSS-17",
     "visibility = rays": "REF-02", "cameras": "HSS-15", "as_published = hss_tan_f": "HSS-02 REF-20",
     "as_published = hss_disc_pi": "HSS-04 REF-20", "as_published = hss_level_factor": "HSS-08 REF-20",
 }

@@ -103,6 +103,7 @@ def test_channels_add_up_to_the_series(terms, evidence):
              f"{errors[np.float32]:.1e} (float32, bound {PER_TERM * terms:.1e})")
 
 
+@pytest.mark.feature("VAL-12")
 @pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-13), (np.float32, 2e-6)])  # 7 turns
 def test_channels_are_sines_and_cosines(dtype, tolerance):
     t = np.linspace(0, 1, 41, dtype=dtype)
@@ -110,6 +111,7 @@ def test_channels_are_sines_and_cosines(dtype, tolerance):
     assert np.abs(basis_of(t, 4, dtype) - expected).max() < tolerance
 
 
+@pytest.mark.feature("VAL-11")
 def test_nothing_seen_lies_at_the_far_end():
     depth = np.array([[0.0, 1.0], [4.0, 7.0], [np.inf, 3.999999]], np.float32)
     out = np.empty_like(depth)

@@ -92,6 +92,7 @@ def test_discs_without_end_or_number_read_within_the_map(kind):
         assert np.isfinite(means[:, 1:]).all() or kind != "mip"
 
 
+@pytest.mark.feature("VAL-16")
 def test_several_maps_at_once_are_those_of_each():
     depth = np.stack([reads.random_map(17, np.float32, seed) for seed in range(3)])
     several = mips(3, 17, 4, np.float32)

@@ -261,6 +261,7 @@ def test_each_receiver_is_on_its_own():
     assert shadow(areas, maps, points[:, 7:8], normals[:, 7:8])[0] == whole[7]
 
 
+@pytest.mark.feature("VAL-09")
 def test_a_light_seen_aslant_is_smaller():
     for foreshortened, share in ((False, 1.0), (True, np.sqrt(0.6))):
         constants, scratch, _, pending, visible = scratch_arrays(1, 4)

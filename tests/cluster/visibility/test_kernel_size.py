@@ -29,6 +29,7 @@ NARROW = 0.015  # tan, sin and a itself for a = 11 degrees
 WIDTH = 0.002
 
 
+@pytest.mark.feature("VAL-15")
 @pytest.mark.parametrize("theta", [0.0, 0.3, 1.0, 1.5, math.pi / 2])
 @pytest.mark.parametrize("a", [1e-3, 0.2, 0.9, math.radians(80)])
 def test_cone_is_a_disc(theta, a):
@@ -55,6 +56,7 @@ def test_the_farthest_blocker_lies_on_the_line_to_the_lights_edge(delta, d, r):
     assert theta > math.atan(cone_tangent(delta, d, r))
 
 
+@pytest.mark.feature("VAL-14")
 def test_blockers_nearer_than_half_the_light_lie_anywhere():
     assert farthest_tangent(1.0, 4.0, 0.36) == STEEPEST
     assert farthest_tangent(1.0, 4.0, 0.49) == STEEPEST
@@ -141,6 +143,7 @@ def test_search_by_the_solid_angle_assumes_blockers_half_way():
     assert solid_angle_tangent(0.7, 5.0) == pytest.approx(cone_tangent(0.7, 5.0, 2.5))
 
 
+@pytest.mark.feature("VAL-14")
 @pytest.mark.parametrize("real", [np.float32, np.float64])
 def test_cones_end_at_80_degrees(real):
     near, huge = real(1e-6), real(1e6)

@@ -91,7 +91,7 @@ def test_shadow_breaks_off_at_the_light_s_plane(evidence):
     evidence("jump of V across the plane: " + ", ".join(f"{name} {step:.2f}" for name, step in steps.items()))
 
 
-@pytest.mark.feature("VAL-21")
+@pytest.mark.feature("VAL-16", "VAL-21")
 def test_no_light_leaks_in_over_the_rim(evidence):
     """Near the plane half of a filter lies beyond the hemisphere, where the square of the map mirrors it."""
     scene, points = room_with_blocker(), np.array([[3.0], [0.0], [0.02]])
@@ -120,6 +120,7 @@ def test_rays_are_asked_for():
         visibility(maps, areas, 0, points, normals, of(ValSettings, visibility="rays_vpls"))
 
 
+@pytest.mark.feature("VAL-03")
 def test_light_without_extent_casts_the_hard_shadow():
     plates = [(-0.5, 0.2, -0.4, 0.4, 1.0)]
     points, normals = on_plane(3.0, 2.0, 30)

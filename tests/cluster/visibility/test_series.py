@@ -91,6 +91,7 @@ def test_doubled_series_needs_no_bias(evidence):
     evidence("clamp(2 f): " + ", ".join(f"{v:.3f} at a gap of {gap}" for gap, v in seen.items()))
 
 
+@pytest.mark.feature("VAL-18")
 def test_bias_of_the_settings_counts():
     chain = series(Csm(bias=0.2))
     assert chain.bias == chain.search_bias == 0.2
@@ -123,6 +124,7 @@ def test_depths_of_distances(dtype, tolerance):
         assert np.abs(depths(depth_scale(kind, NEAR, FAR, SCENE, 0.8), z, dtype) - expected).max() < tolerance
 
 
+@pytest.mark.feature("VAL-12")
 @pytest.mark.parametrize("kind", KINDS)
 def test_distances_of_depths(kind):
     scale, z = depth_scale(kind, NEAR, FAR, SCENE, 0.8), np.geomspace(NEAR, FAR, 31)
@@ -175,6 +177,7 @@ def two_sided():
                       20 * one, np.zeros((1, 2, 2)), 3 * one, 12 * one)
 
 
+@pytest.mark.feature("VAL-21")
 def test_each_hemisphere_has_the_scale_of_its_own_map():
     maps = two_sided()
     for kind in KINDS:
@@ -184,6 +187,7 @@ def test_each_hemisphere_has_the_scale_of_its_own_map():
         assert scale_of(maps, 0, kind, chain, behind=True) == depth_scale(kind, 3.0, 12.0, 20.0, end)
 
 
+@pytest.mark.feature("VAL-14")
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_bias_of_pcss_is_one_of_the_same_scale(kind):
     """A receiver at d is compared at the distance whose depth is t(d) - b."""

@@ -171,7 +171,7 @@ def by_maps(view, areas, sign):
         depth += list(val_maps.depth_maps(*indexed(corners), np.ones(len(corners), bool), center[one],
                                           turned.frame[one], ignored[one], areas.members[one], settings.resolution))
     return shadows_of(view.settings, turned, literal.Maps(np.stack(depth), center, turned.frame, far),
-                      view.position.T, view.facing.T)[0]
+                      view.position.T, view.facing.T, view.normal.T)[0]
 
 
 def indexed(corners):

@@ -153,6 +153,7 @@ def test_a_checkered_floor_is_the_mean_over_each_pixel(evidence: Callable[[str],
     assert size["bilinear"] > 5 * CHECKER
 
 
+@pytest.mark.feature("REF-23")
 def test_the_farthest_rows_see_no_moire() -> None:
     """Pixels there cover up to 16 squares in depth and less than one across."""
     exact, buffer = floor_means(160, 120), Frame(floor(), dtype=np.float64).gbuffer

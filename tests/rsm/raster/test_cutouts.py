@@ -58,6 +58,7 @@ def test_ids_are_those_of_a_literal_ray(name: str, chosen: str, evidence: Callab
     assert doubtful <= 1
 
 
+@pytest.mark.feature("REF-28")
 def test_nearness_is_that_of_what_is_seen_behind() -> None:
     scene, projection = heap(18), projections()["perspective"]
     seen = rasterize(scene.geometry, projection)
@@ -86,6 +87,7 @@ def test_bits_do_not_depend_on_threads_bands_or_order(name: str) -> None:
     np.testing.assert_array_equal(np.append(order, -1)[found.triangle_id], expected.triangle_id)
 
 
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("name", NAMES)
 def test_of_coincident_triangles_the_first_that_is_there_is_seen(name: str) -> None:
     """The same triangles whole and with holes, either first: where there is a hole the whole one is seen."""
@@ -172,6 +174,7 @@ def test_a_cut_out_is_the_mesh_that_is_cut_along_its_edge(evidence: Callable[[st
     assert total > 2000
 
 
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_paraboloid_depth_maps_show_what_lies_behind_holes(dtype: type) -> None:
     scene = heap(18)
@@ -199,6 +202,7 @@ def test_a_material_without_texels_is_there_or_not_as_a_whole() -> None:
             assert (rasterize(chosen.geometry, projection).triangle_id >= 0).any() == there
 
 
+@pytest.mark.feature("REF-28")
 def test_the_picture_and_the_map_of_a_light_see_through_holes() -> None:
     scene = heap(18)
     frame, whole = (Frame(one, rsm_resolution=32) for one in (scene, opaque(scene)))

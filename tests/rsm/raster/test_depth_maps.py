@@ -26,6 +26,7 @@ def expected(shape, center, frame, size):
     return distance, clear
 
 
+@pytest.mark.feature("VAL-11")
 @pytest.mark.parametrize("behind", [(0, 0, -1), (0, 0, -1e-9), (1e-3, 0, -1), (-0.4, 0.3, -0.2)])
 def test_a_corner_behind_draws_the_triangle_to_the_rim(behind):
     shape = geometry([(0.5, 0, 1), behind, (0.5, 0.6, 1)], [[0, 1, 2]])

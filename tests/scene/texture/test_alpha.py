@@ -50,6 +50,7 @@ def test_a_surface_is_there_where_the_twin_says_so(kind: str, chosen: str) -> No
     assert 60 < there < 480
 
 
+@pytest.mark.feature("REF-28")
 def test_equal_texels_are_compared_exactly() -> None:
     """A blend of ones is one: a cutoff of 1, or of a texel's own value, leaves no gaps between texels."""
     for code, cutoff in ((255, 1.0), (51, 0.2), (102, 0.4), (153, 0.6), (204, 0.8)):
@@ -262,6 +263,7 @@ def obj(folder: Path, library: str, faces: str = "f 1/1 2/2 3/3\n") -> Path:
     return path
 
 
+@pytest.mark.feature("REF-28")
 @pytest.mark.parametrize(("library", "expected"), [
     ("map_Kd wood.png\nmap_d leaf.png\n", CODES[..., 3]), ("map_d leaf.png\n", CODES[..., 3]),
     ("map_Kd leaf.png\nmap_d leaf.png\nd 1.0\n", CODES[..., 3]),

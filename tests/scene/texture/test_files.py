@@ -64,6 +64,7 @@ def corners(uv: np.ndarray) -> np.ndarray:
     return uv.astype(np.float64)[[[0, 1, 2], [0, 2, 3]]]
 
 
+@pytest.mark.feature("REF-22")
 def test_a_texture_inside_a_glb_multiplies_the_factor(tmp_path: Path) -> None:
     scene = load_scene(textured(tmp_path))
     assert scene.materials[0].diffuse == (0.1, 0.2, 0.3)
@@ -84,6 +85,7 @@ def test_images_come_from_data_uris_and_files_beside(tmp_path: Path, place: str)
     assert ("the wood.png" in dict(scene.source.files)) == (place == "beside")
 
 
+@pytest.mark.feature("REF-22")
 @pytest.mark.parametrize(("sampler", "wrap", "chosen"), [
     ({}, ("repeat", "repeat"), "trilinear"),
     ({"wrapS": 33071, "wrapT": 33648, "minFilter": 9728}, ("clamp", "mirror"), "nearest"),
@@ -128,6 +130,7 @@ def sampled(sampler: dict[str, int]) -> Edit:
     return lambda tree: (tree.update(samplers=[{}, sampler]), tree["textures"][0].update(sampler=1))
 
 
+@pytest.mark.feature("REF-22")
 def test_the_set_of_coordinates_is_the_one_that_is_asked_for(tmp_path: Path) -> None:
     scene = load_scene(textured(tmp_path, lambda tree: info(tree).update(texCoord=1)))
     assert np.array_equal(scene.geometry.uv, corners(SECOND))
@@ -138,6 +141,7 @@ def test_the_set_of_coordinates_is_the_one_that_is_asked_for(tmp_path: Path) -> 
     assert np.array_equal(load_scene(textured(tmp_path, both)).geometry.uv, corners(SECOND))
 
 
+@pytest.mark.feature("REF-22")
 def test_a_quarter_turn_turns_the_way_the_extension_says(tmp_path: Path) -> None:
     """By hand, with the sine of the corrected text: u' = 2 u + 0.1, v' = 3 v + 0.2 unturned; a quarter: see below."""
     def changed(**change: Any) -> np.ndarray:
@@ -233,6 +237,7 @@ def obj(folder: Path, library: str, faces: str = "f 1/1 2/2 3/3 4/4\n") -> Path:
     return folder / "square.obj"
 
 
+@pytest.mark.feature("REF-22")
 def test_obj_coordinates_count_from_the_bottom_of_the_picture(tmp_path: Path) -> None:
     mesh, = read_obj(obj(tmp_path, "newmtl a\nKd 0.5 0.25 1\nmap_Kd wood.png\n")).meshes
     assert mesh.material.texture == Texture(Image(CODES))
@@ -243,6 +248,7 @@ def test_obj_coordinates_count_from_the_bottom_of_the_picture(tmp_path: Path) ->
         assert tuple(uv) == upright[tuple(corner[:2])]
 
 
+@pytest.mark.feature("REF-22")
 def test_obj_scale_offset_and_clamp(tmp_path: Path) -> None:
     library = "newmtl a\nmap_Kd -s 2 3 1 -o 0.25 0.5 -clamp on ./wood.png\n"
     mesh, = read_obj(obj(tmp_path, library)).meshes

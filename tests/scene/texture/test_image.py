@@ -42,6 +42,7 @@ def png16(codes: np.ndarray) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
 
 
+@pytest.mark.feature("REF-22")
 @pytest.mark.parametrize("codes", [256, 65536])
 def test_the_curve_is_exact_at_every_code(codes: int) -> None:
     table = srgb_table(codes)
@@ -50,6 +51,7 @@ def test_the_curve_is_exact_at_every_code(codes: int) -> None:
     assert (table[0], table[-1]) == (0.0, 1.0)
 
 
+@pytest.mark.feature("REF-22")
 def test_texels_are_decoded_one_by_one_and_16_bits_hold_those_of_8() -> None:
     eight, sixteen = Image(CODES), Image(CODES.astype(np.uint16) * 257)
     assert np.array_equal(eight.linear(), srgb_table(256).astype(np.float32)[CODES])
@@ -57,12 +59,14 @@ def test_texels_are_decoded_one_by_one_and_16_bits_hold_those_of_8() -> None:
     assert eight.linear().dtype == np.float32
 
 
+@pytest.mark.feature("REF-22")
 def test_eight_bits_in_colour_with_and_without_alpha() -> None:
     alpha = np.concatenate([CODES, RNG.integers(0, 256, (5, 7, 1), np.uint8)], axis=2)
     for content in (imageio.v3.imwrite("<bytes>", CODES, extension=".png"), encoded(Pictures.fromarray(alpha))):
         assert np.array_equal(decoded(content, "a").pixels, CODES)
 
 
+@pytest.mark.feature("REF-22")
 @pytest.mark.parametrize("channels", [1, 3, 4])
 def test_sixteen_bits_keep_their_lower_byte(channels: int) -> None:
     codes = RNG.integers(0, 65536, (4, 3, channels), np.uint16)
@@ -72,6 +76,7 @@ def test_sixteen_bits_keep_their_lower_byte(channels: int) -> None:
                           if channels == 1 else [0, 1, 2]])
 
 
+@pytest.mark.feature("REF-22")
 def test_grey_and_palettes_of_few_bits() -> None:
     grey = CODES[..., 0]
     assert np.array_equal(decoded(encoded(Pictures.fromarray(grey)), "a").pixels, np.repeat(grey[..., None], 3, 2))
@@ -87,6 +92,7 @@ def test_grey_and_palettes_of_few_bits() -> None:
     assert np.array_equal(decoded(encoded(bits), "d").pixels[..., 1], (grey > 127) * 255)
 
 
+@pytest.mark.feature("REF-22")
 def test_jpeg_in_colour_grey_and_four_inks() -> None:
     for mode, ink, expected in (("RGB", (200, 100, 50), (200, 100, 50)), ("L", 90, (90, 90, 90)),
                                 ("CMYK", (51, 0, 102, 51), (163.2, 204, 122.4))):  # 255 (1 - C) (1 - K)
@@ -102,6 +108,7 @@ def test_one_texel_and_sizes_that_are_no_powers_of_two() -> None:
     assert level_sizes(1, 6) == [(1, 6), (1, 3), (1, 1)]
 
 
+@pytest.mark.feature("REF-23")
 @pytest.mark.parametrize("shape", [(5, 7), (4, 6), (3, 1), (1, 1), (2, 9), (13, 11)])
 def test_levels_are_means_of_areas_and_keep_the_whole(shape: tuple[int, int]) -> None:
     level = image = RNG.random((*shape, 3))

@@ -25,7 +25,7 @@ def image(height: int, width: int) -> Image:
     return Image(RNG.random((height, width, 3)).astype(np.float32))
 
 
-@pytest.mark.feature("REF-22")
+@pytest.mark.feature("REF-22", "REF-24")
 @pytest.mark.parametrize("size", [(4, 8), (5, 7), (1, 1), (1, 6), (3, 2)])
 @pytest.mark.parametrize("wrap", [*itertools.product(WRAPS, WRAPS)])
 def test_points_equal_the_twin(size: tuple[int, int], wrap: tuple[str, str]) -> None:
@@ -40,6 +40,7 @@ def test_points_equal_the_twin(size: tuple[int, int], wrap: tuple[str, str]) -> 
             assert found == point_sample(table, 0, u, v)
 
 
+@pytest.mark.feature("REF-23")
 def test_centres_of_texels_lie_half_a_texel_in_and_row_0_at_v_0() -> None:
     picture = image(3, 5)
     table = Textures([Texture(picture)]).table
@@ -63,6 +64,7 @@ def at(place: np.ndarray) -> Looks:
     return scratch
 
 
+@pytest.mark.feature("REF-23")
 @pytest.mark.parametrize("size", [(16, 16), (9, 14), (1, 1)])
 @pytest.mark.parametrize("wrap", [("repeat", "repeat"), ("mirror", "clamp")])
 def test_means_over_footprints_equal_the_twin(size: tuple[int, int], wrap: tuple[str, str]) -> None:
@@ -78,6 +80,7 @@ def test_means_over_footprints_equal_the_twin(size: tuple[int, int], wrap: tuple
         assert np.abs(colour[k] - naive.footprint(picture.pixels, wrap, place[:, k], MOST)).max() <= BLENDS
 
 
+@pytest.mark.feature("REF-23")
 @pytest.mark.parametrize("chosen", ["nearest", "bilinear"])
 def test_other_filters_look_at_the_middle_of_a_footprint(chosen: str) -> None:
     picture, place = image(6, 7), footprints(40, 4)
@@ -114,6 +117,7 @@ def test_images_are_stored_once_and_equal_materials_share_a_table() -> None:
     assert textures_of([None, None]) is None
 
 
+@pytest.mark.feature("REF-23")
 def test_coordinates_of_points_are_those_of_barycentrics() -> None:
     for _ in range(20):
         vertices, uv = RNG.normal(size=(3, 3)), RNG.normal(size=(1, 3, 2))

@@ -241,6 +241,7 @@ def test_a_mesh_around_the_eye_covers_everything():
     assert covered_pixels(VIEW, solids, 0, 20, True).all()
 
 
+@pytest.mark.feature("REF-14")
 @settings(max_examples=60)
 @given(seed=st.integers(0, 2**16), size=st.sampled_from([0.01, 0.3, 3.0]))
 def test_quads_hold_their_balls(seed, size):
@@ -272,6 +273,7 @@ def test_quad_of_a_ball_ahead_is_its_tangents():
         screen_quads(cube_projection((0, 0, 0), 8), eye[:, None], np.ones(1))
 
 
+@pytest.mark.feature("REF-14")
 def test_tiles_meet_the_quads_that_hold_their_pixels():
     """Tiles of a picture in the kernels' order against each pixel's centre in each rectangle."""
     rng = np.random.default_rng(6)

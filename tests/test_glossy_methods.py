@@ -154,7 +154,7 @@ def test_a_cut_leaves_the_same_pairs_out(room):
     close(METHODS["sii"].lobes(frame, settings).reshape(3, -1)[:, points.pixel], irradiance / math.pi)
 
 
-@pytest.mark.feature("AMS-13", "REF-27")
+@pytest.mark.feature("AMS-13", "REF-02", "REF-27")
 @pytest.mark.parametrize(("scene", "visibility"), [("lamps", True), ("smooth", True), ("lamps", False)])
 def test_vpl_sums_what_shadow_rays_let_through(scene, visibility):
     """Without visibility nothing arrives from below a face either, which flat faces alone leave to the normal."""

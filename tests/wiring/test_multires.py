@@ -281,7 +281,7 @@ def sums(frame, settings):
     return full
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", featured(ALL, MULTIRES))
 def test_each_key_counts(name):
     """Property: a key put back to its default makes another picture, unless the case says why not."""
     assert_each_key_counts(ALL[name], MultiresSettings, multires, BASE, frame_of(ALL[name]), TOLERANCE.get(name, 0.0))

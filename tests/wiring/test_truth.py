@@ -124,6 +124,7 @@ def compared(name):
     return got.mean(axis=0) - expected.mean(axis=0), error, expected.mean(axis=0)
 
 
+@pytest.mark.feature("REF-03")
 @pytest.mark.slow("visible emitters, not blocked")
 @pytest.mark.parametrize("name", CASES)
 def test_the_mean(name, evidence):

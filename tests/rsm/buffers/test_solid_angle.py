@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from refgi.rsm.buffers.light_projection import texel_shares
-from refgi.rsm.buffers.solid_angle import sampled_spot_share, spot_power, spot_power_at, texel_solid_angles
+from refgi.rsm.buffers.solid_angle import (
+    sampled_spot_share,
+    spot_power,
+    spot_power_at,
+    texel_solid_angles,
+    texel_solid_angles_at,
+)
 from refgi.rsm.raster.projection import (
     cube_projection,
     directional_projection,
@@ -43,8 +49,10 @@ def test_sums_over_whole_maps(n, evidence):
         "perspective 90": (cube_projection((0, 0, 0), n)._replace(origin=np.zeros((1, 3))), 2 * math.pi / 3),
     }
     for name, (projection, expected) in whole.items():
-        error = abs(texel_solid_angles(projection).sum() / expected - 1)
+        angles = texel_solid_angles(projection)
+        error = abs(angles.sum() / expected - 1)
         assert error < (RIM[n] if name == "dual paraboloid" else ROUNDING), name
+        np.testing.assert_array_equal(texel_solid_angles_at(projection, np.arange(angles.size)), angles.ravel())
         evidence(f"n={n} {name}: {error:.0e}")
     light = DirectionalLight((0, -1, 0), (1, 1, 1))
     area = texel_solid_angles(directional_projection(light, (np.zeros(3), np.array([2.0, 1, 3])), n)).sum()

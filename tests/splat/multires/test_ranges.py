@@ -96,6 +96,7 @@ def test_mips_are_the_same_for_any_number_of_threads():
     assert all_of_them() == alone
 
 
+@pytest.mark.feature("AMS-03", "AMS-05")
 @pytest.mark.parametrize("shape", SIZES)
 def test_slopes_and_curvatures_are_the_largest_of_their_pixels(shape):
     buffer = scattered(shape)

@@ -205,6 +205,7 @@ def test_the_depth_test_leaves_what_lies_in_the_mesh(exponent, evidence):
     """The drawing's nearest and farthest depth against the planes of the mesh's faces, surfaces at any depth."""
     rng = np.random.default_rng(4)
     place, axis, square = scattered(rng)
+    place[:, 0] = VIEW.origin[0]  # its meshes hold the eye
     solids = light_solids(place, axis, np.full(len(square), exponent), square, False, 0.2)
     depth = rng.uniform(0.05, 3, VIEW.shape)
     seen = (VIEW.origin[0][:, None, None] + depth * pixel_rays(VIEW)).reshape(3, -1)

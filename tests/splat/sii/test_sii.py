@@ -256,7 +256,7 @@ def test_filtered_flux_is_steadier_under_a_moving_light(box, evidence):
              f"{steady:.3%} filtered; flux sum kept")
 
 
-@pytest.mark.feature("REF-18")
+@pytest.mark.feature("REF-18", "SII-28")
 def test_lights_that_hold_their_places_on_the_map_flicker_less(box, evidence):
     """The flicker metric against every texel's pictures, of a lamp that glides by 1 mm a frame.
 

@@ -55,7 +55,8 @@ PRINTED = [
     ("SII-25", "gather", "default", "interpolation.grid", 64),  # SII Fig. 12
     ("AMS-01", "multires", "default", "lights.count", 256),  # Sec. 5: 16 x 16
     ("AMS-01", "multires", "default", "lights.source.pattern", "grid"),
-    ("AMS-04", "multires", "default", "subsplats.criteria.normal.threshold", 0.25),  # Fig. 11 a
+    ("AMS-02 AMS-21", "multires", "default", "subsplats.criteria.depth.threshold", 0.1),  # docs/methods/multires
+    ("AMS-04 AMS-21", "multires", "default", "subsplats.criteria.normal.threshold", 0.25),  # Fig. 11 a
     ("AMS-04", "multires", "default", "subsplats.criteria.normal.components", "xyz"),
     ("AMS-05", "multires", {"curvature": "chord"}, "subsplats.criteria.curvature.threshold", 0.1),  # Fig. 12
     ("AMS-06 AMS-07", "multires", "default", "subsplats.coarsest", 16),  # Sec. 3.3

@@ -88,6 +88,7 @@ def test_same_paths_for_the_same_seed():
     assert first.flux.shape != other.flux.shape or (first.flux != other.flux).any()
 
 
+@pytest.mark.feature("SII-17")
 def test_lights_lie_on_surfaces_and_face_the_path():
     scene = load_scene("cornell_box")
     lights = lights_of(scene, paths=500)
@@ -97,6 +98,7 @@ def test_lights_lie_on_surfaces_and_face_the_path():
     assert lights.drawn >= lights.flux.shape[1]
 
 
+@pytest.mark.feature("SII-17")
 def test_glossy_surfaces_leave_lobes_around_the_mirror_direction():
     scene = load_scene("parallel_plates")
     shiny = tuple(dataclasses.replace(m, diffuse=(0.0, 0.0, 0.0), specular=(0.4, 0.4, 0.4), exponent=30.0)
@@ -122,6 +124,7 @@ def test_bad_numbers_are_refused():
             lights_of(scene, **change)
 
 
+@pytest.mark.feature("SII-17")
 def test_paths_are_shared_out_among_lights():
     scene = load_scene("cornell_box")
     lamps = (PointLight((0.278, 0.4, -0.2), (2.0, 2.0, 2.0)), PointLight((0.2, 0.3, -0.2), (1.0, 1.0, 1.0)))

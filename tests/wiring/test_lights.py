@@ -55,7 +55,7 @@ def test_the_lights_are_those_of_the_twin(name):
         assert apart(got[field], values) <= tolerance(field, settings), field
 
 
-@pytest.mark.parametrize("name", featured(LIGHT_CASES, LIGHTS))
+@pytest.mark.parametrize("name", LIGHT_CASES)
 def test_each_key_counts(name):
     case = LIGHT_CASES[name]
     lights = chosen(case, case.settings(LightSettings, LIGHT_BASE))

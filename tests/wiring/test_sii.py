@@ -162,7 +162,7 @@ def test_the_literal_text(name):
     np.testing.assert_allclose(sii(frame, settings), expected, rtol=0, atol=tolerance(settings) * expected.max())
 
 
-@pytest.mark.parametrize("name", featured(CASES, SII))
+@pytest.mark.parametrize("name", CASES)
 def test_each_key_counts(name):
     assert_each_key_counts(CASES[name], SiiSettings, sii, BASE, same=ORDER.get(name, 0.0))
 

@@ -36,6 +36,7 @@ CASES = {
     "two bounces": Case({"bounces": 2}),
     "not blocked": Case({"visibility": False}, scene="tilted"),
     "not blocked, on a smooth ball": Case({"visibility": False}, {"estimator": "light"}, scene="smooth"),
+    "not blocked, by directions": Case({"visibility": False}, {"estimator": "hemisphere"}, scene="tilted"),
     "visible emitters": Case({"emitters": "visible"}, scene="close"),
     "visible emitters, by light": Case({"emitters": "visible"}, {"estimator": "light"}, scene="close"),
     "visible emitters, by directions": Case({"emitters": "visible"}, {"estimator": "hemisphere"}, scene="close"),

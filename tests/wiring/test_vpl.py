@@ -66,7 +66,7 @@ def test_the_literal_text(name, evidence):
     assert off < SINGLE
 
 
-@pytest.mark.parametrize("name", featured(CASES, VPL))
+@pytest.mark.parametrize("name", CASES)
 def test_each_key_counts(name):
     assert_each_key_counts(CASES[name], VplSettings, vpl, BASE)
 

@@ -121,6 +121,7 @@ def test_a_spots_power_is_that_of_its_cone(inner, outer, n, evidence):
         evidence(f"{math.degrees(outer):.0f} deg n={n}: {error:.0e}")
 
 
+@pytest.mark.feature("SII-01")
 @pytest.mark.parametrize("kind", ["perspective", "paraboloid"])
 @pytest.mark.parametrize(("inner", "outer"), [(0.3, 0.9), (0.8, 0.8)])
 def test_each_texels_spot_power_equals_a_dense_sum(kind, inner, outer):
@@ -139,6 +140,7 @@ def test_each_texels_spot_power_equals_a_dense_sum(kind, inner, outer):
         assert power[row, column] == pytest.approx(expected, rel=dense, abs=dense * power.max())
 
 
+@pytest.mark.feature("SII-02")
 def test_sampled_share_tends_to_the_exact_one():
     light, n, angles = spot(0.3, 0.9), 128, (0.3, 0.9)
     projection = spot_projection(light, n)
@@ -149,6 +151,7 @@ def test_sampled_share_tends_to_the_exact_one():
     assert sampled.sum() == pytest.approx(exact.sum(), rel=1e-5)
 
 
+@pytest.mark.feature("SII-01")
 @pytest.mark.parametrize("falloff", ["smoothstep", "squared_ramp", "ramp"])
 @pytest.mark.parametrize("n", [1, 2, 9, 16])
 @pytest.mark.parametrize("half", [math.radians(40), math.radians(85)])
@@ -162,6 +165,7 @@ def test_power_of_some_texels_is_that_of_the_whole_map(n, half, falloff):
     np.testing.assert_array_equal(texel_shares(light, maps, texel=texel), whole.reshape(-1)[texel])
 
 
+@pytest.mark.feature("SII-01")
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
 @pytest.mark.parametrize(("inner", "outer"), [(0.4, 0.8), (0.1, 1.2), (0.0, 1.3), (0.02, 0.03)])
 def test_coarse_maps_hold_a_spots_power(inner, outer, n):

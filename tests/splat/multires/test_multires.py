@@ -138,6 +138,7 @@ def test_cells_that_look_dark_do_not_hold_an_error_up(scene, size, change):
     assert off <= settings.subsplats.target * full[:, covered].mean()
 
 
+@pytest.mark.feature("AMS-15")
 def test_slivers_between_doubled_pixels_take_the_light_around():
     """By hand: a pixel with a surface whose four finer ones show none is the mean of its covered neighbours."""
     covered, fine = np.ones((1, 3), bool), np.ones((2, 6), bool)
@@ -146,6 +147,7 @@ def test_slivers_between_doubled_pixels_take_the_light_around():
     np.testing.assert_array_equal(halved(light, fine, covered), [[[1, 2, 3]]] * 3)
 
 
+@pytest.mark.feature("AMS-17")
 @pytest.mark.parametrize(("change", "clamp"), [
     ({}, "disc"), ({"pattern": "halton", "warp": "A"}, "disc"), ({"subsplats": ByError(0.3)}, "disc"),
     ({"subsplats": "irradiance"}, "disc"), ({"supersampled": True}, "disc"), ({"source": "walk"}, "none"),
@@ -173,6 +175,7 @@ def test_the_default_clamp_keeps_subsplats_near_the_full_sum():
     assert off["none"] > 2 * off["auto"]
 
 
+@pytest.mark.feature("AMS-17")
 def test_the_demos_disc_counts_the_lights_of_each_map(box):
     """By hand: pi L^2 / (1.5 N) with the lights that each map has of 256, in proportion to its flux."""
     spot = box.scene.lights[0]
@@ -281,6 +284,7 @@ def test_shadows_say_what_they_take():
         assert of(MultiresSettings, visibility="val", **change).traces_rays
 
 
+@pytest.mark.feature("AMS-09", "AMS-12", "AMS-15")
 def test_printed_values_are_a_preset():
     paper = PRESETS["paper"]
     assert changed(paper) == {"subsplats.criteria.diagonal": "literal", "subsplats.criteria.traversal": "list",

@@ -229,9 +229,12 @@ def test_each_light_has_its_texels_area_times_the_texels_it_stands_for(pattern, 
         np.testing.assert_allclose(area[here], expected, rtol=ROUNDING)
 
 
-def test_lights_without_their_weight_have_their_texels_flux_under_a_rounded_grid():
+@pytest.mark.feature("SII-13")
+@pytest.mark.parametrize(("pattern", "count"), [("grid", 256), ("halton", 1)])  # a grid that is rounded; drawn lamps
+def test_lights_without_their_weight_have_their_texels_flux(pattern, count):
     frame = Frame(BOX.with_lights(KINDS["spot"], KINDS["cube"]), rsm_resolution=40)
-    lights = choose_lights(frame, of(LightSettings, count=256, pattern="grid", as_published={"sii_no_tn"}))
+    lights = choose_lights(frame, of(LightSettings, count=count, pattern=pattern, seed=1, as_published={"sii_no_tn"}))
+    assert lights.flux.any()
     for index, rsm in enumerate(frame.rsms):
         here = lights.map_index == index
         np.testing.assert_allclose(lights.flux[:, here], rsm.flux.reshape(3, -1)[:, lights.texel[here]], rtol=ROUNDING)

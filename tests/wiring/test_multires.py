@@ -87,7 +87,7 @@ CASES = {
     "nearest": Case({"subsplats.upsampling": "nearest"}, DEPTH),
     "naive bilinear": Case({"subsplats.upsampling": "naive_bilinear"}, DEPTH),
     "irradiance": Case({"subsplats": "irradiance", "subsplats.threshold": 0.4}),
-    "irradiance coarsest": Case({"subsplats.coarsest": 5}, SINGLE | {"subsplats.threshold": 0.4}),
+    "irradiance coarsest": Case({"subsplats.coarsest": 6}, SINGLE | {"subsplats.threshold": 0.4}),
     "irradiance finest": Case({"subsplats.finest": 1}, SINGLE),
     "absolute": Case({"subsplats.form": "absolute"}, SINGLE),
     "brightest": Case({"subsplats.form": "brightest"}, SINGLE | {"subsplats.threshold": 0.5}),

@@ -14,7 +14,7 @@ PAIRS = {
     "as_published = sii_widening_unnorm": "REF-20",
 }
 LIGHTS = {
-    "count": "SII-10 SII-26", "seed": "SII-10", "source.projection": "SII-02",
+    "count": "SII-10 SII-26", "seed": "SII-10 SII-14 SII-16 SII-17", "source.projection": "SII-02",
     "source.pattern": "SII-10", "source.filtered": "SII-03",
     "source.warp = A": "SII-11", "source.warp = B": "SII-12", "source.warp.levels": "SII-11 SII-12",
     "source.warp.importance": "SII-14", "source.warp.defensive": "REF-13", "source.warp.renormalise_weights": "SII-13",

@@ -13,6 +13,7 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.shares import map_shares
+from refgi.literal import multires_lights as literal
 from refgi.method import Extent
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, PointLight, load_scene
@@ -145,6 +146,11 @@ def test_slivers_between_doubled_pixels_take_the_light_around():
     fine[:, 2:4] = False
     light = np.where(fine, np.array([1.0, 1, 9, 9, 3, 3]), 0)[None].repeat(3, axis=0)
     np.testing.assert_array_equal(halved(light, fine, covered), [[[1, 2, 3]]] * 3)
+    rng = np.random.default_rng(2)
+    covered, fine = rng.random((9, 11)) < 0.7, rng.random((18, 22)) < 0.15  # most pixels are slivers
+    light = rng.random((3, 18, 22)) * fine
+    expected = literal.halved(light, np.where(fine, 0, -1), covered)
+    np.testing.assert_allclose(halved(light, fine, covered), expected, rtol=1e-13)  # sums in another order
 
 
 @pytest.mark.feature("AMS-17")

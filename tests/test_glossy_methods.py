@@ -170,7 +170,7 @@ def test_imperfect_maps_shadow_lobes_as_they_do_irradiance(room):
     assert np.abs(METHODS["vpl"].lobes(room, settings) - by_rays).max() > 0.01 * by_rays.max()
 
 
-@pytest.mark.feature("AMS-13", "REF-27")
+@pytest.mark.feature("AMS-13", "REF-02", "REF-27")
 @pytest.mark.parametrize(("scene", "visibility"), [("lamps", True), ("smooth", True), ("lamps", False)])
 def test_vpl_sums_what_shadow_rays_let_through(scene, visibility):
     """Without visibility nothing arrives from below a face either, which flat faces alone leave to the normal."""

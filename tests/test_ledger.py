@@ -271,6 +271,7 @@ def test_bounces_of_a_walk_are_a_geometric_series(evidence):
     evidence("reflected {:.4f}, bounced {:.4f}, lights {:.4f} of emitted".format(*shares))
 
 
+@pytest.mark.feature("REF-04")
 def test_areas_are_those_of_the_faces():
     """Analytic: pixels on the whole of a tilted plate have its area together, up to its rim."""
     scene, _ = plates(below=False)
@@ -311,6 +312,7 @@ def test_lines_sum_to_the_whole_with_textures(chosen, settings, evidence):
     assert balance(ledger) <= WHOLE
 
 
+@pytest.mark.feature("REF-04")
 def test_a_textured_wall_absorbs_what_its_texels_leave():
     """In float64, texel by texel: shares of the light's power times 1 - albedo."""
     frame = Frame(room(), rsm_resolution=48, dtype=np.float64)
@@ -324,6 +326,7 @@ def test_a_textured_wall_absorbs_what_its_texels_leave():
     assert rsm.albedo[0][seen].std() > 0.2
 
 
+@pytest.mark.feature("REF-04")
 @pytest.mark.parametrize("falloff", ["smoothstep", "squared_ramp", "ramp"])
 def test_coloured_walls_and_every_falloff_leave_nothing_over(falloff):
     """What is emitted has a closed form, what is absorbed is the texels' own."""

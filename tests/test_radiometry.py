@@ -83,6 +83,7 @@ def test_no_light_at_the_light_itself():
     assert incident_light(table, 0, 1.0, 2.0, 3.0) == (0,) * 7
 
 
+@pytest.mark.feature("SII-01")
 def test_spot_flux_is_its_closed_form():
     light = SpotLight((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.4, 1.1, (3.0, 0.0, 0.0))
     table = light_table([light])
@@ -129,6 +130,7 @@ def test_lobe_fraction_is_the_part_above_the_surface(evidence):
     evidence(f"K(75, 10), K(85, 100) as tabled; max error against quadrature {worst:.1e}")
 
 
+@pytest.mark.feature("SII-06")
 def test_lobe_fraction_up_to_exponents_of_a_million():
     rng = np.random.default_rng(3)
     for exponent in np.r_[0.0, np.geomspace(1e-3, 1e6, 40)]:
@@ -164,6 +166,7 @@ def test_kernels_keep_float32(name):
     assert all("float64" not in kind for kind in types)
 
 
+@pytest.mark.feature("SII-06")
 def test_a_small_part_of_a_lobe_above_the_surface_keeps_its_digits(evidence):
     """Lobes that point into the surface: K is half of the incomplete beta function, down to 1e-11."""
     assert lobe_fraction(-1 + 2.0**-40, 1.0) == pytest.approx(2.0**-41, rel=1e-14)  # (1 + cos th) / 2

@@ -56,6 +56,7 @@ def test_it_is_the_largest_channel_of_flux_times_lobe_peak_times_hidden_share(ev
     evidence("lobe of P = 20 beside a diffuse part: Phi_d + 10.5 Phi_l, its largest channel, times max(eps, 1 - O)")
 
 
+@pytest.mark.feature("SII-14")
 @pytest.mark.parametrize("kind", ["flux", "peak", "openness"])
 def test_as_printed_a_lobe_counts_by_its_exponent(kind):
     """Oracle: p = Phi (1 - O) P; the flux alone knows no lobes."""
@@ -68,6 +69,7 @@ def test_as_printed_a_lobe_counts_by_its_exponent(kind):
     np.testing.assert_allclose(got, expected * hidden, rtol=ROUNDING)
 
 
+@pytest.mark.feature("SII-14")
 def test_it_is_zero_only_where_the_flux_is():
     for rsm in (box_map(), glossy_map()):
         lit = rsm.flux.any(axis=0) if rsm.lobe_flux is None else rsm.flux.any(axis=0) | rsm.lobe_flux.any(axis=0)

@@ -92,6 +92,7 @@ def test_filtering_keeps_the_flux(pattern, source, evidence):
     evidence(f"{pattern}, {source}: flux sum changes by {error:.0e}")
 
 
+@pytest.mark.feature("SII-03")
 @pytest.mark.parametrize(("n", "resolution"), [(4, 24), (5, 24), (24, 24), (7, 31)])
 def test_grid_cells_equal_those_of_a_literal_twin(n, resolution):
     rsm = box_map(resolution)
@@ -100,6 +101,7 @@ def test_grid_cells_equal_those_of_a_literal_twin(n, resolution):
     np.testing.assert_allclose(lights.flux, expected[:, expected.any(axis=0)], rtol=ROUNDING)
 
 
+@pytest.mark.feature("SII-03")
 def test_nearest_cells_equal_those_of_a_literal_twin():
     rsm = box_map()
     chosen, _ = texels(halton_points([9], np.zeros((1, 2)), 0), [9], 0, 1, 24, 24)
@@ -108,6 +110,7 @@ def test_nearest_cells_equal_those_of_a_literal_twin():
     np.testing.assert_allclose(lights.flux, expected[:, expected.any(axis=0)], rtol=ROUNDING)
 
 
+@pytest.mark.feature("SII-03")
 def test_a_filtered_light_on_a_dark_texel_moves_to_the_nearest_bright_one():
     rsm = box_map()
     lights = choose_pixel_lights([rsm], count=1, pattern="grid", filtered=True)
@@ -118,6 +121,7 @@ def test_a_filtered_light_on_a_dark_texel_moves_to_the_nearest_bright_one():
     np.testing.assert_array_equal(lights.position[:, 0], rsm.position[:, 12, 12])
 
 
+@pytest.mark.feature("SII-13")
 def test_several_lights_share_the_count_and_each_keeps_its_flux():
     first, second = box_map(), box_map(16)
     glossy = reflective_shadow_map(sphere(10, 2.0), material_table([GLOSSY], np.float64),
@@ -169,6 +173,7 @@ def test_a_grid_that_is_rounded_is_logged_with_the_number_used():
         "242 texels for 256: n x n on each map of 2 lights"]
 
 
+@pytest.mark.feature("SII-13")
 def test_lobes_carry_the_same_weight_as_the_diffuse_part():
     light = SpotLight((0, 0, 0), (0, -1, 0), 0.4, 0.8, (1, 1, 1))
     rsm = reflective_shadow_map(sphere(10, 2.0), material_table([GLOSSY], np.float64), light, 16, np.float64)
@@ -200,6 +205,7 @@ def test_warped_lights_have_the_maps_flux_in_the_mean_for_every_count(source, me
     evidence(f"{source}, method {method}, N = 3 and 200: mean of 100 draws {worst:.1f} standard errors off")
 
 
+@pytest.mark.feature("SII-13")
 def test_warped_lights_are_texels_with_their_weight_times_t_over_n():
     for rsm in (box_map(), cube_map()):
         lights = choose_pixel_lights([rsm], count=200, pattern="halton", seed=4, warp=Warp("A", 20))
@@ -259,6 +265,7 @@ def test_lights_name_their_texel_and_map():
             np.testing.assert_array_equal(lights.position[:, here], flat(rsm.position)[:, lights.texel[here]])
 
 
+@pytest.mark.feature("SII-13")
 def test_renormalised_weights_sum_to_the_count_and_bring_variance_back():
     rsm = box_map()
     worth = importance(rsm)
@@ -270,6 +277,7 @@ def test_renormalised_weights_sum_to_the_count_and_bring_variance_back():
     assert abs(scaled.flux.max(axis=0).sum() / worth.sum() - 1) > 1e-3
 
 
+@pytest.mark.feature("SII-10", "SII-28")
 def test_same_seed_same_lights_other_seed_others():
     rsm = box_map()
     for pattern in ("halton", "random"):

@@ -104,6 +104,7 @@ def test_energy_through_a_ball_follows_fresnel(mode, evidence):
              f"({whole:.4f})")
 
 
+@pytest.mark.feature("SII-02", "SII-09")
 @pytest.mark.parametrize("projection", ["perspective", "cube", "paraboloid"])
 def test_every_projection_sends_the_same_flux(projection):
     expected = through(glass_ball(), SPOT, "back_face", 256)[1].lobe_flux.sum(axis=(1, 2))
@@ -111,6 +112,7 @@ def test_every_projection_sends_the_same_flux(projection):
     assert got == pytest.approx(expected, rel=5 * FLUX)
 
 
+@pytest.mark.feature("SII-09")
 @pytest.mark.parametrize("mode", MODES)
 def test_lobes_point_out_of_the_surface(mode):
     _, glass = through(glass_ball(), SPOT, mode)
@@ -136,6 +138,7 @@ def test_what_is_not_glass_stays():
     assert glass.lobe_flux[:, ~kept].any()
 
 
+@pytest.mark.feature("SII-09")
 @pytest.mark.parametrize("mode", MODES)
 def test_opaque_things_end_the_light(mode):
     roof = rectangle((0.1, 0.5, 1.3), (2, 0, 0), (0, 0, -2), WHITE, "roof")  # over the half x > 0.1
@@ -155,6 +158,7 @@ def through_core():
     return (0.2 * INDEX) ** 2
 
 
+@pytest.mark.feature("SII-09")
 @pytest.mark.parametrize("mode", MODES)
 def test_glass_without_a_back_lets_nothing_through(mode):
     scene = merge([rectangle((-1, 0, 1), (2, 0, 0), (0, 0, -2), GLASS, "pane"),
@@ -178,6 +182,7 @@ def test_a_light_inside_glass_refracts_once(mode):
     assert glass.lobe_flux[0].sum() > 0.5 * 4 * math.pi
 
 
+@pytest.mark.feature("SII-09")
 def test_of_two_balls_in_a_row_the_first_bends():
     second = sphere((CENTRE[0], CENTRE[1] - 1.5, CENTRE[2]), RADIUS, FACETS, GLASS, "second")
     _, one = through(glass_ball(), DOWN, "back_face")

@@ -128,6 +128,7 @@ def test_scaling_by_openness_saves_pairs_and_says_what_it_loses(chosen, evidence
              "fewer")
 
 
+@pytest.mark.feature("SII-16")
 def test_as_printed_flux_is_scaled_by_openness(chosen):
     """Oracle: Phi O, with O the share of free directions."""
     lights, share = chosen
@@ -199,6 +200,7 @@ def test_roulette_saves_lights_and_loses_nothing_in_the_mean(scene, chosen, evid
              f"all of them {by_chance:.0%}, scaled instead {scaled:.0%}")
 
 
+@pytest.mark.feature("SII-16")
 def test_survivors_are_some_of_the_lights_with_their_flux_over_their_chance(chosen):
     lights, share = chosen
     survivors = roulette(lights, share, 0.1, 7)

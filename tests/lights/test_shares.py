@@ -39,6 +39,7 @@ def test_shares_are_those_of_the_twin(flux, more):
     assert sum(shares) == lit + more
 
 
+@pytest.mark.feature("SII-26")
 @pytest.mark.parametrize(("count", "flux", "shares"), [
     (768, [1, 1], [384, 384]), (7, [1, 1], [4, 3]), (10, [4, 0, 1], [8, 0, 2]), (10, [1000, 1, 1], [8, 1, 1]),
     (3, [1000, 1, 1], [1, 1, 1]), (40, [0, 0], [20, 20])])
@@ -76,6 +77,7 @@ def test_fewer_lights_than_lamps_keep_the_flux_in_the_mean(options, evidence):
     evidence(f"{options}: 2 lights of {LAMPS} lamps, mean of {len(seeds)} draws {z:.1f} standard errors off")
 
 
+@pytest.mark.feature("SII-13")
 def test_the_flux_of_a_map_is_that_of_its_texels():
     rsm = cube_map(20)
     assert map_flux(rsm) == pytest.approx(float(rsm.flux.sum()), rel=1e-12)
@@ -192,6 +194,7 @@ def whole(rsm):
     return texel_areas(rsm, np.arange(rsm.texels)).reshape(rsm.projection.shape)
 
 
+@pytest.mark.feature("REF-08")
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("kind", [*KINDS, "glossy"])
 def test_areas_are_those_of_the_formula(kind, dtype):
@@ -226,9 +229,12 @@ def test_each_light_has_its_texels_area_times_the_texels_it_stands_for(pattern, 
         np.testing.assert_allclose(area[here], expected, rtol=ROUNDING)
 
 
-def test_lights_without_their_weight_have_their_texels_flux_under_a_rounded_grid():
+@pytest.mark.feature("SII-13")
+@pytest.mark.parametrize(("pattern", "count"), [("grid", 256), ("halton", 1)])  # a grid that is rounded; drawn lamps
+def test_lights_without_their_weight_have_their_texels_flux(pattern, count):
     frame = Frame(BOX.with_lights(KINDS["spot"], KINDS["cube"]), rsm_resolution=40)
-    lights = choose_lights(frame, of(LightSettings, count=256, pattern="grid", as_published={"sii_no_tn"}))
+    lights = choose_lights(frame, of(LightSettings, count=count, pattern=pattern, seed=1, as_published={"sii_no_tn"}))
+    assert lights.flux.any()
     for index, rsm in enumerate(frame.rsms):
         here = lights.map_index == index
         np.testing.assert_allclose(lights.flux[:, here], rsm.flux.reshape(3, -1)[:, lights.texel[here]], rtol=ROUNDING)

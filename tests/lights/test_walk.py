@@ -88,6 +88,7 @@ def test_same_paths_for_the_same_seed():
     assert first.flux.shape != other.flux.shape or (first.flux != other.flux).any()
 
 
+@pytest.mark.feature("SII-17")
 def test_lights_lie_on_surfaces_and_face_the_path():
     scene = load_scene("cornell_box")
     lights = lights_of(scene, paths=500)
@@ -97,7 +98,7 @@ def test_lights_lie_on_surfaces_and_face_the_path():
     assert lights.drawn >= lights.flux.shape[1]
 
 
-@pytest.mark.feature("REF-16")
+@pytest.mark.feature("REF-16", "SII-17")
 def test_glossy_surfaces_leave_lobes_around_the_mirror_direction():
     scene = load_scene("parallel_plates")
     shiny = tuple(dataclasses.replace(m, diffuse=(0.0, 0.0, 0.0), specular=(0.4, 0.4, 0.4), exponent=30.0)

@@ -90,6 +90,7 @@ def test_samples_equal_those_of_the_literal_text(method, levels, evidence):
     evidence(f"{method}, {levels} levels: off the literal text by {np.abs(got - expected).max():.0e}")
 
 
+@pytest.mark.feature("SII-11", "SII-12")
 @pytest.mark.parametrize(("height", "width"), [*SIZES, (1, 1), (3, 2), (8, 1)])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_pyramids_sum_the_cells_of_maps_of_any_size(height, width, dtype):
@@ -121,6 +122,7 @@ def test_weights_are_one_over_the_density(height, width, evidence):
     evidence(f"{height} x {width}: w T q = 1 to {worst:.0e}")
 
 
+@pytest.mark.feature("SII-11", "SII-12")
 @pytest.mark.parametrize("method", ["A", "B"])
 @pytest.mark.parametrize(("height", "width"), SIZES)
 def test_samples_come_as_often_as_their_weights_say(height, width, method):
@@ -229,6 +231,7 @@ def test_the_sum_of_weights_is_n_in_the_mean_only(evidence):
     evidence(f"std of sum(w)/N, 32 shifted Halton points: {', '.join(figures)} for 1, 4, 6 levels")
 
 
+@pytest.mark.feature("SII-11")
 def test_top_is_the_rows_with_v_below_one_half():
     importance = np.zeros((8, 8))
     importance[:4] = 1

@@ -62,6 +62,9 @@ def test_disc_and_parallel_plates(evidence):
     lights = sets.lights(position, np.tile(UP, n * 64), math.pi**2 * radius**2 / (n * 64))
     disc = light_on(np.array([[0.0], [0.0], [height]]), -UP, lights)[0] / math.pi
     assert disc == pytest.approx(disc_form_factor(height, radius), rel=1e-5)
+    whole = sets.lights(np.zeros((3, 1)), UP, math.pi**2 * radius**2)  # one light that stands for all of it
+    one = light_on(np.array([[0.0], [0.0], [height]]), -UP, whole, np.array([math.pi * radius**2]), clamp="disc")
+    assert one[0] / math.pi == pytest.approx(disc_form_factor(height, radius), rel=1e-12)
     above = np.concatenate([cells(32).T, np.full((1, 1024), 0.8)])
     mean = light_on(above, -UP, floor_lights(cells(32))).mean() / math.pi
     plates = parallel_rectangles_form_factor(1.0, 1.0, 0.8)
@@ -79,6 +82,7 @@ def test_wedge(evidence):
     evidence(f"wall at the floor's edge: error up to {error.max():.1e} at 2 cm, {error[5:].max():.1e} from 28 cm up")
 
 
+@pytest.mark.feature("SII-27", "REF-08")
 @pytest.mark.parametrize(("clamp", "value"), [("distance", 0.3), ("geometry", 2.0), ("disc", 0.0)])
 def test_clamps_are_those_of_the_twin(clamp, value):
     """A minimum distance, a bounded geometry term, a disc of the light's area, from the literal pair."""

@@ -26,6 +26,7 @@ def receiver(position, normal):
     return RayReceivers(np.array([0]), at, up, up, at)
 
 
+@pytest.mark.feature("SII-05")
 @pytest.mark.parametrize("exponent", [0.0, 3.0, 1e3, 1e6, 1e12])
 def test_one_lobe_by_hand(exponent, evidence):
     axis = np.array([0.3, 0.8, -0.2])
@@ -50,6 +51,7 @@ def test_one_lobe_by_hand(exponent, evidence):
     evidence(f"P = {exponent:g}: within {worst:.1e}")
 
 
+@pytest.mark.feature("SII-06")
 @pytest.mark.parametrize("exponent", [50.0, 1e4, 1e12])
 def test_a_lobe_that_points_into_the_surface_sends_nothing(exponent):
     down = np.array([0.5, -math.sqrt(0.75), 0.0])

@@ -42,6 +42,7 @@ def test_sum_is_that_of_the_twin(real, evidence):
     evidence(f"{np.dtype(real).name}: max error against the literal sum {error:.1e} of its mean over 37^2 pairs")
 
 
+@pytest.mark.feature("SII-04")
 def test_one_light_by_hand():
     # light at the origin facing +z; receiver 2 m away at 60 degrees, facing it: E = Phi/pi * 1/2 * 1 / 4
     x = 2 * np.array([[math.sin(math.pi / 3)], [0.0], [math.cos(math.pi / 3)]])
@@ -115,6 +116,7 @@ def test_linear_in_flux_to_the_bit(real, evidence):
     evidence("twice the flux: twice E, to the bit; E of two halves of the lights adds up")
 
 
+@pytest.mark.feature("SII-04", "REF-05")
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**16), scale=st.sampled_from([0.25, 2.0, 1024.0]))
 def test_properties(seed, scale):
@@ -138,6 +140,7 @@ def test_properties(seed, scale):
     np.testing.assert_allclose(moved, plain, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.feature("SII-04")
 def test_zero_behind_either_plane():
     rng = np.random.default_rng(6)
     below = rng.uniform(-1, 1, (3, 50)) * [[1], [1], [0]] + [[0], [0], [-0.5]]

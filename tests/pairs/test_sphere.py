@@ -145,6 +145,7 @@ def test_finite_and_bounded_wherever_the_light_is(real):
     assert not spheres(np.zeros((3, 1)), -UP, sets.lights(np.zeros((3, 1)), UP, 1.0, real), 0.1, real).any()
 
 
+@pytest.mark.feature("REF-09")
 def test_reaches_over_horizons_by_its_radius():
     """A light 1 cm behind a wall's plane, 2 cm in radius, 10 cm away: seen in part; on a common plane: not at all."""
     light = sets.lights(np.array([[-0.01], [0.0], [0.1]]), -UP, 1.0)
@@ -156,6 +157,7 @@ def test_reaches_over_horizons_by_its_radius():
     assert not spheres(floor, np.tile(UP, 2), sets.lights(floor, np.tile(UP, 2), 1.0), 0.5).any()
 
 
+@pytest.mark.feature("REF-09")
 def test_radius_follows_the_footprint():
     receivers, lights = sets.room(np.random.default_rng(5), 20)
     area = np.random.default_rng(6).uniform(0.01, 0.2, 20)

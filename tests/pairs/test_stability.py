@@ -182,7 +182,7 @@ def lit_room():
                                  of(SiiSettings, cut_share=0.05, reference_length=1.0, stochastic=True)])
 
 
-@pytest.mark.parametrize("factor", [2.0, 4.0, 0.5, 1024.0])
+@pytest.mark.parametrize("factor", [2.0, 4.0, 0.5, 1024.0, 2.0**-29])
 @pytest.mark.feature("REF-05")
 def test_powers_of_two_scale_to_the_bit(how, factor, evidence):
     receivers, lights = lit_room()

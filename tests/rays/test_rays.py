@@ -40,6 +40,7 @@ def backend(request, monkeypatch):
     return request.param
 
 
+@pytest.mark.feature("REF-02")
 @pytest.mark.usefixtures("backend")
 def test_hits_equal_the_naive_twin():
     random = np.random.default_rng(3)
@@ -117,6 +118,7 @@ def test_offset_rays_never_hit_the_face_they_leave(scale, centre, evidence):
     evidence(f"0 of 100,000 rays hit the face they leave (scale {scale}, centre {centre})")
 
 
+@pytest.mark.feature("REF-02")
 def test_segments_between_surface_points():
     tracer = Tracer(box())
     inside = np.array([[-0.5, 0.1, 0.0], [0.1, -0.5, 0.2]])

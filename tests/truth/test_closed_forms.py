@@ -26,6 +26,7 @@ def deviation(result, expected):
     return error.max(), (error - SIGMAS * np.sqrt(result.picture_variance) / expected).max()
 
 
+@pytest.mark.feature("REF-03")
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_spot_over_a_plane(estimator, evidence):
     c, h, rho, intensity = math.radians(40), 0.7, 0.6, np.array([1.0, 2.0, 0.5])
@@ -111,6 +112,7 @@ def test_bounces_in_a_sphere_are_a_geometric_series(bounces, evidence):
     evidence(f"{bounces} bounces: relative error {error:.1e}, within {SIGMAS:g} standard errors")
 
 
+@pytest.mark.feature("REF-03", "REF-10")
 @pytest.mark.slow("several")
 @pytest.mark.parametrize("lights", ["spot", "point", "several"])
 def test_estimators_agree(lights, evidence):
@@ -147,17 +149,20 @@ def pixel_means(room, tracer, position, normal, ids, options, passes=24):
     return rows.mean(axis=0), rows.var(axis=0, ddof=1) / passes
 
 
+@pytest.mark.feature("REF-03")
 def test_glossy_emitters_agree(evidence):
     glossy = Material("glossy", (0.2, 0.2, 0.2), (0.5, 0.4, 0.3), 20.0)
     spot = SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.3, 0.6, (2.0, 1.5, 1.0))
     assert agree(corner_room(spot, material=glossy), evidence, "glossy floor") < SIGMAS + 1
 
 
+@pytest.mark.feature("REF-03")
 def test_estimators_agree_without_visibility(evidence):
     spot = SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.3, 0.6, (2.0, 1.5, 1.0))
     assert agree(corner_room(spot), evidence, "visibility=False", visibility=False) < SIGMAS + 1
 
 
+@pytest.mark.feature("REF-03")
 @pytest.mark.slow("True-smoothstep")
 @pytest.mark.parametrize(("blocked", "falloff"), [(True, "smoothstep"), (False, "smoothstep"), (True, "squared_ramp")])
 def test_the_naive_twin(blocked, falloff, evidence):

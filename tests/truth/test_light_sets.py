@@ -130,6 +130,7 @@ def test_sets_hold_diffuse_parts_in_whole_blocks():
 VARIANTS = ({"interleave": 1, "uniform_share": 1.0}, {"interleave": 4, "uniform_share": 0.1}, {"interleave": 3})
 
 
+@pytest.mark.feature("REF-03")
 @pytest.mark.slow("spot")
 @pytest.mark.parametrize("lights", ["spot", pytest.param("several", marks=pytest.mark.slow)])
 def test_sets_and_densities_change_no_expectation(lights, evidence):

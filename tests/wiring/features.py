@@ -14,7 +14,7 @@ PAIRS = {
     "as_published = sii_widening_unnorm": "REF-20",
 }
 LIGHTS = {
-    "count": "SII-10 SII-26", "seed": "SII-10", "source.projection": "SII-02",
+    "count": "SII-10 SII-26", "seed": "SII-10 SII-14 SII-16 SII-17", "source.projection": "SII-02",
     "source.pattern": "SII-10", "source.filtered": "SII-03",
     "source.warp = A": "SII-11", "source.warp = B": "SII-12", "source.warp.levels": "SII-11 SII-12",
     "source.warp.importance": "SII-14", "source.warp.defensive": "REF-13", "source.warp.renormalise_weights": "SII-13",
@@ -25,8 +25,8 @@ LIGHTS = {
 }
 SII = PAIRS | {
     "reach.cut": "SII-21", "reach.bound": "SII-18", "bound.faces": "SII-20", "bound.inflate": "SII-20",
-    "reach.stochastic": "REF-12", "half_resolution": "SII-22", "quantisation": "SII-31", "compensation": "REF-11",
-    "as_published = per_light_ilow": "SII-21 REF-20",
+    "reach.stochastic": "REF-12", "reach.seed": "REF-12", "half_resolution": "SII-22", "quantisation": "SII-31",
+    "compensation": "REF-11", "as_published = per_light_ilow": "SII-21 REF-20", "ambient_occlusion": "SII-32",
 }
 SHADOWS = {
     "clusters.count": "VAL-04", "clusters.distance": "VAL-05", "clusters.normal_weight": "VAL-08",
@@ -42,7 +42,8 @@ SHADOWS = {
     "as_published = val_alpha_over_pi": "VAL-15 REF-20", "as_published = val_search_solid_angle": "VAL-14 REF-20",
 }
 VAL = SHADOWS | {"visibility = none": "VAL-01", "interleaving": "VAL-23", "blur": "VAL-24"}
-MULTIRES = {
+MULTIRES = PAIRS | {
+    "lights.count": "AMS-01", "pairs.clamp": "AMS-17",
     "criteria.depth": "AMS-02", "criteria.derivative": "AMS-03", "criteria.normal": "AMS-04",
     "criteria.curvature": "AMS-05", "subsplats.coarsest": "AMS-06 AMS-07", "subsplats.finest": "AMS-06 AMS-07",
     "criteria.traversal": "AMS-09", "criteria.rim": "AMS-12", "criteria.diagonal": "AMS-12",
@@ -50,7 +51,8 @@ MULTIRES = {
     "subsplats.upsampling": "AMS-11", "detail": "AMS-14", "supersampled": "AMS-15",
     "as_published = ams_disc": "AMS-17 REF-20", "as_published = ams_rho_in_splat": "AMS-10 REF-20",
     "as_published = ams_filter_all": "AMS-11 REF-20", "as_published = ams_all_corners": "AMS-11 REF-20",
-    "subsplats.visibility = rays": "AMS-18 REF-02",
+    "subsplats.visibility = rays": "AMS-18 REF-02", "subsplats.criteria = geometry": "AMS-08",
+    "subsplats.representative": "AMS-10", "ambient_occlusion": "SII-32",
 }
 HSSIL = {
     "samples": "HSS-06", "pattern": "HSS-05 HSS-06", "tile": "HSS-06", "inner_samples": "HSS-05", "blur": "HSS-06",

@@ -49,7 +49,7 @@ SAME_LIST = "both ways find the same subsplats"
 
 UNDER_SHADOWS = under("subsplats.visibility", shadow_cases("shadow"), UNCLAMPED)
 CASES = {
-    "geometry": Case({"subsplats.coarsest": 6}, {"subsplats.criteria.depth": None}),
+    "geometry": Case({"subsplats.coarsest": 7}, {"subsplats.criteria.depth": None}, frame={"width": 13, "height": 22}),
     "finest": Case({"subsplats.finest": 2}),
     "depth": Case(DEPTH, scene="smooth"),
     "normal": Case(NORMAL, scene="ball"),
@@ -159,7 +159,8 @@ TOLERANCE = {"clusters": ROUNDING, "rays": RAYS, "error by rays": RAYS, "spheres
 
 def frame_of(case, scale=1):
     """Return the frame of a case, also at a multiple of its size."""
-    return seen(case.scene, **{"width": 17 * scale, "height": 13 * scale} | case.frame)
+    options = {"width": 17, "height": 13} | case.frame
+    return seen(case.scene, **options | {side: scale * options[side] for side in ("width", "height")})
 
 
 @cache

@@ -234,6 +234,9 @@ def test_fragments_are_those_of_the_literal_text(name):
     np.testing.assert_array_equal(found.overdraw, overdraw)
     np.testing.assert_array_equal(found.of_light, of_light)
     assert found.total == overdraw.sum()
+    tested = fragments(receivers_of(frame), lights, replaced(settings, {"reach.bound": "full"}), footprint)
+    parts = sum(np.count_nonzero(flux.any(axis=0)) for flux in (lights.flux, lights.lobe_flux) if flux is not None)
+    assert tested.evaluated == frame.gbuffer.covered.sum() * parts
 
 
 @pytest.mark.feature("SII-23")

@@ -36,6 +36,7 @@ CASES = {
     "two bounces": Case({"bounces": 2}),
     "not blocked": Case({"visibility": False}, scene="tilted"),
     "not blocked, on a smooth ball": Case({"visibility": False}, {"estimator": "light"}, scene="smooth"),
+    "not blocked, by directions": Case({"visibility": False}, {"estimator": "hemisphere"}, scene="tilted"),
     "visible emitters": Case({"emitters": "visible"}, scene="close"),
     "visible emitters, by light": Case({"emitters": "visible"}, {"estimator": "light"}, scene="close"),
     "visible emitters, by directions": Case({"emitters": "visible"}, {"estimator": "hemisphere"}, scene="close"),
@@ -124,6 +125,7 @@ def compared(name):
     return got.mean(axis=0) - expected.mean(axis=0), error, expected.mean(axis=0)
 
 
+@pytest.mark.feature("REF-03")
 @pytest.mark.slow("visible emitters, not blocked")
 @pytest.mark.parametrize("name", CASES)
 def test_the_mean(name, evidence):

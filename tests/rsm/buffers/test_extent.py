@@ -149,6 +149,7 @@ def test_screen_space_visibility_needs_no_rsm():
     assert "rsm.reflective_shadow_map" not in {run.name for run in log.runs}
 
 
+@pytest.mark.feature("SII-15")
 def test_rays_of_openness_are_a_tenth_of_what_lights_reach(monkeypatch):
     asked, openness, scene = [], rays.openness, room(1e3)
 

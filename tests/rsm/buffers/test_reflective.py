@@ -195,6 +195,7 @@ def test_lobes_only_where_a_material_has_one():
         np.testing.assert_allclose(rsm.lobe_axis[:, row, column], expected, atol=1e-12)
 
 
+@pytest.mark.feature("SII-08")
 def test_lobe_axis_of_a_directional_light_mirrors_its_direction():
     light = DirectionalLight((0.3, -1.0, 0.2), (1, 1, 1))
     rsm = in_a_ball(light, materials=(GLOSSY,))
@@ -203,6 +204,7 @@ def test_lobe_axis_of_a_directional_light_mirrors_its_direction():
     np.testing.assert_allclose(rsm.lobe_axis[:, row, column], expected, atol=1e-12)
 
 
+@pytest.mark.feature("SII-01")
 def test_glass_reflects_nothing():
     light = PointLight((0.3, 0.2, -0.4), (3.0, 2.0, 1.0))
     rsm = in_a_ball(light, materials=(DIFFUSE, GLASS))
@@ -264,6 +266,7 @@ def test_errors_name_what_is_wrong(light, options, message):
 VIEWED = ("depth", "position", "normal", "solid_angle", "flux")
 
 
+@pytest.mark.feature("SII-01")
 @pytest.mark.parametrize("materials", [(DIFFUSE,), (DIFFUSE, GLOSSY, GLASS)])
 @pytest.mark.parametrize("light", [
     SpotLight((0.3, 0.2, -0.4), (1, -2, 0.5), 0.4, 0.8, (3.0, 2.0, 1.0)),

@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from refgi.rsm.buffers.light_projection import texel_shares
-from refgi.rsm.buffers.solid_angle import sampled_spot_share, spot_power, spot_power_at, texel_solid_angles
+from refgi.rsm.buffers.solid_angle import (
+    sampled_spot_share,
+    spot_power,
+    spot_power_at,
+    texel_solid_angles,
+    texel_solid_angles_at,
+)
 from refgi.rsm.raster.projection import (
     cube_projection,
     directional_projection,
@@ -43,8 +49,10 @@ def test_sums_over_whole_maps(n, evidence):
         "perspective 90": (cube_projection((0, 0, 0), n)._replace(origin=np.zeros((1, 3))), 2 * math.pi / 3),
     }
     for name, (projection, expected) in whole.items():
-        error = abs(texel_solid_angles(projection).sum() / expected - 1)
+        angles = texel_solid_angles(projection)
+        error = abs(angles.sum() / expected - 1)
         assert error < (RIM[n] if name == "dual paraboloid" else ROUNDING), name
+        np.testing.assert_array_equal(texel_solid_angles_at(projection, np.arange(angles.size)), angles.ravel())
         evidence(f"n={n} {name}: {error:.0e}")
     light = DirectionalLight((0, -1, 0), (1, 1, 1))
     area = texel_solid_angles(directional_projection(light, (np.zeros(3), np.array([2.0, 1, 3])), n)).sum()
@@ -113,6 +121,7 @@ def test_a_spots_power_is_that_of_its_cone(inner, outer, n, evidence):
         evidence(f"{math.degrees(outer):.0f} deg n={n}: {error:.0e}")
 
 
+@pytest.mark.feature("SII-01")
 @pytest.mark.parametrize("kind", ["perspective", "paraboloid"])
 @pytest.mark.parametrize(("inner", "outer"), [(0.3, 0.9), (0.8, 0.8)])
 def test_each_texels_spot_power_equals_a_dense_sum(kind, inner, outer):
@@ -131,6 +140,7 @@ def test_each_texels_spot_power_equals_a_dense_sum(kind, inner, outer):
         assert power[row, column] == pytest.approx(expected, rel=dense, abs=dense * power.max())
 
 
+@pytest.mark.feature("SII-02")
 def test_sampled_share_tends_to_the_exact_one():
     light, n, angles = spot(0.3, 0.9), 128, (0.3, 0.9)
     projection = spot_projection(light, n)
@@ -141,6 +151,7 @@ def test_sampled_share_tends_to_the_exact_one():
     assert sampled.sum() == pytest.approx(exact.sum(), rel=1e-5)
 
 
+@pytest.mark.feature("SII-01")
 @pytest.mark.parametrize("falloff", ["smoothstep", "squared_ramp", "ramp"])
 @pytest.mark.parametrize("n", [1, 2, 9, 16])
 @pytest.mark.parametrize("half", [math.radians(40), math.radians(85)])
@@ -154,6 +165,7 @@ def test_power_of_some_texels_is_that_of_the_whole_map(n, half, falloff):
     np.testing.assert_array_equal(texel_shares(light, maps, texel=texel), whole.reshape(-1)[texel])
 
 
+@pytest.mark.feature("SII-01")
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
 @pytest.mark.parametrize(("inner", "outer"), [(0.4, 0.8), (0.1, 1.2), (0.0, 1.3), (0.02, 0.03)])
 def test_coarse_maps_hold_a_spots_power(inner, outer, n):

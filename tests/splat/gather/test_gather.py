@@ -54,6 +54,7 @@ def test_pattern_lies_in_the_disc(seed):
     assert (np.hypot(down.mean(), right.mean())) < 0.02
 
 
+@pytest.mark.feature("SII-25")
 @pytest.mark.parametrize("offset", [0.0, 0.03])
 def test_sum_is_that_of_the_literal_text(offset):
     frame = Frame(load_scene("cornell_box"), width=12, height=12, dtype=np.float64, rsm_resolution=32)
@@ -100,6 +101,7 @@ def test_published_weight_loses_light(box, full_sum, evidence):
              f"{relative(squared, full_sum):.2f} against {relative(plain, full_sum):.3f}")
 
 
+@pytest.mark.feature("SII-25")
 @pytest.mark.parametrize("light", [PointLight((0.278, 0.4, -0.2), (1.0, 1.0, 1.0)),
                                    DirectionalLight((0.3, -1.0, 0.4), (1.0, 1.0, 1.0))])
 def test_other_lights_converge_too(box, light):
@@ -135,6 +137,7 @@ def plane(height, width):
     return Receivers(position, normal, np.ones((height, width), bool))
 
 
+@pytest.mark.feature("SII-25")
 def test_interpolation_is_bilinear_on_a_plane():
     floor = plane(20, 30)
     light = np.stack([1 + floor.position[0], 2 + floor.position[1], floor.position[0] * 0 + 5])
@@ -145,6 +148,7 @@ def test_interpolation_is_bilinear_on_a_plane():
     np.testing.assert_allclose(got[inside], light[inside], rtol=1e-12)
 
 
+@pytest.mark.feature("SII-25")
 def test_interpolation_keeps_to_one_side_of_a_step():
     floor = plane(16, 16)
     floor.position[2, :, 8:] = 50  # a cliff

@@ -33,6 +33,7 @@ def cells(covered, level):
                      places[level][row, column].astype(np.int64), (*empty, places[level] >= 0), covered.shape)
 
 
+@pytest.mark.feature("AMS-10")
 @pytest.mark.parametrize("change", [{}, {"clamp": "disc"}, {"clamp": "sphere"}, {"clamp": "distance",
                                                                                "clamp_value": 0.1}])
 def test_points_get_the_bits_of_the_full_sum(box, change):
@@ -53,6 +54,7 @@ def test_no_points_get_no_light(box):
     assert evaluate(np.zeros((3, 0), np.float32), np.zeros((3, 0), np.float32), lights, unclamped().pairs).size == 0
 
 
+@pytest.mark.feature("AMS-10")
 def test_means_are_those_of_the_cells_surface(box):
     """Oracle: means over slices, cut at the border and by what is not covered."""
     position, normal, covered = box.gbuffer.resolve("position", "normal", "covered")
@@ -70,6 +72,7 @@ def test_means_are_those_of_the_cells_surface(box):
         np.testing.assert_array_equal(mean, own)
 
 
+@pytest.mark.feature("AMS-18", "REF-02")
 @pytest.mark.parametrize("level", [0, 2])
 def test_subsplats_get_the_bits_of_vpl(box, level):
     """Oracle: `vpl` with the same lights, which lights every pixel."""

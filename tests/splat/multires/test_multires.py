@@ -13,6 +13,7 @@ from refgi.frame import Frame
 from refgi.jit import threads
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.shares import map_shares
+from refgi.literal import multires_lights as literal
 from refgi.method import Extent
 from refgi.methods import find_method, render
 from refgi.scene import DirectionalLight, PointLight, load_scene
@@ -138,14 +139,21 @@ def test_cells_that_look_dark_do_not_hold_an_error_up(scene, size, change):
     assert off <= settings.subsplats.target * full[:, covered].mean()
 
 
+@pytest.mark.feature("AMS-15")
 def test_slivers_between_doubled_pixels_take_the_light_around():
     """By hand: a pixel with a surface whose four finer ones show none is the mean of its covered neighbours."""
     covered, fine = np.ones((1, 3), bool), np.ones((2, 6), bool)
     fine[:, 2:4] = False
     light = np.where(fine, np.array([1.0, 1, 9, 9, 3, 3]), 0)[None].repeat(3, axis=0)
     np.testing.assert_array_equal(halved(light, fine, covered), [[[1, 2, 3]]] * 3)
+    rng = np.random.default_rng(2)
+    covered, fine = rng.random((9, 11)) < 0.7, rng.random((18, 22)) < 0.15  # most pixels are slivers
+    light = rng.random((3, 18, 22)) * fine
+    expected = literal.halved(light, np.where(fine, 0, -1), covered)
+    np.testing.assert_allclose(halved(light, fine, covered), expected, rtol=1e-13)  # sums in another order
 
 
+@pytest.mark.feature("AMS-17")
 @pytest.mark.parametrize(("change", "clamp"), [
     ({}, "disc"), ({"pattern": "halton", "warp": "A"}, "disc"), ({"subsplats": ByError(0.3)}, "disc"),
     ({"subsplats": "irradiance"}, "disc"), ({"supersampled": True}, "disc"), ({"source": "walk"}, "none"),
@@ -173,6 +181,7 @@ def test_the_default_clamp_keeps_subsplats_near_the_full_sum():
     assert off["none"] > 2 * off["auto"]
 
 
+@pytest.mark.feature("AMS-17")
 def test_the_demos_disc_counts_the_lights_of_each_map(box):
     """By hand: pi L^2 / (1.5 N) with the lights that each map has of 256, in proportion to its flux."""
     spot = box.scene.lights[0]
@@ -281,6 +290,7 @@ def test_shadows_say_what_they_take():
         assert of(MultiresSettings, visibility="val", **change).traces_rays
 
 
+@pytest.mark.feature("AMS-09", "AMS-12", "AMS-15")
 def test_printed_values_are_a_preset():
     paper = PRESETS["paper"]
     assert changed(paper) == {"subsplats.criteria.diagonal": "literal", "subsplats.criteria.traversal": "list",

@@ -139,6 +139,7 @@ def test_lists_go_on_from_the_shared_one():
                                atol=TWIN * expected.max())
 
 
+@pytest.mark.feature("AMS-08")
 def test_lights_that_split_nothing_stay_with_the_shared_list():
     """Oracle: the shared list evaluated for all lights at once."""
     buffer, lights = wall(40, 64, np.float32, bumps=0.2), lamps(7, np.float32)
@@ -153,6 +154,7 @@ def test_lights_that_split_nothing_stay_with_the_shared_list():
     np.testing.assert_allclose(summed(buffer, lights, settings, None, start), expected, rtol=8 * ROUNDING)
 
 
+@pytest.mark.feature("AMS-08")
 @pytest.mark.parametrize("shape", [(1, 1), (1, 9), (7, 1), (33, 20)])
 def test_threshold_0_is_the_full_sum(shape):
     """Limit: every cell is split, so every pixel is evaluated by itself; a light alone to the bit."""
@@ -167,6 +169,7 @@ def test_threshold_0_is_the_full_sum(shape):
     np.testing.assert_array_equal(summed(buffer, one, settings), full_sum(buffer, one, settings))
 
 
+@pytest.mark.feature("AMS-08")
 @pytest.mark.parametrize("change", [{"clamp": "sphere", "clamp_value": 8.0},
                                     {"clamp": "disc", "offset": 0.1}])
 def test_pairs_are_those_of_the_full_sum(change):

@@ -96,6 +96,7 @@ def test_mips_are_the_same_for_any_number_of_threads():
     assert all_of_them() == alone
 
 
+@pytest.mark.feature("AMS-03", "AMS-05")
 @pytest.mark.parametrize("shape", SIZES)
 def test_slopes_and_curvatures_are_the_largest_of_their_pixels(shape):
     buffer = scattered(shape)
@@ -236,6 +237,7 @@ def test_the_rate_of_a_sphere_is_the_inverse_of_its_radius(evidence, radius):
     evidence(f"R = {radius:g} m: 1/R to {np.abs(rates * radius - 1).max():.0e}")
 
 
+@pytest.mark.feature("AMS-06")
 def test_criteria_add_up_and_the_finest_level_is_never_refined():
     buffer = scattered((37, 53), np.float32, 0.95)
     together = found_by(buffer, TOP, 1, **only("depth", "normal"))
@@ -246,6 +248,7 @@ def test_criteria_add_up_and_the_finest_level_is_never_refined():
         assert together[level].any() == (level > 1)
 
 
+@pytest.mark.feature("AMS-02", "AMS-04")
 @pytest.mark.parametrize("rim", [0, 1])
 def test_needs_are_those_of_the_printed_tests(rim):
     buffer = scattered((19, 23), np.float32, 0.6)

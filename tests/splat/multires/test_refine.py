@@ -76,7 +76,7 @@ def refined(buffer, top=None, **settings):
     return refine(discontinuous, buffer.covered, chosen.criteria.diagonal, chosen.criteria.traversal)
 
 
-@pytest.mark.feature("AMS-06")
+@pytest.mark.feature("AMS-06", "AMS-09")
 @pytest.mark.parametrize("shape", [(1, 1), (1, 13), (9, 1), (6, 5), (32, 32), (37, 53)])
 @pytest.mark.parametrize("rule", RULES)
 def test_subsplats_are_the_published_list(shape, rule):
@@ -209,6 +209,7 @@ def test_an_edge_between_two_cells_is_found_with_a_rim(evidence):
              "(paper: up to + 40 % of time)")
 
 
+@pytest.mark.feature("AMS-12")
 def test_a_corner_is_refined_across_only_where_nothing_else_tells():
     need = [np.zeros((16 >> level, 16 >> level), bool) for level in range(3)]
     need[2][0, 0] = True

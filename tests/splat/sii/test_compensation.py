@@ -4,6 +4,7 @@ The scene of `tests/truth/test_bias_compensation`, where short rays give back th
 floor of the unit square under a sun straight above, seen with the wall at its edge.
 """
 
+import dataclasses
 import math
 
 import numpy as np
@@ -16,12 +17,14 @@ from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
 from refgi.splat.sii.options import _within
 from tests.form_factors import polygon_form_factor
+from tests.literal.whole.sii import compensation
 from tests.truth.scenes import rectangle
 
 FLOOR = [(0, 0, 0), (1, 0, 0), (1, 0, -1), (0, 0, -1)]
 SUN = DirectionalLight((0.0, -1.0, 0.0), (3.0, 2.0, 1.0))
 RADIANCE = 0.6 * 3.0 / math.pi
 BOUND = 4.0  # 1/m^2: half a metre
+ROUNDING = 1e-9  # of the largest sum: float64 in another order
 BOUNDED = of(SiiSettings, pattern="all", clamp="geometry", clamp_value=BOUND)
 
 
@@ -32,10 +35,11 @@ LEAST_HEIGHT = 0.02  # m: nearer to the floor than two pixels are apart, a sum o
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 
-def corner(size, camera=BOTH):
+def corner(size, camera=BOTH, width=None, **options):
     floor, wall = rectangle((0, 0, 0), (1, 0, 0), (0, 0, -1)), rectangle((0, 0, 0), (0, 0, -1), (0, 1, 0))
     geometry, materials = merge([floor, wall])
-    return Frame(Scene("corner", geometry, materials, camera, (SUN,)), width=size, height=size, rsm_resolution=128)
+    return Frame(Scene("corner", geometry, materials, camera, (SUN,)), width=width or size, height=size,
+                 rsm_resolution=128, **options)
 
 
 def taken(height, z, n=600):
@@ -64,6 +68,18 @@ def test_what_the_bound_takes_comes_back(size, residual, evidence):
     assert after < before / 10
     evidence(f"{size} x {size}: {integral.sum() / whole.sum():.0%} of the light is above the bound, of which pixels "
              f"give back {1 + back:.1%}, short rays all; RMSE to the form factor {before:.1%}, with it {after:.1%}")
+
+
+@pytest.mark.feature("REF-11")
+@pytest.mark.parametrize(("width", "height"), [(120, 20), (20, 120)])
+def test_of_a_long_picture_it_is_the_sum_of_all_pairs_of_pixels(width, height):
+    """Literal senders: windows of rows and of columns are each of their own angle of view."""
+    narrow = dataclasses.replace(BOTH, target=(0.1, 0.1, -0.5), vfov=math.radians(15 if width > height else 90))
+    frame = corner(height, narrow, width, dtype=np.float64)
+    bounded, given = (sii(frame, replaced(BOUNDED, {"compensation": how})) for how in ("none", "screen"))
+    expected = compensation(frame, BOUND)
+    assert expected.any()
+    np.testing.assert_allclose(given - bounded, expected, rtol=0, atol=ROUNDING * expected.max())
 
 
 @pytest.mark.feature("REF-11")

@@ -170,6 +170,7 @@ def test_a_quarter_of_the_pixels_is_evaluated(name, evidence):
     evidence(f"{name}: {share:.1%} of the pixels")
 
 
+@pytest.mark.feature("SII-22")
 def test_thin_surfaces_are_lit_by_themselves():
     """A bright pole one pixel wide between the pixels that stand for blocks keeps its own light."""
     receivers = wall(10, 10)

@@ -59,6 +59,7 @@ def counted(at, lights, low):
     return total
 
 
+@pytest.mark.feature("SII-21")
 @pytest.mark.parametrize("name", ["cornell_box", "stage", "glass_ball", "atrium:faces=20000"])
 def test_the_papers_cut_leaves_the_papers_share_of_pairs(name):
     """Oracle: a count over all pixels, pair by pair, at the length found from some."""

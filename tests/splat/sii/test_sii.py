@@ -11,7 +11,7 @@ from refgi.errors import InputError
 from refgi.frame import Frame
 from refgi.lights.selection import light_areas, pixel_lights
 from refgi.lights.settings import LightSettings
-from refgi.scene import SpotLight, load_scene
+from refgi.scene import PointLight, SpotLight, load_scene
 from refgi.settings import of, replaced
 from refgi.splat import SiiSettings, sii
 from refgi.splat.sii import METHOD
@@ -51,6 +51,10 @@ def test_integrating_sphere_scene(real, limit, evidence):
     flux = light.intensity[0] * 2 * math.pi * ((1 - half[0]) + 0.5 * (half[0] - half[1]))
     expected = 0.6 * flux / (4 * math.pi)
     got = sii(frame, ALL)
+    bulb = Frame(scene.with_lights(PointLight(light.position, (1.0, 1.0, 1.0))), width=8, height=8, dtype=real,
+                 rsm_resolution=128)
+    cells = sii(bulb, of(SiiSettings, pattern="grid", lights=6 * 32**2, clamp="none"))  # T/N of a cube's six faces
+    assert np.median(cells) == pytest.approx(0.6, rel=limit)
     away = np.abs(got / expected - 1)
     # lights within a few texels of a receiver see the facets, not the sphere
     assert np.quantile(away, 0.95) < limit
@@ -148,6 +152,7 @@ def test_footprints_are_the_lit_area(plates):
     assert few.sum() == pytest.approx(disc, rel=0.1)
 
 
+@pytest.mark.feature("REF-05")
 def test_several_lights_add_up(box):
     first = box.scene.lights[0]
     second = SpotLight((0.3, 0.4, 0.3), (1.0, -0.5, 0.0), 0.2, 0.5, (1.0, 2.0, 3.0))
@@ -219,6 +224,7 @@ def test_settings_are_checked():
             of(SiiSettings, **change)
 
 
+@pytest.mark.feature("SII-03", "SII-21", "SII-26")
 def test_preset_of_the_paper_is_its_printed_values(box):
     """Sec. 4 and Fig. 12: 768 lights with filtered flux, cut at 5 %; the default cuts nothing."""
     paper = METHOD.preset("paper")
@@ -256,7 +262,7 @@ def test_filtered_flux_is_steadier_under_a_moving_light(box, evidence):
              f"{steady:.3%} filtered; flux sum kept")
 
 
-@pytest.mark.feature("REF-18")
+@pytest.mark.feature("REF-18", "SII-28")
 def test_lights_that_hold_their_places_on_the_map_flicker_less(box, evidence):
     """The flicker metric against every texel's pictures, of a lamp that glides by 1 mm a frame.
 

@@ -65,6 +65,7 @@ def test_sum_is_that_of_the_twin(real, evidence):
     evidence(f"{np.dtype(real).name}: the twin's {overdraw.sum()} of {60 * 60} pairs count")
 
 
+@pytest.mark.feature("SII-21")
 @pytest.mark.parametrize("clamp", [{}, {"clamp": "distance", "clamp_value": 0.2}, {"clamp": "geometry",
                          "clamp_value": 3.0}, {"clamp": "disc"}, {"clamp": "sphere"}])
 def test_kept_and_cut_make_the_full_sum(corner, clamp):
@@ -200,6 +201,7 @@ def behind_slats(scene, distance=0.1, count=9):
         np.concatenate([old.material_of_face, extra.material_of_face])))
 
 
+@pytest.mark.feature("SII-20")
 def test_meshes_that_are_not_inflated_lose_pixels(corner):
     receivers, lights, view = corner
     how = of(SiiSettings, cut_share=0.05, reference_length=0.02, bound="mesh", bound_faces=8, bound_inflate=False)
@@ -238,6 +240,7 @@ def test_range_scales_with_the_scene(length):
     np.testing.assert_allclose(splat(there, far, CUT), splat(receivers, lights, CUT), rtol=1e-5)
 
 
+@pytest.mark.feature("SII-21")
 def test_threshold_is_one_irradiance_for_all_lights():
     light = sets.lights(np.zeros((3, 3)), np.array([[0.0] * 3, [0] * 3, [1] * 3]), [[1.0, 2, 3], [9, 1, 0], [0, 0, 5]])
     settings = of(SiiSettings, cut_share=0.1, reference_length=2.0)
@@ -260,6 +263,7 @@ def test_thresholds_near_0_cut_nothing(how):
     assert not cut_irradiance(receivers, lights, settings).any()
 
 
+@pytest.mark.feature("SII-21")
 def test_range_of_a_light_is_that_of_its_flux():
     """On the axis a light counts up to sqrt(I_0 / I_low); as published, all up to x^(-1/2) reference lengths."""
     z = np.linspace(0.01, 5, 4000)
@@ -461,6 +465,7 @@ def test_stochastic_range_has_the_mean_of_the_full_sum(glossy, evidence):
              f"{bias:.0%}")
 
 
+@pytest.mark.feature("REF-12")
 def test_factor_of_a_pair():
     """R_0 = 2; on the axis B / I_low = 4 / r^2."""
     cases = (1.0, 0.5, 1.0), (2.0, 1.0, 1.0), (2.5, 1.0, 0.0), (2.5, 0.5, 2.5**2 / 4), (3.0, 0.5, 0.0)

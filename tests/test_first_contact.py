@@ -33,8 +33,10 @@ def examples(text):
 
 @pytest.fixture
 def clone(tmp_path, monkeypatch):
-    """A folder with the files that a clone has for its examples."""
+    """A folder with the files that a clone has for its examples; the plan's pictures are small."""
     shutil.copytree(ROOT / "docs" / "examples", tmp_path / "docs" / "examples")
+    plan = tmp_path / "docs" / "examples" / "batch.toml"
+    plan.write_text(plan.read_text().replace("[96, 72]", "[24, 18]").replace("384", "96"))
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

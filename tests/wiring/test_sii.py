@@ -37,7 +37,7 @@ OCTAHEDRA = MESH | {"reach.bound.faces": 8, "lights.count": 12}
 # ranges that end beyond the distance within which exponents fall
 FAR = OCTAHEDRA | {"reach.cut.reference_length": 1.5}
 RIM = MESH | {"reach.bound.inflate": False, "lights.count": 6}
-FINE = {"width": 40, "height": 30}
+FINE = {"width": 28, "height": 21}
 CANDIDATES = "a bound finds the pixels that the threshold is tested at"
 
 FEW = "few lights are summed in full in any case"

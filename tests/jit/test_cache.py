@@ -1,6 +1,7 @@
 """Property tests of the kernel cache: it follows what a kernel reaches, and mends what is damaged."""
 
 import hashlib
+import json
 import os
 import pickle
 import shutil
@@ -8,6 +9,7 @@ import stat
 import subprocess
 import sys
 import textwrap
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -61,9 +63,49 @@ def surroundings(folder: Path) -> dict[str, str]:
                          "PYTHONDONTWRITEBYTECODE": "1"}
 
 
-def process(folder: Path, code: str, **also: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", code], env=surroundings(folder) | also, capture_output=True, text=True,
-                          check=False)
+SERVER = """
+import atexit, json, os, sys, traceback
+import numpy, refgi.jit
+for line in sys.stdin:
+    code, environment, *files = json.loads(line)
+    if (child := os.fork()) == 0:
+        for number, file in enumerate(files, 1):
+            os.dup2(os.open(file, os.O_CREAT | os.O_TRUNC | os.O_WRONLY), number)
+        os.environ.clear()
+        os.environ.update(environment)
+        sys.path.insert(0, environment["PYTHONPATH"])
+        sys.dont_write_bytecode = True
+        failed = 0
+        try:
+            exec(code, {"__name__": "__main__"})
+        except BaseException:
+            failed = 1
+            traceback.print_exc()
+        atexit._run_exitfuncs()
+        sys.stdout.flush()
+        os._exit(failed)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def server() -> Iterator[None]:
+    """A process that has imported `refgi.jit` and compiled nothing: those of the tests are forked from it."""
+    with subprocess.Popen([sys.executable, "-c", SERVER], text=True, stdin=subprocess.PIPE,
+                          stdout=subprocess.PIPE) as started:
+        SERVERS.append(started)
+        yield
+        SERVERS.pop().stdin.close()
+
+
+SERVERS: list[subprocess.Popen[str]] = []
+
+
+def process(folder: Path, code: str) -> subprocess.CompletedProcess[str]:
+    files = [folder.parent / name for name in ("stdout", "stderr")]
+    print(json.dumps([code, surroundings(folder), *map(str, files)]), file=SERVERS[0].stdin, flush=True)
+    returned = int(SERVERS[0].stdout.readline())
+    return subprocess.CompletedProcess(code, returned, *(file.read_text() for file in files))
 
 
 def run(folder: Path, said: str = "", call: str = CALL) -> str:
@@ -119,7 +161,8 @@ def test_a_folder_that_cannot_be_written_is_named(package):
 
 def test_kernels_run_as_plain_python(package):
     call = "import package_a.outer as o; print(o.outer(1.5))"
-    done = process(package, call, NUMBA_DISABLE_JIT="1")
+    done = subprocess.run([sys.executable, "-c", call], env=surroundings(package) | {"NUMBA_DISABLE_JIT": "1"},
+                          capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "5.0", done.stderr
 
 

@@ -1,5 +1,6 @@
 """What every test can ask for: the real scenes' folder, and a place to put the figure a feature's evidence gave."""
 
+import gc
 import os
 import re
 import warnings
@@ -9,6 +10,7 @@ from typing import Any
 
 import hypothesis
 import pytest
+from xdist.scheduler import LoadFileScheduling
 
 # the same examples on every run and no limit on time, which a compiling kernel would break
 hypothesis.settings.register_profile("refgi", derandomize=True, deadline=None)
@@ -17,15 +19,12 @@ hypothesis.settings.load_profile("refgi")
 ROOT = Path(__file__).parents[1]
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # several processes share the cores: waiting threads leave theirs
 COLLECTED: pytest.StashKey[tuple[list[pytest.Item], set[int]]] = pytest.StashKey()  # tests, and those left out
-# its first test makes the kit, for which the others of its folder would wait: it runs first, and they run last
+# its first test makes the kit, for which the others of its folder would wait
 MAKES_THE_KIT = "tests/vectors/test_forms.py"
-# files that compile or run longest, which nobody should wait for at the end
-LONGEST = (
-    "tests/cli/test_again.py", "tests/bench/test_measure.py", "tests/test_first_contact.py",
-    "tests/bench/test_approximations.py", "tests/bench/test_work.py", "tests/batch/test_work.py",
-    "tests/wiring/test_multires.py", "tests/wiring/test_sii.py", "tests/pairs/test_glossy_receivers.py",
-    "tests/splat/sii/test_lists.py", "tests/rsm/raster/test_cutouts.py", "tests/bench/test_val_split.py",
-    "tests/pairs/lightcuts/test_sums.py", "tests/wiring/test_hssil.py", "tests/literal/test_whole.py")
+# folders from both ends, so that two processes lower few kernels twice: whole methods in float64, in float32; files of
+# the others, which lower few, stand between
+FIRST = ("vectors", "wiring", "literal", "cluster", "sssil")
+LAST = ("rsm", "truth", "pairs", "splat", "batch", "bench", "cli")
 # what `make quick` runs: a minute with warm kernels
 QUICK = (
     "tests/settings", "tests/image", "tests/scene/test_scenefile", "tests/compare", "tests/provenance",
@@ -66,11 +65,31 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if item not in left_out]
 
 
+def pytest_collection_finish() -> None:
+    """Spare the garbage collector what imports and collection made, and the small rounds."""
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
+
+
 def _turn(item: pytest.Item) -> int:
-    """Return when a test runs: 0 is first."""
+    """Return when a test runs, by its folder."""
     if item.nodeid.startswith(MAKES_THE_KIT):
-        return 0
-    return 1 if item.nodeid.startswith(LONGEST) else 3 if item.nodeid.startswith("tests/vectors/") else 2
+        return -1
+    folder = (*item.nodeid.split("/"), "")[1]
+    return FIRST.index(folder) if folder in FIRST else len(FIRST) + (1 + LAST.index(folder) if folder in LAST else 0)
+
+
+class FromBothEnds(LoadFileScheduling):  # type: ignore[misc]
+    """Files for processes, from the first and from the last on: a kernel is lowered anew in each that reaches it."""
+
+    def _assign_work_unit(self, node: Any) -> None:
+        if self.nodes.index(node) % 2:
+            self.workqueue.move_to_end(next(reversed(self.workqueue)), last=False)
+        super()._assign_work_unit(node)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> FromBothEnds | None:
+    return FromBothEnds(config, log) if config.getvalue("dist") == "loadfile" else None
 
 
 def _is_slow(item: pytest.Item) -> bool:

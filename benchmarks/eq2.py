@@ -9,7 +9,7 @@ and face anywhere.
 
 import types as python
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numba
@@ -52,11 +52,14 @@ def power_of_libm(h, exponent):
     return (type(h)(1.0) - h) ** exponent
 
 
-@njit(types.float32(types.float32, types.float32))
-def power_in_lanes(h, exponent):
-    # Compiled here, before any caller: Numba hands a caller's licence on to the overloads that it calls, and with it
-    # the polynomials' rounding to whole numbers is taken apart: sums would be off by a fifth.
-    return exp2(exponent * log2p1(-h))
+@cache
+def power_in_lanes():
+    # Compiled before any caller: Numba hands a caller's licence on to the overloads that it calls, and with it the
+    # polynomials' rounding to whole numbers is taken apart: sums would be off by a fifth.
+    @njit(types.float32(types.float32, types.float32))
+    def power(h, exponent):
+        return exp2(exponent * log2p1(-h))
+    return power
 
 
 def lobes_freely(power):
@@ -151,7 +154,7 @@ def _pairs(quick: bool, dtype: Any) -> Iterator[Row]:
 
 def _lobes(quick: bool) -> Iterator[Row]:
     pixels, lights, repeats = (1 << 14, 256, 7) if quick else (1 << 16, 512, 15)
-    yardsticks = {"polynomials": lobes_freely(power_in_lanes), "libm": lobes_freely(power_of_libm)}
+    yardsticks = {"polynomials": lobes_freely(power_in_lanes()), "libm": lobes_freely(power_of_libm)}
     position, normal, packed = room(pixels, lights, np.float32)
     clamp, out = Clamp(np.float32(0), np.zeros(lights, np.float32), np.float32(np.inf)), np.zeros_like(position)
     for exponent in EXPONENTS:

@@ -153,11 +153,3 @@ def data_dir() -> Path:
     if not folder.is_dir():
         pytest.skip("no real scenes here: set REFGI_DATA to their folder")
     return folder
-
-
-@pytest.fixture(scope="session")
-def failure_dir() -> Path:
-    """Return where a failed picture test leaves image, reference and error."""
-    folder = ROOT / "out" / "failures"
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder

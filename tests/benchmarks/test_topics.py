@@ -47,7 +47,7 @@ def test_a_yardstick_sums_what_the_strict_kernel_does():
     clamp = Clamp(np.float32(0), np.zeros(48, np.float32), np.float32(np.inf))
     strict[:] = 0
     add_lobes(position, normal, lobes, clamp, None, None, None, strict)
-    eq2.lobes_freely(eq2.power_in_lanes)(position, normal, lobes, free)
+    eq2.lobes_freely(eq2.power_in_lanes())(position, normal, lobes, free)
     np.testing.assert_allclose(free, strict, rtol=1e-4, atol=1e-5 * strict.max())
 
 

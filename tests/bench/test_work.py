@@ -1,5 +1,6 @@
 """What a frame takes beside time: pairs and rays by closed forms, memory by what must be held at least."""
 
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -116,6 +117,7 @@ def test_gathering_takes_its_samples_at_each_pixel(box, shown):
 def test_levels_take_their_samples_at_each_texel(box):
     found = taken(box, "hssil", "samples=16", "levels=2", "start=full", "pattern=pixel", "inner_samples=4")
     assert found.pairs == 40 * 36 * (16 + 4) + 20 * 18 * 16
+    assert taken(box, "hssil", "samples=16", "levels=1", "start=full").pairs == 40 * 36 * 16
 
 
 def test_subsplats_take_each_light(box, frame):
@@ -153,8 +155,12 @@ def test_memory_holds_the_frame_s_buffers_and_not_the_scene(box):
     held = 256 * 256 * (3 + 3 + 3) * 4  # position, normal, irradiance
     assert held < large.peak_bytes < 12 * held
     assert large.peak_bytes - small.peak_bytes == pytest.approx(0.75 * large.peak_bytes, rel=0.3)
+    tracemalloc.start()
+    kept = np.ones(1 << 20)  # of others
     assert taken(box, "sii", f"lights={LIGHTS}", width=128, height=128).peak_bytes == pytest.approx(
         small.peak_bytes, rel=0.02)
+    tracemalloc.stop()
+    assert kept.all()
 
 
 def test_choices_without_a_picture_are_left_out(box):

@@ -137,12 +137,14 @@ def test_a_caller_imported_after_an_edit_does_not_pass_for_the_edited_one(packag
     assert run(package) == "7.0 0"
 
 
-@pytest.mark.parametrize("damage", [b"\x80\x05garbage", pytest.param(b"", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("damage", [lambda _: b"\x80\x05garbage", lambda _: b"", lambda content: content[:-40],
+                                    lambda content: content[:-40] + bytes([content[-40] ^ 1]) + content[-39:]],
+                         ids=["other", "empty", "short", "flipped"])
 def test_a_damaged_cache_is_dropped_and_rebuilt(compiled, damage):
     files = list((compiled.parent / "cache").rglob("outer.*.kernel"))
     assert files
     for file in files:
-        file.write_bytes(damage)
+        file.write_bytes(damage(file.read_bytes()))
     assert run(compiled) == "5.0 0"
     assert run(compiled) == "5.0 1"
 

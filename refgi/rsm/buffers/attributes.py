@@ -101,22 +101,27 @@ def allocate(workers: int, rows: int = ROWS) -> Scratch:
 
 @kernel(parallel=True)
 def resolve(
-    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, listed: bool, channels: ChannelMask,
+    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, seen: Array, channels: ChannelMask,
     planes: Planes, scratch: Scratch,
 ) -> None:
-    """Fill the planes of the chosen channels of geometry: of all texels, or of those `listed`, to the same bits.
+    """Fill the planes of the chosen channels: of all texels, or of listed ones, to the same bits.
 
     `projection`: the maps that `triangle_id` (H, W) was drawn on: triangle at each texel, -1 for none. `texel` (n,):
-    those listed, of the flattened maps; the planes then have one row of them, and one worker fills it. `scratch`: of
-    each worker; strips of rows are assigned to them round-robin.
+    those listed, of the flattened maps, n > 0; the planes then have one row of them, and one worker fills it. `seen`:
+    `triangle_id` there, (1, n), or everywhere. `scratch`: of each worker; strips of rows, and rows of materials, are
+    assigned to them round-robin.
     """
     workers, height, width = len(scratch.line), projection.height, projection.width
     strips = (height + ROWS - 1) // ROWS  # of a map
+    listed, painted = len(texel) > 0, channels.albedo | channels.material_id
+    shaped = channels.depth | channels.distance | channels.position | channels.normal
     for worker in prange(workers):
+        for row in range(worker, len(seen) if painted else 0, workers):
+            _fill_materials(surface, seen[row], row, planes)
         runs, records, line = _runs_of(scratch, worker), _records_of(scratch, worker), scratch.line[worker]
         strip = worker
         left: Any = np.int64(0)  # no literal, for which callees would be compiled again
-        while left < len(texel) if listed else strip < strips * len(projection.origin):
+        while shaped and (left < len(texel) if listed else strip < strips * len(projection.origin)):
             if listed:
                 m, columns = _list_runs(projection, triangle_id, texel, left, runs, records, line)
                 tile, count = Tile(m * height, left, 1, columns), columns + 1
@@ -198,23 +203,17 @@ def _fill(
                 store_units(row, left, columns, line, planes.normal)
 
 
-@kernel(parallel=True)
-def fill_materials(material_of_face: Array, diffuse: Array, triangle_id: Array, planes: Planes) -> None:
-    """Fill the planes of material and albedo, those that are not empty, of visible triangles (h, w), -1 for none.
-
-    `diffuse` (3, materials + 1): reflectances, the last one black, which index -1 is.
-    """
-    width = triangle_id.shape[1]
-    for row in prange(triangle_id.shape[0]):
-        material = np.empty(width, np.int32)
-        for x in range(width):
-            face = triangle_id[row, x]
-            material[x] = material_of_face[max(face, 0)] if face >= 0 else -1
-        for x in range(width if planes.material_id.size else 0):
-            planes.material_id[row, x] = material[x]
-        for channel in range(3 if planes.albedo.size else 0):
-            for x in range(width):
-                planes.albedo[channel, row, x] = diffuse[channel, material[x]]
+@kernel
+def _fill_materials(surface: Surface, face: Array, row: int, planes: Planes) -> None:
+    """Fill a row of the planes of material and albedo, if not empty, of visible triangles (w,), -1: none."""
+    material = np.empty(len(face), np.int32)
+    for x in range(len(face)):
+        material[x] = surface.material_of_face[max(face[x], 0)] if face[x] >= 0 else -1
+    for x in range(len(face) if planes.material_id.size else 0):
+        planes.material_id[row, x] = material[x]
+    for channel in range(3 if planes.albedo.size else 0):
+        for x in range(len(face)):
+            planes.albedo[channel, row, x] = surface.diffuse[channel, material[x]]
 
 
 class Coloured(NamedTuple):

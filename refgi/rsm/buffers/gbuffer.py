@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange, thread_count
-from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, fill_materials, resolve, tint
+from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, tint
 from refgi.rsm.buffers.surfaces import Surface
 from refgi.rsm.buffers.textures import paint
 from refgi.rsm.pool import plane
@@ -305,17 +305,15 @@ def _filled(
     names: tuple[str, ...], texel: Array | None = None,
 ) -> Planes:
     """Return planes of the named channels, of all texels or, in one row, of those listed (n,)."""
-    seen = triangle_id if texel is None else triangle_id.reshape(1, -1)[:, texel]
+    seen = triangle_id if texel is None else np.take(triangle_id.reshape(1, -1), texel, axis=1)
     planes = _planes(names, seen.shape, dtype)
-    channels = ChannelMask(*(name in names for name in ChannelMask._fields))
-    if any(channels._replace(albedo=False, material_id=False)):
-        surface = Surface(geometry.vertices, geometry.faces, geometry.vertex_normals)
-        scratch = allocate(thread_count()) if texel is None else allocate(1, 1)
-        resolve(surface, projection, triangle_id, NO_TEXELS if texel is None else texel, texel is not None, channels,
-                planes, scratch)
-    if channels.albedo or channels.material_id:
+    if seen.size:
+        channels = ChannelMask(*(name in names for name in ChannelMask._fields))
         diffuse = np.append(materials.diffuse.T.astype(dtype), np.zeros((3, 1), dtype), axis=1)
-        fill_materials(geometry.material_of_face, diffuse, seen, planes)
+        surface = Surface(geometry.vertices, geometry.faces, geometry.vertex_normals, geometry.material_of_face,
+                          diffuse)
+        resolve(surface, projection, triangle_id, NO_TEXELS if texel is None else texel, seen, channels, planes,
+                allocate(thread_count()) if texel is None else allocate(1, 1))
     paint(geometry, materials, projection, triangle_id, planes.albedo, texel)
     tint(geometry, projection, triangle_id, planes.albedo, texel)
     return planes

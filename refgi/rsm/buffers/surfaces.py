@@ -31,11 +31,13 @@ INPUTS = 18  # rows of a batch: corners and their normals
 
 
 class Surface(NamedTuple):
-    """The triangles."""
+    """What the triangles are made of."""
 
     vertices: Array  # (n, 3) float64, m
     faces: Array  # (m, 3) int32
     normals: Any  # (n, 3) float64; None: the faces' normals count
+    material_of_face: Array  # (m,) int32
+    diffuse: Array  # (3, materials + 1), the last one black
 
 
 class Records(NamedTuple):

@@ -273,7 +273,11 @@ def add_lobes(radiance: Array, direct: Array, indirect: Array | None) -> Array:
     indirect (3, h, w): Lobes by indirect light, W/m^2/sr.
     -> (3, h, w): Radiance, W/m^2/sr, linear RGB.
     """
-    return radiance + direct if indirect is None else radiance + (direct + indirect)
+    from refgi.rsm.pool import plane
+
+    total = plane(radiance.shape, np.result_type(radiance, direct))
+    lobes = direct if indirect is None else np.add(direct, indirect, out=total)
+    return np.add(radiance, lobes, out=total)
 
 
 def _dtype(requested: npt.DTypeLike) -> np.dtype[Any]:

@@ -44,20 +44,20 @@ def halton(count: int, bases: Sequence[int] = (2, 3), shift: Sequence[float] | N
     [[0.5, 0.333], [0.25, 0.667], [0.75, 0.111]]
     """
     expect(count >= 0, "count", "0 or more points", count)
-    points = np.stack([_radical_inverse(np.arange(start, start + count), base) for base in bases], axis=1)
+    points = np.stack([_radical_inverses(start + count, base)[start:] for base in bases], axis=1)
     if shift is not None:
         points = np.minimum((points + np.asarray(shift)) % 1.0, ONE_ULP_BELOW_1)
     return points
 
 
-def _radical_inverse(index: Array, base: int) -> Array:
-    value = np.zeros(len(index))
-    digit = 1.0
-    while index.any():
-        digit /= base
-        index, rest = np.divmod(index, base)
-        value += rest * digit
-    return value
+def _radical_inverses(count: int, base: int) -> Array:
+    """Return the radical inverses of 0 to `count` - 1, (count,): each further digit adds its own to those before."""
+    values, weight = np.zeros(1), 1.0
+    while len(values) < count:
+        weight /= base
+        digits = np.arange(min(base, -(-count // len(values))))
+        values = np.add.outer(digits * weight, values).reshape(-1)
+    return values[:count]
 
 
 def grid(n: int) -> Array:

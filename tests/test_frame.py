@@ -9,6 +9,7 @@ import pytest
 
 from refgi import Frame, load_scene
 from refgi.errors import InputError, RefgiWarning
+from refgi.frame import add_lobes
 from refgi.methods import METHODS, find_method, render
 from refgi.scene import DirectionalLight, Geometry, PointLight
 from refgi.settings import of
@@ -188,3 +189,11 @@ def test_map_and_exact_shadows_agree_off_their_edges(scene):
     frames = [Frame(scene, width=96, height=96, shadows=kind) for kind in ("map", "exact")]
     lit = [frame.direct.sum(axis=0) > 0 for frame in frames]
     assert np.mean(lit[0] != lit[1]) < 0.02  # 2 %: the share of pixels within a texel of an edge in this view
+
+
+def test_lobes_are_added_to_what_diffuse_receivers_reflect():
+    """By hand, in numbers that float32 holds, and without a change of what is given."""
+    radiance, direct, indirect = (np.full((3, 2, 2), value, np.float32) for value in (1.0, 2.0, 4.0))
+    assert (add_lobes(radiance, direct, indirect) == 7.0).all()
+    assert (add_lobes(radiance, direct, None) == 3.0).all()
+    assert [plane[0, 0, 0] for plane in (radiance, direct, indirect)] == [1.0, 2.0, 4.0]

@@ -8,6 +8,7 @@ from scipy.stats import chi2
 
 from refgi.errors import InputError
 from refgi.jit import kernel
+from refgi.literal.lights import radical_inverse
 from refgi.sampling import (
     cosine_hemisphere,
     grid,
@@ -34,6 +35,8 @@ def test_halton_first_points():
     np.testing.assert_allclose(halton(5), expected, atol=1e-16)
     np.testing.assert_array_equal(halton(3, start=2), halton(5)[2:])
     assert halton(0).shape == (0, 2)
+    for base in (2, 3, 7, 101):
+        np.testing.assert_array_equal(halton(5000, (base,), start=9)[:, 0], radical_inverse(np.arange(9, 5009), base))
 
 
 def test_halton_shift_stays_in_the_square_and_keeps_distances():

@@ -41,9 +41,10 @@ class MapPlanes(NamedTuple):
     lobe_axis: Array | None  # (3, H, W) unit vectors
     lobe_exponent: Array | None  # (H, W)
 
-    def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
-        """Return channels at some texels (n,)."""
-        return tuple(values_at(getattr(self, name), texel) for name in names)
+    def at(self, texel: Array, *names: str) -> tuple[Any, ...]:
+        """Return channels at some texels (n,), None for those of no lobe."""
+        planes = [getattr(self, name) for name in names]
+        return tuple(None if plane is None else values_at(plane, texel) for plane in planes)
 
 
 class Drawn(NamedTuple):
@@ -227,10 +228,9 @@ def _warped(rsm: Rsm, points: Array, importance: Array, warp: Warp) -> tuple[Arr
 
 def _weighted_lights(rsm: Rsm | MapPlanes, texel: Array, weight: Array, half: Array | None) -> PixelLights:
     """Return the texels as lights with T/N, or T/N w, times their flux."""
-    (flux,) = rsm.at(texel, "flux")
+    flux, lobe = rsm.at(texel, "flux", "lobe_flux")
     scale = weight.astype(flux.dtype)
-    lobe = None if rsm.lobe_flux is None else values_at(rsm.lobe_flux, texel) * scale
-    return _lights(rsm, texel, flux * scale, lobe, half)
+    return _lights(rsm, texel, flux * scale, None if lobe is None else lobe * scale, half)
 
 
 def _filtered_lights(
@@ -251,14 +251,14 @@ def _lights(rsm: Rsm | MapPlanes, texel: Array, flux: Array, lobe: Array | None,
     """Gather the chosen texels, leaving out those without flux."""
     has_flux = flux.any(axis=0) if lobe is None else flux.any(axis=0) | lobe.any(axis=0)
     chosen = texel[has_flux]
-    position, normal = rsm.at(chosen, "position", "normal")
+    position, normal, axis, exponent = rsm.at(chosen, "position", "normal", "lobe_axis", "lobe_exponent")
     return PixelLights(
         position,
         normal,
         flux[:, has_flux],
         None if lobe is None else lobe[:, has_flux],
-        None if rsm.lobe_axis is None else values_at(rsm.lobe_axis, chosen),
-        None if rsm.lobe_exponent is None else values_at(rsm.lobe_exponent, chosen),
+        axis,
+        exponent,
         len(texel),
         chosen.astype(np.int32),
         half=None if half is None else half[has_flux],

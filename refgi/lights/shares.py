@@ -16,7 +16,6 @@ import numpy as np
 from refgi.errors import expect
 from refgi.jit import kernel, prange
 from refgi.rsm.buffers.extent import texel_grid
-from refgi.rsm.buffers.gbuffer import values_at
 from refgi.rsm.raster.projection import Projection
 from refgi.sampling import PARTS, PIXEL_LIGHTS, draws
 from refgi.stages import skip, stage
@@ -53,9 +52,8 @@ def map_flux(rsm: "Rsm") -> float:
 
 
 def _flux_at(rsm: "Rsm", texel: Array) -> float:
-    (flux,) = rsm.at(texel, "flux")
-    lobe = rsm.lobe_flux
-    glossy = 0.0 if lobe is None else float(values_at(lobe, texel).sum(dtype=np.float64))
+    flux, lobe = rsm.at(texel, "flux", "lobe_flux")
+    glossy = 0.0 if lobe is None else float(lobe.sum(dtype=np.float64))
     return float(flux.sum(dtype=np.float64)) + glossy
 
 
@@ -132,7 +130,7 @@ def _nearest_grid(share: int, maps: int) -> int:
     return min((maps * n * n for n in (below, below + 1)), key=lambda cells: abs(cells - share))
 
 
-EQUALLY_NEAR = 8  # chosen texels tested for ties
+NOWHERE = 1 << 62  # where a column has no chosen texel
 LEAST_COSINE = 1e-3  # at grazing angles areas would grow without limit
 DEMO_CONSTANT = 1.5  # pi over the 2 pi / 3 sr of a square 90 degree frustum
 
@@ -153,19 +151,46 @@ def cells_of_nearest(maps: Projection, texel: Array) -> Array:
 
     On its own map as long as that has one; of equal or equally near ones the first gets the texel.
     """
-    from scipy.spatial import cKDTree
-
-    apart = 4 * (maps.height + maps.width)  # keeps stacked maps from being neighbours
-
-    def place(index: Array) -> Array:
-        row, column = index // maps.width, index % maps.width
-        return np.stack([row + row // maps.height * apart, column], axis=1).astype(np.float64)
-
     unique, first = np.unique(texel, return_index=True)
-    candidates = np.arange(1, min(EQUALLY_NEAR, len(unique)) + 1)
-    distance, nearest = cKDTree(place(unique)).query(place(np.arange(math.prod(maps.shape))), k=candidates)
-    tied = np.rint(distance**2) == np.rint(distance[:, :1] ** 2)  # squares of integer steps
-    return np.asarray(np.where(tied, first[nearest], len(texel)).min(axis=1))
+    nearest = np.full(math.prod(maps.shape), NOWHERE)  # square of the distance, times N, plus the index
+    nearest[unique] = first
+    nearest = nearest.reshape(maps.shape)
+    row = np.arange(len(nearest))
+    line = row + row // maps.height * (4 * (maps.height + maps.width))  # keeps stacked maps from being neighbours
+    above, below = (np.where(nearest < NOWHERE, row[:, None], none) for none in (-1, len(row)))
+    for here in row[1:]:  # not `accumulate`, which takes columns one by one
+        np.maximum(above[here - 1], above[here], out=above[here])
+        np.minimum(below[-here], below[-here - 1], out=below[-here - 1])
+    cell = np.empty_like(nearest)
+    _fill_nearest(nearest, line, above, below, len(texel), cell)
+    return cell.reshape(-1)
+
+
+@kernel(parallel=True)
+def _fill_nearest(chosen: Array, line: Array, above: Array, below: Array, count: int, cell: Array) -> None:
+    """Fill the nearest of the nearest texels of each column, all columns d apart at once."""
+    height, width = chosen.shape
+    for row in prange(height):
+        own, least = np.empty(width, np.int64), cell[row]
+        for x in range(width):
+            own[x] = NOWHERE
+            for other in (above[row, x], below[row, x]):
+                if 0 <= other < height:
+                    own[x] = min(own[x], (line[other] - line[row]) ** 2 * count + chosen[other, x])
+        least[:] = own
+        d, most = 1, NOWHERE
+        while d < width and d * d <= most:
+            left, right, off = least[d:], own[d:], d * d * count
+            for x in range(len(left)):
+                least[x] = min(least[x], right[x] + off)
+            for x in range(len(left)):
+                left[x] = min(left[x], own[x] + off)
+            d, most = d + 1, 0
+            for x in range(width):
+                most = max(most, least[x])
+            most //= count
+        for x in range(width):
+            least[x] %= count
 
 
 def cell_sums(flux: Array, cell: Array, count: int) -> Array:
@@ -201,8 +226,8 @@ def texel_areas(rsm: "Rsm", texel: Array) -> Array:
     light = rsm.light
     far = isinstance(light, DirectionalLight)
     source = np.asarray(light.direction if isinstance(light, DirectionalLight) else light.position, np.float64)
-    position, normal, solid_angle, flux = rsm.at(texel, "position", "normal", "solid_angle", "flux")
-    lobe = None if rsm.lobe_flux is None else values_at(rsm.lobe_flux, texel)
+    position, normal, solid_angle, flux, lobe = rsm.at(
+        texel, "position", "normal", "solid_angle", "flux", "lobe_flux")
     return areas_of(position, normal, solid_angle, flux, lobe, source, far)
 
 

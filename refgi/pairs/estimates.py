@@ -103,9 +103,11 @@ def sample_for(receivers: Receivers, lights: "PixelLights", *, least: int = LEAS
     return sample_pixels(receivers, max(least, PAIRS // max(1, lights.flux.shape[1])))
 
 
-def thinned(lights: "PixelLights", footprint: Array | None) -> tuple["PixelLights", Array | None]:
-    """Return one of every few lights, THINNED or more, and their areas: enough for the share of a loss."""
-    some = slice(None, None, max(1, lights.flux.shape[1] // THINNED))
+def thinned(
+    lights: "PixelLights", footprint: Array | None, least: int = THINNED
+) -> tuple["PixelLights", Array | None]:
+    """Return one of every few lights, `least` or more, and their areas: enough for the share of a loss."""
+    some = slice(None, None, max(1, lights.flux.shape[1] // least))
     return lights.selected(some), None if footprint is None else footprint[some]
 
 
@@ -155,6 +157,7 @@ def warn_of_loss(share: float, setting: str) -> None:
 
 LEAST_ERROR = 0.2  # share of the light from which a sampling error gives a warning
 SENDERS = 1024  # pixels that send light to each other
+MANY = 1 << 15  # lights, of which one of every few stands for all
 GRAZING = 0.02  # least cosine of a pixel's surface
 FEW_SAMPLED = 128  # pixels, where a picture does not sum all of its lights
 
@@ -213,7 +216,9 @@ def seen_light(camera: "Camera", albedo: Array, direct: Array, receivers: Receiv
         rather lowers their light.
     """
     sample = sample_pixels(receivers, SENDERS)
-    whole = light_at(sample, lights, PairSettings(clamp=UNREACHED))
+    some, _ = thinned(lights, None, MANY)
+    share = some.flux.shape[1] / max(1, lights.flux.shape[1])
+    whole = light_at(sample, some, PairSettings(clamp=UNREACHED)) / (share or 1.0)
     if whole <= 0:
         return 0.0
     area = _areas(camera, direct.shape[1], sample) * (np.count_nonzero(receivers.covered) / max(1, len(sample.place)))

@@ -207,10 +207,10 @@ def glossy_summed(
     step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(packed.shines)) // TILE * TILE)
     for first in range(0, len(order), step):
         part = order[first : first + step]
-        some = GlossyPoints(*(np.ascontiguousarray(plane[..., part]) for plane in points))
+        some = points.at(part)
         sums = np.zeros((3, len(part)), points.position.dtype)
         _add_lights(some, packed, ranges, (None, None) if lists is None else lists(some.position, some.normal), sums)
-        result[:, part] = sums * some.specular
+        put(result, part, sums * some.specular)
         report_progress(min(1.0, (first + step) / len(order)))
     return result
 

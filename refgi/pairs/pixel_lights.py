@@ -49,7 +49,8 @@ class PixelLights(NamedTuple):
 
     def selected(self, chosen: Array | slice | list[int]) -> "PixelLights":
         """Return some of the lights, as many drawn."""
-        parts: dict[str, Any] = {name: values[..., chosen] for name, values in self._asdict().items()
+        place = np.arange(self.flux.shape[1])[chosen]
+        parts: dict[str, Any] = {name: np.take(values, place, axis=-1) for name, values in self._asdict().items()
                                  if isinstance(values, np.ndarray)}
         return self._replace(**parts)
 
@@ -194,7 +195,30 @@ def clustered(unpacked: Unpacked, error: float) -> Packed:
            packed.diffuse[6:].min(initial=0.0))
     if packed.diffuse.shape[1] == 1:
         return packed
-    return packed._replace(tree=light_tree(packed.diffuse, packed.clamp, error))
+    return packed._replace(tree=light_tree(*joined_at_texels(packed, unpacked.lights), error))
+
+
+def joined_at_texels(packed: Packed, lights: PixelLights) -> tuple[Array, Clamp | None]:
+    """Return diffuse lights and their clamp, those of one texel joined to one, where there are more than texels.
+
+    They differ in flux alone; lights of unequal areas stay as they are.
+    """
+    diffuse, clamp = packed.diffuse, packed.clamp
+    if lights.texel is None or lights.map_index is None:
+        return diffuse, clamp
+    texel = lights.texel[packed.shines].astype(np.int64)
+    texel += lights.map_index[packed.shines] * (texel.max() + 1)
+    places = int(texel.max()) + 1
+    first = np.full(places, -1)
+    first[texel[::-1]] = np.arange(len(texel))[::-1]
+    alike = clamp is None or np.array_equal(clamp.softness[first[texel]], clamp.softness[:-1])
+    if len(texel) <= places or not alike:
+        return diffuse, clamp
+    some = np.append(first[first >= 0], len(texel))
+    joined = np.take(diffuse, some, axis=1)
+    for row in range(6, 9):
+        joined[row, :-1] = np.bincount(texel, diffuse[row, :-1], places)[first >= 0]
+    return joined, clamp if clamp is None else clamp._replace(softness=clamp.softness[some])
 
 
 def with_dark_lobes(lights: PixelLights) -> PixelLights:
@@ -210,14 +234,20 @@ def pack_diffuse(lights: PixelLights, settings: PairSettings, dtype: npt.DTypeLi
     """
     # Eq. (1), over pi unless as printed
     scale = 1.0 if "sii_no_pi" in settings.as_published else 1.0 / math.pi
-    packed = np.concatenate([*_place(lights, settings, chosen), np.asarray(lights.flux[:, chosen], np.float64) * scale])
-    packed = np.concatenate([packed, np.zeros((9, 1))], axis=1)
-    return packed.astype(dtype, order="C")  # one layout: kernels are compiled once
+    packed = np.zeros((9, np.count_nonzero(chosen) + 1), dtype)
+    packed[:3, :-1], packed[3:6, :-1] = _place(lights, settings, chosen)
+    packed[6:, :-1] = np.asarray(_taken(lights.flux, chosen), np.float64) * scale
+    return packed
+
+
+def _taken(values: Array, chosen: Array) -> Array:
+    """Return what chosen lights have of values (..., N)."""
+    return values if chosen.all() else np.take(values, np.flatnonzero(chosen), axis=-1)
 
 
 def _place(lights: PixelLights, settings: PairSettings, chosen: Array) -> tuple[Array, Array]:
-    normal = np.asarray(lights.normal[:, chosen], np.float64)
-    return lights.position[:, chosen] - settings.offset * normal, -normal
+    normal = np.asarray(_taken(lights.normal, chosen), np.float64)
+    return _taken(lights.position, chosen) - settings.offset * normal, -normal
 
 
 def pack_lobes(lights: PixelLights, settings: PairSettings, dtype: npt.DTypeLike, chosen: Array) -> Array:

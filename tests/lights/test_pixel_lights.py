@@ -7,7 +7,7 @@ import pytest
 
 from refgi.errors import InputError
 from refgi.lights import Warp, choose_pixel_lights, importance
-from refgi.lights.shares import map_shares
+from refgi.lights.shares import cells_of_nearest, map_shares
 from refgi.literal.lights import grid_points, halton_points, pixel_lights, texels
 from refgi.rsm import reflective_shadow_map
 from refgi.scene import Material, PointLight, SpotLight, load_scene, material_table
@@ -108,6 +108,19 @@ def test_nearest_cells_equal_those_of_a_literal_twin():
     lights = choose_pixel_lights([rsm], count=9, pattern="halton", filtered=True)
     expected = np.array(naive.nearest_cell_sums(rsm.flux, [divmod(int(t), 24) for t in chosen]))
     np.testing.assert_allclose(lights.flux, expected[:, expected.any(axis=0)], rtol=ROUNDING)
+
+
+@pytest.mark.parametrize(("maps", "height", "width", "count"),
+                         [(1, 13, 17, 40), (3, 9, 7, 12), (4, 6, 11, 2), (2, 5, 5, 1)])
+def test_cells_of_stacked_maps_belong_to_their_own_map_first(maps, height, width, count):
+    """Texels of other maps are farther than any of one's own, those of the next map nearer than those behind it."""
+    projection = cube_map().projection._replace(
+        height=height, width=width, origin=np.zeros((maps, 3)), frame=np.zeros((maps, 3, 3)))
+    chosen = np.random.default_rng(count).integers(0, maps * height * width, count)
+    row, column = np.divmod(np.arange(maps * height * width), width)
+    row = row + row // height * 4 * (height + width)
+    square = np.subtract.outer(row, row[chosen]) ** 2 + np.subtract.outer(column, column[chosen]) ** 2
+    np.testing.assert_array_equal(cells_of_nearest(projection, chosen), square.argmin(axis=1))
 
 
 @pytest.mark.feature("SII-03")

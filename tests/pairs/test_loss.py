@@ -13,7 +13,8 @@ from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import LightSettings
-from refgi.pairs.estimates import sample_pixels
+from refgi.pairs import estimates
+from refgi.pairs.estimates import sample_pixels, seen_light
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.settings import PairSettings
 from refgi.scene import PointLight, load_scene
@@ -23,6 +24,7 @@ from refgi.splat.gather.gather_sum import disc_loss
 from refgi.splat.multires import ByError
 from refgi.stages import observe
 
+A_QUARTER_OF_LIGHTS = 0.05  # the sampling error of the mean of 750 lights is about 0.02
 # points of 100, besides the rounding of the words: without a clamp the sum has a standard deviation of 0.8 to 2.2 of
 # its mean at a pixel, which is 2 to 5 points for 2048 pixels; both sums share most of it
 NEAR = 3.0
@@ -202,3 +204,14 @@ def test_sampled_pixels_are_covered_differ_and_spread(covered):
         rows, columns = np.divmod(sample.place, covered.shape[1])
         quarters = np.histogram2d(rows, columns, bins=[[0, 20, 40], [0, 25, 50]])[0]
         assert np.abs(quarters - 75).max() < 12
+
+
+def test_one_of_every_few_lights_stands_for_many(monkeypatch):
+    frame = Frame(load_scene("cornell_box"), width=32, height=32)
+    receivers = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    lights = choose_lights(frame, LightSettings(count=3000))
+    whole = seen_light(frame.scene.camera, frame.sent_albedo, frame.direct, receivers, lights)
+    monkeypatch.setattr(estimates, "MANY", 700)
+    some = seen_light(frame.scene.camera, frame.sent_albedo, frame.direct, receivers, lights)
+    assert some != whole
+    assert some == pytest.approx(whole, rel=A_QUARTER_OF_LIGHTS)

@@ -1,4 +1,4 @@
-"""Attribute resolve, the second pass of rasterization: position, normal, albedo and vertex colour of each texel.
+"""Attribute resolve, the second pass of rasterization: depth, position, normal, material, vertex colour of each texel.
 
 Every texel of every projection has a ray: an origin o and a direction d, where d reaches depth 1 (planar maps) or has
 unit length (paraboloid). With v_i relative to o and N = (v1 - v0) x (v2 - v0) the hit is o + t d,
@@ -19,11 +19,10 @@ from refgi.rsm.buffers.lines import (
     Runs,
     find_runs,
     mix_normals,
-    spread,
+    spread_normals,
     store,
     store_depth,
     store_distance,
-    store_material,
     store_points,
     store_units,
     write_hits,
@@ -31,11 +30,9 @@ from refgi.rsm.buffers.lines import (
     write_rays,
 )
 from refgi.rsm.buffers.surfaces import (
-    ALBEDO,
     BATCH,
     COLUMNS,
     INPUTS,
-    NORMAL,
     Records,
     Surface,
     cross,
@@ -96,33 +93,35 @@ def allocate(workers: int, rows: int = ROWS) -> Scratch:
     most = rows * SIDE + 2
     runs = Runs(np.empty((workers, rows, SIDE + 1), np.int32), np.empty((workers, rows, SIDE), np.int32),
                 np.empty((workers, rows), np.int32), np.zeros((workers, TABLE), np.int32))  # fmt: skip
-    records = Records(np.empty((workers, most), np.int32), np.empty((workers, most), np.int32),
-                      plane((workers, most, COLUMNS), np.float64), np.zeros((workers, (INPUTS + COLUMNS) * BATCH)))
+    records = Records(np.empty((workers, most), np.int32), plane((workers, most, COLUMNS), np.float64),
+                      np.zeros((workers, (INPUTS + COLUMNS) * BATCH)))
     records.fixed[:, 0] = 0.0  # of texels that see nothing
-    records.material[:, 0] = -1
     return Scratch(runs, records, np.ones((workers, LINES * LINE)))
 
 
 @kernel(parallel=True)
 def resolve(
-    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, listed: bool, channels: ChannelMask,
+    surface: Surface, projection: Projection, triangle_id: Array, texel: Array, seen: Array, channels: ChannelMask,
     planes: Planes, scratch: Scratch,
 ) -> None:
-    """Fill the planes of the chosen channels: of all texels, or of those `listed`, to the same bits.
+    """Fill the planes of the chosen channels: of all texels, or of listed ones, to the same bits.
 
     `projection`: the maps that `triangle_id` (H, W) was drawn on: triangle at each texel, -1 for none. `texel` (n,):
-    those listed, of the flattened maps; the planes then have one row of them, and one worker fills it. `scratch`: of
-    each worker; strips of rows are assigned to them round-robin.
+    those listed, of the flattened maps, n > 0; the planes then have one row of them, and one worker fills it. `seen`:
+    `triangle_id` there, (1, n), or everywhere. `scratch`: of each worker; strips of rows, and rows of materials, are
+    assigned to them round-robin.
     """
     workers, height, width = len(scratch.line), projection.height, projection.width
     strips = (height + ROWS - 1) // ROWS  # of a map
-    painted = channels.albedo | channels.material_id
+    listed, painted = len(texel) > 0, channels.albedo | channels.material_id
     shaped = channels.depth | channels.distance | channels.position | channels.normal
     for worker in prange(workers):
+        for row in range(worker, len(seen) if painted else 0, workers):
+            _fill_materials(surface, seen[row], row, planes)
         runs, records, line = _runs_of(scratch, worker), _records_of(scratch, worker), scratch.line[worker]
         strip = worker
         left: Any = np.int64(0)  # no literal, for which callees would be compiled again
-        while left < len(texel) if listed else strip < strips * len(projection.origin):
+        while shaped and (left < len(texel) if listed else strip < strips * len(projection.origin)):
             if listed:
                 m, columns = _list_runs(projection, triangle_id, texel, left, runs, records, line)
                 tile, count = Tile(m * height, left, 1, columns), columns + 1
@@ -131,7 +130,7 @@ def resolve(
                 first = (strip - m * strips) * ROWS
                 tile = Tile(m * height + first, left, min(ROWS, height - first), min(SIDE, width - left))
                 count = find_runs(triangle_id, tile.top, tile.top + tile.rows, left, left + tile.columns, runs, records)
-            describe(surface, surface.normals, projection, m, count, shaped, painted, records)
+            describe(surface, surface.normals, projection, m, count, records)
             _fill(projection, tile, listed, surface.normals, runs, records, line, channels, planes)
             left += tile.columns
             if not listed and left >= width:
@@ -147,7 +146,7 @@ def _runs_of(scratch: Scratch, worker: int) -> Runs:
 @kernel
 def _records_of(scratch: Scratch, worker: int) -> Records:
     records = scratch.records
-    return Records(records.face[worker], records.material[worker], records.fixed[worker], records.batch[worker])
+    return Records(records.face[worker], records.fixed[worker], records.batch[worker])
 
 
 @kernel
@@ -180,7 +179,7 @@ def _fill(
 
     `listed`: `line` holds rays of texels from anywhere on the tile's map, which belong in row 0 of the planes.
     """
-    fixed, first, record, material = records.fixed, runs.first, runs.record, records.material
+    fixed, first, record = records.fixed, runs.first, runs.record
     kind, left, columns = projection.kind, tile.left, tile.columns
     for y in range(tile.rows):
         row, count = 0 if listed else tile.top + y, runs.number[y]
@@ -197,16 +196,24 @@ def _fill(
             store_points(kind, view, row, left, columns, line, planes.position)
         if channels.normal:
             if normals is None:
-                spread(NORMAL, y, count, first, record, fixed, line)
+                spread_normals(y, count, first, record, fixed, line)
                 store(row, left, columns, line, planes.normal)
             else:
                 mix_normals(kind, y, count, first, record, fixed, line)
                 store_units(row, left, columns, line, planes.normal)
-        if channels.albedo:
-            spread(ALBEDO, y, count, first, record, fixed, line)
-            store(row, left, columns, line, planes.albedo)
-        if channels.material_id:
-            store_material(row, left, y, count, first, record, material, planes.material_id)
+
+
+@kernel
+def _fill_materials(surface: Surface, face: Array, row: int, planes: Planes) -> None:
+    """Fill a row of the planes of material and albedo, if not empty, of visible triangles (w,), -1: none."""
+    material = np.empty(len(face), np.int32)
+    for x in range(len(face)):
+        material[x] = surface.material_of_face[max(face[x], 0)] if face[x] >= 0 else -1
+    for x in range(len(face) if planes.material_id.size else 0):
+        planes.material_id[row, x] = material[x]
+    for channel in range(3 if planes.albedo.size else 0):
+        for x in range(len(face)):
+            planes.albedo[channel, row, x] = surface.diffuse[channel, material[x]]
 
 
 class Coloured(NamedTuple):

@@ -242,13 +242,8 @@ class GBuffer:
         missing = tuple(name for name in ChannelMask._fields if name in names and name not in self._channels)
         computed = {}
         if missing:
-            planes = _planes(missing, (1, len(texel)), self.dtype)
-            surface = _surface(self._geometry, self._materials, self.dtype)
-            channels = ChannelMask(*(name in missing for name in ChannelMask._fields))
-            resolve(surface, self.projection, self.visibility.triangle_id, texel, True, channels, planes,
-                    allocate(1, 1))
-            paint(self._geometry, self._materials, self.projection, self.visibility.triangle_id, planes.albedo, texel)
-            tint(self._geometry, self.projection, self.visibility.triangle_id, planes.albedo, texel)
+            planes = _filled(self._geometry, self._materials, self.projection, self.triangle_id, self.dtype, missing,
+                             texel)
             computed = {name: getattr(planes, name)[..., 0, :] for name in missing}
         return tuple(computed[n] if n in computed else values_at(self.resolve(n)[0], texel) for n in names)
 
@@ -258,7 +253,7 @@ def values_at(channel: Array, texel: Array) -> Array:
 
     `channel` (..., h, w): the channel. `texel` (n,) int: texels, row * w + column. Returns (..., n): the values.
     """
-    return channel.reshape(*channel.shape[:-2], -1)[..., texel]
+    return np.take(channel.reshape(*channel.shape[:-2], -1), texel, axis=-1)
 
 
 @stage("rsm.gbuffer", steps="refgi.rsm.buffers.steps.gbuffer_steps")
@@ -301,13 +296,27 @@ def _resolve(
     names: Channels to compute.
     -> dict of str to (h, w) or (3, h, w): The channels by name, units as `GBuffer` states them.
     """
-    planes = _planes(names, triangle_id.shape, dtype)
-    channels = ChannelMask(*(name in names for name in ChannelMask._fields))
-    surface = _surface(geometry, materials, dtype)
-    resolve(surface, projection, triangle_id, NO_TEXELS, False, channels, planes, allocate(thread_count()))
-    paint(geometry, materials, projection, triangle_id, planes.albedo)
-    tint(geometry, projection, triangle_id, planes.albedo)
+    planes = _filled(geometry, materials, projection, triangle_id, dtype, names)
     return {name: getattr(planes, name) for name in names}
+
+
+def _filled(
+    geometry: Geometry, materials: MaterialTable, projection: Projection, triangle_id: Array, dtype: np.dtype[Any],
+    names: tuple[str, ...], texel: Array | None = None,
+) -> Planes:
+    """Return planes of the named channels, of all texels or, in one row, of those listed (n,)."""
+    seen = triangle_id if texel is None else np.take(triangle_id.reshape(1, -1), texel, axis=1)
+    planes = _planes(names, seen.shape, dtype)
+    if seen.size:
+        channels = ChannelMask(*(name in names for name in ChannelMask._fields))
+        diffuse = np.append(materials.diffuse.T.astype(dtype), np.zeros((3, 1), dtype), axis=1)
+        surface = Surface(geometry.vertices, geometry.faces, geometry.vertex_normals, geometry.material_of_face,
+                          diffuse)
+        resolve(surface, projection, triangle_id, NO_TEXELS if texel is None else texel, seen, channels, planes,
+                allocate(thread_count()) if texel is None else allocate(1, 1))
+    paint(geometry, materials, projection, triangle_id, planes.albedo, texel)
+    tint(geometry, projection, triangle_id, planes.albedo, texel)
+    return planes
 
 
 def _planes(names: tuple[str, ...], shape: tuple[int, ...], dtype: np.dtype[Any]) -> Planes:
@@ -318,8 +327,3 @@ def _planes(names: tuple[str, ...], shape: tuple[int, ...], dtype: np.dtype[Any]
         planes[name] = plane((3, *size) if name in ("position", "normal", "albedo") else size,
                              np.int32 if name == "material_id" else dtype)  # fmt: skip
     return Planes(**planes)
-
-
-def _surface(geometry: Geometry, materials: MaterialTable, dtype: np.dtype[Any]) -> Surface:
-    return Surface(geometry.vertices, geometry.faces, geometry.vertex_normals, geometry.material_of_face,
-                   materials.diffuse.astype(dtype, copy=False))  # fmt: skip

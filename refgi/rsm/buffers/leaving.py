@@ -17,7 +17,7 @@ import numpy.typing as npt
 from refgi.jit import kernel, prange
 from refgi.radiometry import incident_light, mirrored, receiver_lobe
 from refgi.rsm.buffers.gbuffer import GBuffer
-from refgi.rsm.pool import plane
+from refgi.rsm.pool import plane, zeros
 from refgi.scene.model import Light, LightTable, MaterialTable, light_table
 from refgi.stages import stage
 from refgi.types import Array
@@ -124,6 +124,10 @@ class GlossyPoints(NamedTuple):
     exponent: Array  # (n,)
     specular: Array  # (3, n) reflectance of the lobe
 
+    def at(self, place: Array) -> "GlossyPoints":
+        """Return some of the points by index."""
+        return GlossyPoints(*(np.take(part, place, axis=-1) for part in self))
+
 
 def glossy_materials(materials: MaterialTable) -> Array:
     """Return, (m,) bool, which materials reflect by a lobe; clear glass does not."""
@@ -160,13 +164,13 @@ def glossy_points(buffer: GBuffer, materials: MaterialTable, eye: npt.ArrayLike)
     material_id, position, normal = buffer.resolve("material_id", "position", "normal")
     glossy = np.append(glossy_materials(materials), False)  # the last one stands for no surface, -1
     pixel = np.flatnonzero(glossy[material_id])
-    at, up = (np.ascontiguousarray(plane.reshape(3, -1)[:, pixel]) for plane in (position, normal))
+    at, up = (np.take(channel.reshape(3, -1), pixel, axis=1) for channel in (position, normal))
     mirror, faces_eye = np.empty_like(at), np.empty(len(pixel), np.bool_)
     _mirror(at, up, np.asarray(eye, np.float64), mirror, faces_eye)
     material = material_id.reshape(-1)[pixel]
     found = GlossyPoints(pixel, at, up, mirror, materials.exponent.astype(at.dtype)[material],
-                         materials.specular.astype(at.dtype)[material].T)
-    return GlossyPoints(*(np.ascontiguousarray(part[..., faces_eye]) for part in found))
+                         np.take(materials.specular.T.astype(at.dtype), material, axis=1))
+    return found if faces_eye.all() else found.at(np.flatnonzero(faces_eye))
 
 
 @kernel(parallel=True)
@@ -217,6 +221,7 @@ def spread_over_picture(points: GlossyPoints, radiance: Array, shape: tuple[int,
     shape: Height and width of the picture.
     -> (3, h, w): 0 elsewhere.
     """
-    picture = np.zeros((3, *shape), points.position.dtype)
-    picture.reshape(3, -1)[:, points.pixel] = radiance
+    picture = zeros((3, *shape), points.position.dtype)
+    for channel, values in zip(picture.reshape(3, -1), radiance, strict=True):
+        channel[points.pixel] = values
     return picture

@@ -197,11 +197,11 @@ def store_units(row: int, left: int, columns: int, line: Array, normal: Array) -
 
 
 @kernel
-def spread(column: int, y: int, count: int, first: Array, record: Array, fixed: Array, line: Array) -> None:
-    """Write three numbers of a record, from `column` on, along each of its runs in a row."""
+def spread_normals(y: int, count: int, first: Array, record: Array, fixed: Array, line: Array) -> None:
+    """Write the faces' normals of a row along its runs."""
     for run in range(count):
         start, stop, r = first[y, run], first[y, run + 1], record[y, run]
-        a, b, c = fixed[r, column], fixed[r, column + 1], fixed[r, column + 2]
+        a, b, c = fixed[r, NORMAL], fixed[r, NORMAL + 1], fixed[r, NORMAL + 2]
         for lane in range((stop - start + LANES - 1) & -LANES):
             at = np.uint64(start) + np.uint64(lane)
             line[at + VALUE], line[at + VALUE + Y], line[at + VALUE + Z] = a, b, c
@@ -215,14 +215,3 @@ def store(row: int, left: int, columns: int, line: Array, channel: Array) -> Non
         at = np.uint64(i)
         channel[0, row, to + at], channel[1, row, to + at] = line[at + VALUE], line[at + VALUE + Y]
         channel[2, row, to + at] = line[at + VALUE + Z]
-
-
-@kernel
-def store_material(
-    row: int, left: int, y: int, count: int, first: Array, record: Array, material: Array, channel: Array
-) -> None:
-    """Store the material of each run of a row."""
-    for run in range(count):
-        value = material[record[y, run]]
-        for i in range(first[y, run], first[y, run + 1]):
-            channel[row, np.uint64(left) + np.uint64(i)] = value

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from refgi.errors import expect
 from refgi.jit import kernel, prange
-from refgi.rsm.buffers.gbuffer import GBuffer, values_at
+from refgi.rsm.buffers.gbuffer import MANY, GBuffer, values_at
 from refgi.rsm.buffers.light_projection import MapShape, incident_flux, light_projection
 from refgi.rsm.buffers.solid_angle import texel_solid_angles, texel_solid_angles_at
 from refgi.rsm.buffers.surfaces import texel_ray
@@ -28,6 +28,7 @@ __all__ = ["Rsm", "reflective_shadow_map"]
 
 VIEW_CHANNELS = ("depth", "position", "normal")  # channels of the light's view
 LOBE = ("lobe_flux", "lobe_axis", "lobe_exponent")
+LOBE_READS = ("normal", "material_id", "covered")
 
 
 class Rsm:
@@ -134,23 +135,30 @@ class Rsm:
         return Rsm(self.light, view, self._materials, {
             name: channels[name] for name in ("solid_angle", "flux", *LOBE)})
 
-    def at(self, texel: Array, *names: str) -> tuple[Array, ...]:
+    def at(self, texel: Array, *names: str) -> tuple[Any, ...]:
         """Return channels at some texels alone, (n,) or (3, n), with the bits that they have on the whole map.
 
-        `texel`: (n,) row * W + column; `names` as for `resolve`. What is not yet known is computed there.
+        `texel`: (n,) row * W + column; `names` as for `resolve`, and those of lobes, None where no material has one.
+        What is not yet known is computed there.
         """
-        parts = {name: values_at(self._whole(name), texel) for name in names if name in self._known}
-        absent = [name for name in names if name not in parts]
-        reflecting = self._reflecting if "flux" in absent else ()
-        needed = dict.fromkeys([*(n for n in absent if n in VIEW_CHANNELS), *reflecting])
-        surface = dict(zip(needed, self._view.at(texel, *needed), strict=True))
-        if "flux" in absent:
+        absent = [name for name in names if name not in self._known]
+        lobes = self._glossy and any(name in LOBE for name in absent)
+        needed = dict.fromkeys([*(name for name in absent if name in VIEW_CHANNELS),
+                                *(self._reflecting if "flux" in absent else ()), *(LOBE_READS if lobes else ())])
+        if MANY * len(texel) > self.texels:
+            self._view.resolve(*needed)
+            channels = [getattr(self, name) for name in names]
+            return tuple(None if channel is None else values_at(channel, texel) for channel in channels)
+        surface: dict[str, Any] = dict(zip(needed, self._view.at(texel, *needed), strict=True))
+        if lobes or "flux" in absent:
             incident = incident_flux(self.light, self.projection, None, self._view.dtype, texel)
-            surface["flux"] = self._flux(incident, surface)
+            surface.update(self._lobes(texel, surface, incident) if lobes else {})
+            surface["flux"] = self._flux(incident, surface) if "flux" in absent else None
         if "solid_angle" in absent:
             surface["solid_angle"] = texel_solid_angles_at(self.projection, texel).astype(self._view.dtype)
-        parts.update(surface)
-        return tuple(parts[name] for name in names)
+        surface |= {name: None if channel is None else values_at(channel, texel)
+                    for name, channel in self._known.items() if name in names}
+        return tuple(surface.get(name) for name in names)
 
     @property
     def _reflecting(self) -> tuple[str, ...]:
@@ -182,12 +190,20 @@ class Rsm:
         if name not in self._known and not self._glossy:
             return None
         if name not in self._known:
-            normal, material = self._view.resolve("normal", "material_id")
-            incident = incident_flux(self.light, self.projection, None, self._view.dtype)
-            incident *= (self._materials.ior == 0)[material]
-            lobe = _lobe(self._materials, self.projection, material, normal, incident * self.covered)
-            self._known = {**dict(zip(LOBE, lobe, strict=True)), **self._known}
+            incident = incident_flux(self.light, self.projection, None, self._view.dtype).reshape(3, -1)
+            planes = zip(LOBE_READS, self._view.resolve(*LOBE_READS), strict=True)
+            surface = {key: plane.reshape(*plane.shape[:-2], -1) for key, plane in planes}
+            lobes = self._lobes(np.arange(self.texels), surface, incident)
+            whole = {key: lobe.reshape(*lobe.shape[:-1], *self.projection.shape) for key, lobe in lobes.items()}
+            self._known = {**whole, **self._known}
         return self._known[name]
+
+    def _lobes(self, texel: Array, surface: Mapping[str, Array], incident: Array) -> dict[str, Array]:
+        """Return flux, axis and exponent of the lobes at texels (n,), by name."""
+        material = surface["material_id"]
+        reflected = incident * (self._materials.ior == 0)[material] * surface["covered"]
+        lobe = _lobe(self._materials, self.projection, texel, material, surface["normal"], reflected)
+        return dict(zip(LOBE, lobe, strict=True))
 
     @property
     def texels(self) -> int:
@@ -232,26 +248,25 @@ def reflective_shadow_map(
 
 
 def _lobe(
-    materials: MaterialTable, maps: Projection, material: Array, normal: Array, incident: Array
+    materials: MaterialTable, maps: Projection, texel: Array, material: Array, normal: Array, incident: Array
 ) -> tuple[Array, Array, Array]:
-    """Return flux, axis and exponent of the lobes."""
-    flux = np.moveaxis(materials.specular.astype(normal.dtype)[material], -1, 0) * incident
+    """Return flux, axis and exponent of the lobes at texels (n,)."""
+    flux = np.take(materials.specular.T.astype(normal.dtype), material, axis=1) * incident
     has_lobe: Array = np.asarray(flux.any(axis=0))
     exponent = materials.exponent.astype(normal.dtype)[material] * has_lobe
     axis = np.zeros_like(normal)
-    _mirror(maps, normal, has_lobe, axis)
-    return np.ascontiguousarray(flux), axis, exponent
+    _mirror(maps, texel, normal, has_lobe, axis)
+    return flux, axis, exponent
 
 
 @kernel(parallel=True)
-def _mirror(maps: Projection, normal: Array, has_lobe: Array, axis: Array) -> None:
-    for row in prange(has_lobe.shape[0]):
-        for column in range(has_lobe.shape[1]):
-            if has_lobe[row, column]:
-                _, _, _, dx, dy, dz = texel_ray(maps, row, column)
-                nx, ny, nz = normal[0, row, column], normal[1, row, column], normal[2, row, column]
-                # r = d - 2 (n . d) n
-                twice = 2.0 * (dx * nx + dy * ny + dz * nz)
-                rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
-                scale = 1.0 / math.sqrt(rx * rx + ry * ry + rz * rz)
-                axis[0, row, column], axis[1, row, column], axis[2, row, column] = rx * scale, ry * scale, rz * scale
+def _mirror(maps: Projection, texel: Array, normal: Array, has_lobe: Array, axis: Array) -> None:
+    for i in prange(len(texel)):
+        if has_lobe[i]:
+            _, _, _, dx, dy, dz = texel_ray(maps, texel[i] // maps.width, texel[i] % maps.width)
+            nx, ny, nz = normal[0, i], normal[1, i], normal[2, i]
+            # r = d - 2 (n . d) n
+            twice = 2.0 * (dx * nx + dy * ny + dz * nz)
+            rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
+            scale = 1.0 / math.sqrt(rx * rx + ry * ry + rz * rz)
+            axis[0, i], axis[1, i], axis[2, i] = rx * scale, ry * scale, rz * scale

@@ -25,8 +25,8 @@ from refgi.rsm.raster.projection import ORTHOGRAPHIC, PARABOLOID, Projection
 from refgi.types import Array
 
 BATCH = 64  # triangles described at once
-# columns of `Records.fixed`: corner v0; N; unit normal on the visible side; albedo; least and greatest t; M by axis; K
-CORNER, PLANE, NORMAL, ALBEDO, RANGE, MIXED, CONSTANT, COLUMNS = 0, 3, 6, 9, 12, 14, 23, 26
+# columns of `Records.fixed`: corner v0; N; unit normal on the visible side; least and greatest t; M by axis; K
+CORNER, PLANE, NORMAL, RANGE, MIXED, CONSTANT, COLUMNS = 0, 3, 6, 9, 11, 20, 23
 INPUTS = 18  # rows of a batch: corners and their normals
 
 
@@ -37,14 +37,13 @@ class Surface(NamedTuple):
     faces: Array  # (m, 3) int32
     normals: Any  # (n, 3) float64; None: the faces' normals count
     material_of_face: Array  # (m,) int32
-    diffuse: Array  # (materials, 3)
+    diffuse: Array  # (3, materials + 1), the last one black
 
 
 class Records(NamedTuple):
     """Triangles that some texels of one map see; record 0 is that of texels that see nothing."""
 
     face: Array  # (n,) int32: triangle; -1: none
-    material: Array  # (n,) int32; -1: none
     fixed: Array  # (n, COLUMNS) float64
     batch: Array  # ((INPUTS + COLUMNS) BATCH,) float64: scratch, triangles as lanes
 
@@ -69,37 +68,27 @@ def barycentric_axes(v0: Any, v1: Any, v2: Any, origin: Any) -> Any:
 
 @kernel
 def describe(
-    surface: Surface, normals: Array | None, projection: Projection, m: int, count: int, shaped: bool, painted: bool,
-    records: Records,
+    surface: Surface, normals: Array | None, projection: Projection, m: int, count: int, records: Records
 ) -> None:
     """Fill the records of triangles that map `m` sees.
 
     `normals`: those of `surface`; an argument of its own, so that kernels of flat scenes have no code for them.
-    `count`: one past the last record. `shaped`: whether geometry is read, `painted`: whether material and albedo are.
-    `records`: `face` is read, all else is written.
+    `count`: one past the last record. `records`: `face` is read, all else is written.
     """
     batch, fixed = records.batch, records.fixed
     for base in range(1, count, BATCH):
         size = min(BATCH, count - base)
         columns = MIXED
-        if shaped:
-            _gather(surface, records.face, base, size, batch)
-            _orient(projection, m, batch)
-            _bound(projection, m, batch)
+        _gather(surface, records.face, base, size, batch)
+        _orient(projection, m, batch)
+        _bound(projection, m, batch)
         if normals is not None:
             columns = COLUMNS
-            if shaped:
-                _gather_normals(surface.faces, normals, records.face, base, size, batch)
-                if projection.kind == ORTHOGRAPHIC:
-                    _mix_parallel(projection, m, batch)
-                else:
-                    _mix_central(projection, m, batch)
-        for b in range(size if painted else 0):
-            face = records.face[base + b]
-            material = surface.material_of_face[face]
-            records.material[base + b] = material
-            for channel in range(3):
-                batch[(INPUTS + ALBEDO + channel) * BATCH + b] = surface.diffuse[material, channel]
+            _gather_normals(surface.faces, normals, records.face, base, size, batch)
+            if projection.kind == ORTHOGRAPHIC:
+                _mix_parallel(projection, m, batch)
+            else:
+                _mix_central(projection, m, batch)
         for b in range(size):
             for column in range(columns):
                 fixed[base + b, column] = batch[(INPUTS + column) * BATCH + b]

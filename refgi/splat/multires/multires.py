@@ -249,7 +249,7 @@ def _lobes(
                                    shape)
     total = np.zeros((3, *shape), points.position.dtype)
     for exponent in np.unique(points.exponent):
-        some = GlossyPoints(*(np.ascontiguousarray(plane[..., points.exponent == exponent]) for plane in points))
+        some = points.at(np.flatnonzero(points.exponent == exponent))
         whole = _of_one_exponent(frame, buffer, some, lights, footprint, settings)
         total.reshape(3, -1)[:, some.pixel] = whole.reshape(3, -1)[:, some.pixel] * some.specular
     return total
@@ -268,8 +268,7 @@ def _of_one_exponent(
                                **_printed(settings))
     shared = glossy_subsplats(buffer, points, subsplats)
     place = np.searchsorted(points.pixel, shared.pixel)
-    here = GlossyPoints(*(np.ascontiguousarray(plane[..., place]) for plane in points))._replace(
-        specular=np.ones((3, len(place)), points.position.dtype))
+    here = points.at(place)._replace(specular=np.ones((3, len(place)), points.position.dtype))
     values = _radiance_at(frame, buffer, here, lights, footprint, settings)
     return upsample(values, shared, covered_by(points, shape), subsplats.upsampling, **_printed(settings))
 

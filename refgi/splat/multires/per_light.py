@@ -175,8 +175,7 @@ def per_light_lobes(
     covered = covered_by(points, shape)
     tree = cell_tree(covered, top_level(*shape, settings.coarsest), settings.finest)
     place = np.searchsorted(points.pixel, tree.pixel)
-    some = GlossyPoints(*(np.ascontiguousarray(plane[..., place]) for plane in points))._replace(
-        specular=np.ones((3, len(place)), points.position.dtype))
+    some = points.at(place)._replace(specular=np.ones((3, len(place)), points.position.dtype))
     refined = np.zeros(len(tree.level), np.bool_) if start is None else interior_cells(tree, start)
     cells = ReceiverTree(tree.first, tree.roots, some.position, some.normal, refined,
                          receiver_lobes_of(some.mirrored, some.exponent))

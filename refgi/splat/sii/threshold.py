@@ -22,6 +22,7 @@ from refgi.pairs.irradiance import Receivers
 from refgi.pairs.pair_sum import pair_cosines
 from refgi.pairs.pixel_lights import CORRECTED, Packed, Range, Widening, lobe_norm_factor, pack
 from refgi.pairs.settings import PairSettings
+from refgi.rsm.pool import plane
 from refgi.sampling import RANGE, draws
 from refgi.scene.values import LARGEST
 from refgi.splat.sii.settings import AbsoluteCut, ReachSettings, RelativeCut, SiiSettings
@@ -217,7 +218,7 @@ def strengths(packed: Packed, position: Array, step: int) -> Array:
     diffuse, lobes = all_peaks(packed)
     brightest = max(diffuse.max(), lobes.max(initial=0.0))
     peaks, glossy = diffuse[:-1:step], lobes[::step]
-    strength = np.zeros((len(peaks) + len(glossy), position.shape[1]))
+    strength = plane((len(peaks) + len(glossy), position.shape[1]), np.float64)
     _diffuse_strengths(position, np.ascontiguousarray(packed.diffuse[:, :-1:step]), strength[: len(peaks)])
     if packed.lobes is not None:
         widening = packed.lobes.widening

@@ -11,7 +11,7 @@ from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.lightcuts.groups import LANES, group_receivers
 from refgi.pairs.lightcuts.tree import FAN, level_starts, light_tree
 from refgi.pairs.pair_sum import TILE
-from refgi.pairs.pixel_lights import pack
+from refgi.pairs.pixel_lights import Unpacked, clustered, pack
 from refgi.pairs.settings import Lightcuts, PairSettings, SphereClamp
 from refgi.stages import observe
 from tests.naive import lightcuts as naive
@@ -126,6 +126,24 @@ def test_the_tree(count):
             np.testing.assert_allclose((weights * nodes[:, row]).sum(), (total * packed.diffuse[row, :-1]).sum(),
                                        rtol=1e-9, atol=1e-12)
     assert not tree.nodes[-1].any()
+
+
+@pytest.mark.parametrize("equal_areas", [True, False])
+def test_lights_of_one_texel_are_one_leaf(equal_areas):
+    """The tree has the flux of all, at as many places as there are; of unequal areas lights stay apart."""
+    pairs = PairSettings(clamp=CLAMPS["disc"])
+    lights, area, points = scene("floor", 60, 50, dtype=np.float64)
+    texel, index = np.random.default_rng(4).integers(0, 20, 60), np.arange(60) % 2
+    _, first, of = np.unique(texel + 20 * index, return_index=True, return_inverse=True)
+    lights = lights._replace(position=lights.position[:, first][:, of], normal=lights.normal[:, first][:, of],
+                             texel=texel.astype(np.int32), map_index=index.astype(np.int32))
+    area = area[first][of] if equal_areas else area
+    packed = clustered(Unpacked(lights, pairs, area, np.float64), 1e-6)
+    assert packed.tree.starts[1] == (len(first) if equal_areas else 60)
+    np.testing.assert_allclose(packed.tree.nodes[: packed.tree.starts[1], 6:9].sum(axis=0),
+                               lights.flux.sum(axis=1) / np.pi, rtol=ROUNDING[np.float64])
+    full = irradiance(points, lights, pairs, area)
+    assert off_by(irradiance(points, lights, pairs, area, Lightcuts(1e-6)), full) <= 1e-6
 
 
 def test_clusters_are_compact():

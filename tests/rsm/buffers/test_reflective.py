@@ -263,7 +263,7 @@ def test_errors_name_what_is_wrong(light, options, message):
         in_a_ball(light, **options)
 
 
-VIEWED = ("depth", "position", "normal", "solid_angle", "flux")
+CHANNELS = ("depth", "position", "normal", "solid_angle", "flux", "lobe_flux", "lobe_axis", "lobe_exponent")
 
 
 @pytest.mark.feature("SII-01")
@@ -277,19 +277,24 @@ VIEWED = ("depth", "position", "normal", "solid_angle", "flux")
 def test_channels_at_some_texels_are_those_of_the_whole_map(light, materials):
     whole, some = in_a_ball(light, 33, materials), in_a_ball(light, 33, materials)
     texel = np.random.default_rng(3).integers(0, whole.texels, whole.texels // 10)
-    for given, channel in zip(some.at(texel, *VIEWED), VIEWED, strict=True):
+    for given, channel in zip(some.at(texel, *CHANNELS), CHANNELS, strict=True):
         full = getattr(whole, channel)
-        np.testing.assert_array_equal(given, full.reshape(*full.shape[:-2], -1)[..., texel])
+        assert (given is None) == (full is None) == (len(materials) == 1 and channel.startswith("lobe"))
+        if full is not None:
+            np.testing.assert_array_equal(given, full.reshape(*full.shape[:-2], -1)[..., texel])
+            np.testing.assert_array_equal(some.at(np.arange(some.texels), channel)[0].reshape(full.shape), full)
     other = whole._replace(flux=2 * whole.flux)
     np.testing.assert_array_equal(other.at(texel, "flux")[0], 2 * whole.at(texel, "flux")[0])
     assert other.depth is whole.depth
 
 
-def test_few_lights_need_no_whole_map():
+@pytest.mark.parametrize("materials", [(DIFFUSE,), (DIFFUSE, GLOSSY)])
+def test_few_lights_need_no_whole_map(materials):
     with observe() as log:
-        rsm = in_a_ball(SpotLight((0.3, 0.2, -0.4), (1, -2, 0.5), 0.4, 0.8, (3.0, 2.0, 1.0)), 64)
+        rsm = in_a_ball(SpotLight((0.3, 0.2, -0.4), (1, -2, 0.5), 0.4, 0.8, (3.0, 2.0, 1.0)), 64, materials)
         lights = choose_pixel_lights([rsm], count=64, pattern="grid")
     assert lights.flux.any()
+    assert lights.lobe_flux is None if len(materials) == 1 else lights.lobe_flux.any()
     assert not {"rsm.resolve", "rsm.solid_angles"} & {run.name for run in log.runs}
 
 

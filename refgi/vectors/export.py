@@ -115,11 +115,13 @@ def export_case(case: Case, out: Path, tell: Tell = lambda _, __: None, most: fl
     InputError
         If it would take more, the folder holds something else, or the disk is full.
     """
-    taken = sum(stored(array).nbytes for array in case.given.values()) + PARTS * sum(
-        array.nbytes for name, array in expected_of(case).items() if name not in case.given)
-    if taken > most:
-        raise InputError(f"{out}: expected a kit of at most {most / 1e6:g} MB, got {taken / 1e6:.3g} MB: a smaller "
-                         "size or map (--size, --rsm-resolution), fewer stages (--stage) or more room (--most)")
+    sizes = {name: stored(array).nbytes for name, array in case.given.items()}
+    sizes |= {name: PARTS * array.nbytes for name, array in expected_of(case).items() if name not in case.given}
+    if (taken := sum(sizes.values())) > most:
+        largest = max(sizes, key=lambda name: sizes[name])
+        raise InputError(f"{out}: expected a kit of at most {most / 1e6:g} MB, got {taken / 1e6:.3g} MB, of which "
+                         f"{sizes[largest] / 1e6:.3g} are {largest}: a smaller size or map (--size, --rsm-resolution, "
+                         "--set), fewer stages (--stage) or more room (--most)")
     return _write_kit("scene", {case.id: lambda: case}, out, tell, whole=False)
 
 

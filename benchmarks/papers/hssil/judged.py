@@ -166,7 +166,8 @@ def several_cameras(bench: Workbench, scene: str, ways: dict[str, dict[str, Any]
             f"One camera finds {share[ONE]:.0f} % of the light that would come if nothing blocked; two side views "
             f"bring it to {share[SIDES]:.0f} %, one camera that the method places itself to {share[PLACED]:.0f} %, "
             f"three to {share[MORE]:.0f} %. The maximum of several views is never less than one of them (the least "
-            f"difference is {np.float64(least):.1g} W/m²).",
+            f"difference is {np.float64(least):.1g} W/m²). Where a placed camera's frame ends, so does its light: a "
+            "straight edge across the wall.",
             f"Each camera draws the scene anew: the times are {cost[SIDES]:.1f}, {cost[PLACED]:.1f} and "
             f"{cost[MORE]:.1f} times that of one camera, which is why the paper does not use it in the game.",
             f"With what blocks, path tracing has {judged(exact)[0]:.0f} %: the basket stands between its lit side and "

@@ -45,6 +45,7 @@ def pytest_configure() -> None:
         import trimesh  # noqa: F401
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """Return how many processes run tests, four at most: each collects all tests, and lowers kernels anew."""
     return min(4, max(2, os.cpu_count() or 1))
@@ -88,6 +89,7 @@ class FromBothEnds(LoadFileScheduling):  # type: ignore[misc]
         super()._assign_work_unit(node)
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> FromBothEnds | None:
     return FromBothEnds(config, log) if config.getvalue("dist") == "loadfile" else None
 

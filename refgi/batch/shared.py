@@ -158,7 +158,6 @@ if sys.platform != "win32":
 STOPS = ("samples", "seconds", "target_error")  # settings of the truth that no checkpoint knows
 
 
-
 def within(tell: Tell, first: float, length: float) -> Tell:
     """Return what says the progress of a part, which begins at some share of the whole and has some length of it."""
     return lambda what, share: tell(what, first + share * length)

@@ -193,7 +193,6 @@ def _by_time(probes: Iterable[Probe]) -> tuple[Probe, ...]:
     return tuple(sorted(probes, key=lambda one: one.seconds))
 
 
-
 SMALL = 128  # pixels along the longer side of the small picture
 SMALL_ROUNDS = 2
 NOISE_SHARE = 0.3  # of the error wished for: the truth's standard error, which is taken out of every figure

@@ -145,8 +145,6 @@ def difference(picture: Picture, plain: Picture) -> float | None:
     return float(np.sqrt(((made - right) ** 2).mean())) / mean if mean > 0 else None
 
 
-
-
 class Unmeasured(Strict):
     """A skip without a switch."""
 

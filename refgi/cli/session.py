@@ -25,7 +25,6 @@ PERCENTAGE = re.compile(r"\d+(?= %)")
 SECONDS_BETWEEN_LINES = 3.0
 
 
-
 @dataclasses.dataclass
 class Session:
     """State of one run, the context's `obj`."""

@@ -166,6 +166,8 @@ def _write_kit(
         shutil.rmtree(part, ignore_errors=True)
     tell("done", 1.0)
     return made
+
+
 def _write_in_processes(
     kit: str, groups: Mapping[str, list[str]], part: Path, report: Callable[[Report], None], processes: int
 ) -> list[Written]:

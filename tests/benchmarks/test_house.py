@@ -23,6 +23,7 @@ def area(r):
 def test_lines_are_counted_by_kind():
     assert weight(SOURCE) == (12, 4, 3, 1, 4)
 
+
 LATE = ("refgi.vectors.",)  # whose stages import their steps late
 
 

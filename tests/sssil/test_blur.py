@@ -37,7 +37,6 @@ def plain(shape, dtype=np.float64):
                     np.ones(shape, bool), dtype)
 
 
-@pytest.mark.feature("HSS-06")
 @pytest.mark.parametrize("settings", [GeometryBlur(), GeometryBlur(1), GeometryBlur(3, 0.05, 0.5),
                                       GeometryBlur(8, 0.02, -1.0), GeometryBlur(16, 1e6, 0.8)], ids=str)
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
@@ -53,7 +52,6 @@ def test_equals_the_literal_text(dtype, settings, evidence):
     evidence(f"{settings}: within {ROUNDING[dtype]:.0e} of the literal text, {np.dtype(dtype).name}")
 
 
-@pytest.mark.feature("HSS-06")
 @pytest.mark.parametrize("size", [2, 4, 8])
 def test_a_window_holds_each_place_of_a_tile_once(size, evidence):
     """Analytic: light that repeats in tiles becomes its mean over one tile, away from the rim of the picture."""
@@ -74,7 +72,6 @@ def test_equal_light_stays_to_the_bit(dtype):
     np.testing.assert_array_equal(found, np.where(np.isinf(level.depth), dtype(0), dtype(0.3)) * np.ones((3, 1, 1)))
 
 
-@pytest.mark.feature("HSS-06")
 def test_light_stays_on_its_surface():
     """Property: no light over a step, an edge between two normals, or a hole."""
     shape = (20, 30)

@@ -1,8 +1,11 @@
 """Records that were measured: stale where the code they rest on is another, made again, stamped one by one."""
 
+import ast
+
 import pytest
 
-from benchmarks.records import RECORDS, ROOT, Record, digest, make, stamps, table
+from benchmarks.house import imports
+from benchmarks.records import AROUND, RECORDS, ROOT, Record, digest, make, stamps, table
 
 SCRIPT = "import pathlib; p = pathlib.Path('made'); p.write_text((p.read_text() if p.exists() else '') + '.')"
 
@@ -47,3 +50,16 @@ def test_records_rest_on_files_that_are_there():
     assert all(any(ROOT.glob(pattern)) for record in RECORDS.values() for pattern in record.sources)
     assert len({digest(ROOT, record) for record in RECORDS.values()}) == len(RECORDS)
     assert all((ROOT / record.read_by).exists() for record in RECORDS.values())
+
+
+def test_what_pictures_rest_on_imports_nothing_of_what_lies_around_them(root):
+    sources = {path: ast.parse(path.read_text()) for path in (ROOT / "refgi").rglob("*.py")}
+    around = tuple(f"refgi.{name.removesuffix('.py')}" for name in AROUND)
+    arrows = {(name, to) for name, found in imports(sources, True).items() for to in found}
+    assert not [arrow for arrow in arrows if f"{arrow[1]}.".startswith(tuple(f"{one}." for one in around))
+                and not f"{arrow[0]}.".startswith(tuple(f"{one}." for one in around))]
+    record = Record((), "-")
+    before = digest(root, record)
+    (root / "refgi/cli").mkdir()
+    (root / "refgi/cli/render.py").write_text("x = 1\n")
+    assert digest(root, record) == before != digest(root, record._replace(around=()))

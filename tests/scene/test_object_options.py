@@ -84,7 +84,7 @@ def test_placed_cameras_and_stated_errors_know():
     dim = dim._replace(flux=1e-6 * dim.flux, lobe_flux=None)
     receivers = Receivers(*frames[1].gbuffer.resolve("position", "normal", "covered"))
     silent, black, plain = ([equal_flux_points(frame)[1],
-                             with_seen_light(SamplingError(0.0, 0.0, 1, ""), frame, receivers, dim).pixel]
+                             with_seen_light(SamplingError(0.0, 0.0, 0.0, 1), frame, receivers, dim).pixel]
                             for frame in frames)
     assert silent == black
     assert all(one < other for one, other in zip(silent, plain, strict=True))

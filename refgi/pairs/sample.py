@@ -74,7 +74,8 @@ def sample_peaks(receivers: "Receivers", packed: "Packed", count: int) -> Sample
     at = np.arange(math.ceil(ends[-1])) + _van_der_corput(math.ceil(ends[-1]))
     drawn = np.searchsorted(ends, at[at < ends[-1]], side="right")
     chosen = np.sort(np.concatenate([np.flatnonzero(sure), drawn]))
-    return Sample(looked.place[chosen], looked.position[:, chosen], looked.normal[:, chosen], 1 / chance[chosen])
+    return Sample(looked.place[chosen], np.take(looked.position, chosen, axis=1),
+                  np.take(looked.normal, chosen, axis=1), 1 / chance[chosen])
 
 
 class LightCells(NamedTuple):

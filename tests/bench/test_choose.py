@@ -145,7 +145,7 @@ def test_a_track_that_waits_is_tried_from_where_another_of_its_method_misses_the
     assert for_error([waiting], 0.01, small, full).best is not None  # nobody to wait for
 
 
-@pytest.mark.parametrize(("wish", "tried"), [(0.01, False), (0.2, True)])
+@pytest.mark.parametrize(("wish", "tried"), [(0.01, False), (0.11, False), (0.12, True), (0.2, True)])
 def test_a_track_that_waits_is_timed_where_another_of_its_method_comes_to_it(wish, tried):
     laws = {"sii": (0.0, 1.0, 1.0, 1e-3, 1e-4)}
     (plain,), full = tracks_of(laws), Model(laws)

@@ -6,15 +6,25 @@ import math
 import numpy as np
 import pytest
 
+from refgi.diagnostics import diagnosing
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import with_clamp
 from refgi.literal.pairs import pair
-from refgi.pairs.estimates import FEW_SAMPLED, QUANTILE, RUNS, error_of_halves, sampling_error
+from refgi.pairs import estimates
+from refgi.pairs.estimates import (
+    FEW_SAMPLED,
+    LEAST_SAMPLED,
+    QUANTILE,
+    RUNS,
+    error_of_halves,
+    report_sampling,
+    sampling_error,
+)
 from refgi.pairs.irradiance import Receivers, summed
 from refgi.pairs.pixel_lights import pack
 from refgi.pairs.sample import REACH, near_variance, sample_peaks
-from refgi.pairs.settings import DiscClamp, LobeSettings, PairSettings
+from refgi.pairs.settings import DiscClamp, LobeSettings, PairSettings, SphereClamp
 from refgi.scene import load_scene
 from refgi.settings import of
 from refgi.splat import SiiSettings
@@ -61,6 +71,23 @@ def test_a_part_of_packed_lights_is_that_part_packed():
         np.testing.assert_array_equal(a, b)
     assert some.terms == alone.terms
     assert pack(lights, settings, area, np.float32).part(~glossy).lobes is None
+    spheres, diffuse = PairSettings(clamp=SphereClamp()), lights._replace(lobe_flux=None)
+    np.testing.assert_array_equal(pack(diffuse, spheres, area, np.float32).part(chosen).spheres,
+                                  pack(diffuse.selected(chosen), spheres, area[chosen], np.float32).spheres)
+
+
+@pytest.mark.parametrize(("all_summed", "lobes", "pixels"), [
+    (True, False, LEAST_SAMPLED), (False, False, FEW_SAMPLED), (False, True, LEAST_SAMPLED)])
+def test_few_pixels_are_sampled_where_clusters_stand_for_all_light(monkeypatch, all_summed, lobes, pixels):
+    """Lobes are summed in full also where diffuse lights are not, and no near light tells where they peak."""
+    asked = []
+    monkeypatch.setattr(estimates, "sampling_error", lambda *given: asked.append(given[-1]))
+    points, lights = room(np.random.default_rng(2), 9)
+    if lobes:
+        lights = lights._replace(lobe_flux=lights.flux, lobe_axis=lights.normal, lobe_exponent=np.full(9, 5.0))
+    with diagnosing():
+        report_sampling(None, points, lights, PairSettings(), None, "sii", all_summed=all_summed)
+    assert asked == [pixels]
 
 
 @pytest.mark.parametrize(("common", "parts"), [(False, 4 * RUNS), (True, 1 / (1 / (4 * RUNS) + 1 / RUNS))])

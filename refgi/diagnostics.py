@@ -15,17 +15,18 @@ from refgi.stages import skip
 class SamplingError(NamedTuple):
     """How far pictures of one method differ by the lights or samples that were drawn; shares of the mean light."""
 
-    pixel: float  # RMS over sampled pixels and channels of the error, over their mean
+    pixel: float  # RMS over pixels and channels of the error, over their mean, from sampled ones
     mean: float  # of that mean; of one difference alone, so rather a hint
+    most: float  # that RMS in 95 of 100 draws at most
     samples: int  # lights, or samples of a pixel, that it is of
     of: str = "pixel lights"
 
     @property
     def statement(self) -> str:
         """In a line."""
-        percent = f"{100 * self.pixel:.{1 if self.pixel < 0.1 else 0}f}"
-        return (f"sampling error: {percent} % of the indirect light (RMS over sampled pixels, by two halves of "
-                f"{self.samples:,} {self.of})")
+        percent, most = (f"{100 * share:.{1 if share < 0.1 else 0}f}" for share in (self.pixel, self.most))
+        return (f"sampling error: {percent} % of the indirect light, at most {most} % in 95 of 100 draws (RMS over "
+                f"pixels, by two halves of {self.samples:,} {self.of})")
 
 
 class LightcutsChoice(NamedTuple):

@@ -2,6 +2,7 @@
 
 For an error, the walk goes up all tracks at once on a small picture, always to the probe that promises to be fastest.
 A track is left where it would miss the wish even if its error went on falling as it did last: it falls ever slower.
+One that waits is taken up where another of its method has missed the wish at the value it begins with.
 Each find is judged at full size, the fastest first. For a time, each track is followed at full size up to that time.
 """
 
@@ -101,7 +102,9 @@ class _Walk:
         self.probes: dict[Choice, Probe] = {}
         self.starts: list[tuple[Track, int]] = []
         fastest = math.inf
-        queue = [(0.0, number, 0) for number in range(len(tracks))]
+        leading = {track.method for track in tracks if not track.waits}
+        waiting = [number for number, track in enumerate(tracks) if track.waits and track.method in leading]
+        queue = [(0.0, number, 0) for number in range(len(tracks)) if number not in waiting]
         while queue and queue[0][0] <= SLACK * fastest:
             _, number, rung = heapq.heappop(queue)
             track = tracks[number]
@@ -109,7 +112,11 @@ class _Walk:
                 first = self._first_that_meets(track, max(-1, rung - STRIDE), rung)
                 fastest = min(fastest, self._probe(track, first).seconds)
                 self.starts.append((track, first))
-            elif rung < len(track.rungs) - 1 and self._may_meet(track, rung):
+                continue
+            for other in [one for one in waiting if _comes_to(track, rung, tracks[one])]:
+                waiting.remove(other)
+                heapq.heappush(queue, (self._probe(track, rung).seconds, other, 0))
+            if rung < len(track.rungs) - 1 and self._may_meet(track, rung):
                 following = min(rung + STRIDE, len(track.rungs) - 1)
                 heapq.heappush(queue, (self._seconds_at(track, rung, following), number, following))
 
@@ -167,13 +174,21 @@ class _Walk:
                 if choice in self.probes]
 
 
+def _comes_to(track: Track, rung: int, other: Track) -> bool:
+    """Return whether a track is at the first value of another of its method, or beyond."""
+    return track.method == other.method and track.values[rung] >= other.values[0]
+
+
 def _reached(tracks: Sequence[Track], wish: float, full: JudgedPictures) -> list[Choice]:
     """Return where tracks come to within a time."""
-    return [choice for choice in (_slowest_within(track, wish, full) for track in tracks) if choice is not None]
+    ends = [(track, _slowest_within(track, wish, full)) for track in tracks if not track.waits]
+    ends += [(other, _slowest_within(other, wish, full)) for other in tracks if other.waits
+             and any(rung is not None and _comes_to(track, rung, other) for track, rung in ends)]
+    return [track.rungs[rung] for track, rung in ends if rung is not None]
 
 
-def _slowest_within(track: Track, wish: float, full: JudgedPictures) -> Choice | None:
-    """Return the last choice of a track whose frame takes no longer than a wish; None where the first does."""
+def _slowest_within(track: Track, wish: float, full: JudgedPictures) -> int | None:
+    """Return the last rung of a track whose frame takes no longer than a wish; None where the first does."""
     within, beyond = -1, len(track.rungs)
     rung = 0
     while rung < beyond and full.seconds(track.rungs[rung]) <= wish:
@@ -186,7 +201,7 @@ def _slowest_within(track: Track, wish: float, full: JudgedPictures) -> Choice |
             within = middle
         else:
             beyond = middle
-    return None if within < 0 else track.rungs[within]
+    return None if within < 0 else within
 
 
 def _by_time(probes: Iterable[Probe]) -> tuple[Probe, ...]:

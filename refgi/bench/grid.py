@@ -133,6 +133,7 @@ def toml_line(key: str, value: Any) -> str:
 
 STEP = math.sqrt(2.0)
 WORDS = ("along", "from", "to")
+WAITS = "waits"
 
 
 class Track(NamedTuple):
@@ -140,6 +141,7 @@ class Track(NamedTuple):
 
     rungs: tuple[Choice, ...]
     values: tuple[int, ...]  # of the key that changes along the track
+    waits: bool = False  # until another track of the method comes to the first value without meeting the wish
 
     @property
     def method(self) -> str:
@@ -157,7 +159,7 @@ def built_in_tracks(methods: Sequence[str] | None = None) -> tuple[Track, ...]:
 
 
 def read_tracks(file: Path) -> tuple[Track, ...]:
-    """Read tracks from TOML: tables with `along` (a key), `from`, `to` (its range) and other keys' values."""
+    """Read tracks from TOML: tables with `along` (a key), `from`, `to` (its range), `waits` and other keys' values."""
     found = []
     for name, tables in read_toml(file).items():
         for table in tables if isinstance(tables, list) else [tables]:
@@ -172,10 +174,12 @@ def _track(name: str, table: Mapping[str, Any]) -> Track:
     for word in WORDS:
         expect(word in table, word, "a value", "none")
     key, values = str(table["along"]), _values(table["from"], table["to"])
-    fixed = [f"{other}={value_text(value)}" for other, value in flat(table).items() if other not in WORDS]
+    expect(isinstance(table.get(WAITS, False), bool), WAITS, "true or false", table.get(WAITS))
+    fixed = [f"{other}={value_text(value)}" for other, value in flat(table).items() if other not in (*WORDS, WAITS)]
     method = find_method(name)
     changes = [(f"{key}={value}", *fixed) for value in values]
-    return Track(tuple(Choice(method.name, one, from_text(method.settings(), one)) for one in changes), values)
+    rungs = tuple(Choice(method.name, one, from_text(method.settings(), one)) for one in changes)
+    return Track(rungs, values, table.get(WAITS, False))
 
 
 def _values(least: Any, most: Any) -> tuple[int, ...]:

@@ -9,7 +9,7 @@ all lights are far from what is seen halves agree on too little: what lit pixels
 import dataclasses
 import math
 import warnings
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,8 +17,8 @@ from refgi.diagnostics import SamplingError, asked, is_due
 from refgi.errors import RefgiWarning
 from refgi.pairs.irradiance import Receivers, add_lights
 from refgi.pairs.pixel_lights import pack
+from refgi.pairs.sample import Sample, sample_peaks, sample_pixels
 from refgi.pairs.settings import STRONGEST_CLAMP, DiscClamp, GeometryClamp, PairSettings
-from refgi.pairs.tiles import block_by_block, taken
 from refgi.stages import stage
 from refgi.types import Array
 
@@ -68,39 +68,14 @@ UNREACHED = GeometryClamp(STRONGEST_CLAMP)  # a bound in place of no clamp: one 
 LEAST_LOSS = 0.02  # share of the light below which a loss gives no warning
 
 
-class Sample(NamedTuple):
-    """Some pixels of a picture."""
-
-    place: Array  # (n,) int64, flat indices
-    position: Array  # (3, n) m
-    normal: Array  # (3, n)
-
-
-def sample_pixels(receivers: Receivers, count: int) -> Sample:
-    """Sample pixels with a surface from all over a picture, the same ones in every run.
-
-    One out of each of `count` equal stretches of the picture's blocks, at van der Corput's place in it; all where there
-    are fewer.
-    """
-    covered = np.asarray(receivers.covered, np.bool_)
-    shown = int(np.count_nonzero(covered))
-    count = min(count, shown)
-    ends = np.arange(count + 1) * shown // max(1, count)
-    nth = ends[:-1] + (_van_der_corput(count) * np.diff(ends)).astype(np.int64)
-    chosen = block_by_block(covered, nth)
-    return Sample(chosen, *(taken(np.asarray(plane), chosen) for plane in (receivers.position, receivers.normal)))
-
-
-def _van_der_corput(count: int) -> Array:
-    index, value, digit = np.arange(count), np.zeros(count), 0.5
-    while index.any():
-        value, index, digit = value + digit * (index & 1), index >> 1, digit / 2
-    return value
+def pixels_for(lights: "PixelLights", least: int = LEAST_SAMPLED) -> int:
+    """Return about PAIRS / N pixels to sample for N lights, at least `least`: few cost little and have high peaks."""
+    return max(least, PAIRS // max(1, int(lights.flux.shape[1])))
 
 
 def sample_for(receivers: Receivers, lights: "PixelLights", *, least: int = LEAST_SAMPLED) -> Sample:
-    """Sample about PAIRS / N pixels for N lights, at least `least`: few lights cost little and have high peaks."""
-    return sample_pixels(receivers, max(least, PAIRS // max(1, lights.flux.shape[1])))
+    """Sample as many pixels as `pixels_for` says."""
+    return sample_pixels(receivers, pixels_for(lights, least))
 
 
 def thinned(
@@ -159,14 +134,9 @@ LEAST_ERROR = 0.2  # share of the light from which a sampling error gives a warn
 SENDERS = 1024  # pixels that send light to each other
 MANY = 1 << 15  # lights, of which one of every few stands for all
 GRAZING = 0.02  # least cosine of a pixel's surface
-FEW_SAMPLED = 128  # pixels, where a picture does not sum all of its lights
-
-
-def half_of(lights: "PixelLights", second: bool) -> tuple["PixelLights", Array]:
-    """Return the lights of one half of the draw, and which they are, (N,) bool."""
-    assert lights.half is not None
-    chosen = lights.half == second
-    return lights.selected(chosen), chosen
+FEW_SAMPLED = 256  # pixels, where a picture does not sum all of its lights
+QUANTILE = 1.645  # of the normal distribution, 95 of 100
+RUNS = 64  # of sampled pixels that follow each other
 
 
 @stage("pairs.sampling_error")
@@ -181,30 +151,42 @@ def sampling_error(
     """
     if lights.half is None:
         return None
-    sample = sample_for(receivers, lights, least=least)
+    packed = pack(lights, settings, footprint, np.asarray(receivers.position).dtype)
+    sample = sample_peaks(receivers, packed, pixels_for(lights, least))
     halves = []
     for second in (False, True):
-        some, chosen = half_of(lights, second)
         sums = np.zeros_like(sample.position)
-        add_lights(sample.position, sample.normal,
-                   pack(some, settings, None if footprint is None else footprint[chosen], sums.dtype), sums)
+        add_lights(sample.position, sample.normal, packed.part(lights.half == second), sums)
         halves.append(sums)
-    return error_of_halves(halves[0], halves[1], lights.drawn)
+    return error_of_halves(halves[0], halves[1], lights.drawn, weight=sample.weight)
 
 
-def error_of_halves(first: Array, second: Array, samples: int, of: str = "pixel lights") -> SamplingError | None:
+def error_of_halves(
+    first: Array, second: Array, samples: int, of: str = "pixel lights", weight: Array | None = None
+) -> SamplingError | None:
     """Return the error of the sum of two halves (3, n) of a picture's light, not doubled; None where there is none.
 
-    It is |2 first - 2 second| / 2 over the mean of first + second; `samples` counts both halves.
+    It is |2 first - 2 second| / 2 over the mean of first + second; `samples` counts both halves, `weight` (n,) says how
+    many pixels each stands for; neighbours follow each other. For its bound, squares are those of m normal numbers, in
+    this draw and in others: the root of a ratio of two chi-squares over m, by Fisher's z. m is Kish's effective number
+    of pixels, and of runs of pixels by what is common to each.
 
     >>> error_of_halves(np.array([[1.0, 2.0]]), np.array([[2.0, 1.0]]), 8)[:2]
     (0.3333333333333333, 0.0)
     """
-    whole = float((first + second).mean(dtype=np.float64)) if first.size else 0.0
+    share = np.full(first.shape[1], 1.0) if weight is None else weight
+    share = share / max(share.sum(), 1e-300)
+    whole = float(((first + second).mean(axis=0, dtype=np.float64) * share).sum())
     if whole <= 0:
         return None
     off = np.subtract(first, second, dtype=np.float64)
-    return SamplingError(float(np.sqrt((off**2).mean())) / whole, abs(float(off.mean())) / whole, samples, of)
+    parts = (off**2).mean(axis=0) * share
+    first_of_run = np.unique(np.arange(RUNS) * len(share) // RUNS)
+    sums = np.add.reduceat(np.concatenate([off * share, share[None]]), first_of_run, axis=1)
+    common = (sums[:-1] ** 2).mean(axis=0) / sums[-1]
+    pixel, spread = math.sqrt(parts.sum()) / whole, math.sqrt((parts**2).sum() + (common**2).sum())
+    most = pixel * math.exp(QUANTILE * spread / parts.sum()) if pixel > 0 else 0.0
+    return SamplingError(pixel, abs(float((off.mean(axis=0) * share).sum())) / whole, most, samples, of)
 
 
 @stage("pairs.seen_light")
@@ -249,7 +231,8 @@ def report_sampling(
     warn_of_mirrors(frame, lights, method)
     found = asked("pairs.sampling_error")
     if found is not None:
-        stated = sampling_error(receivers, lights, settings, footprint, LEAST_SAMPLED if all_summed else FEW_SAMPLED)
+        few = not all_summed and lights.lobe_flux is None  # clusters stand for diffuse lights alone
+        stated = sampling_error(receivers, lights, settings, footprint, FEW_SAMPLED if few else LEAST_SAMPLED)
         found.sampling_error = with_seen_light(stated, frame, receivers, lights)
         warn_of_sampling(found.sampling_error, method)
 
@@ -261,7 +244,8 @@ def with_seen_light(
     if stated is None:
         return None
     lacking = seen_light(frame.scene.camera, frame.sent_albedo, frame.direct, receivers, lights) - 1
-    return stated._replace(pixel=max(stated.pixel, lacking), mean=max(stated.mean, lacking))
+    return stated._replace(pixel=max(stated.pixel, lacking), mean=max(stated.mean, lacking),
+                           most=max(stated.most, lacking))
 
 
 def warn_of_sampling(error: SamplingError | None, method: str) -> None:

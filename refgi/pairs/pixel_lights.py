@@ -142,6 +142,22 @@ class Packed(NamedTuple):
         """What a receiver sums: diffuse lights and lobes."""
         return int(np.count_nonzero(self.shines) + np.count_nonzero(self.glossy))
 
+    def part(self, chosen: Array) -> "Packed":
+        """Return the lights that are chosen, (N,) bool, without a tree."""
+        shines, glossy = chosen[self.shines], chosen[self.glossy]
+        some = np.append(shines, True)  # the last one is black
+        lobes = self.lobes if glossy.any() else None
+        if lobes is not None:
+            widening = lobes.widening
+            lobes = PackedLobes(
+                np.compress(glossy, lobes.lights, axis=1),
+                lobes.clamp._replace(softness=lobes.clamp.softness[glossy]),
+                widening if widening is None else widening._replace(cos_theta=widening.cos_theta[glossy]))
+        return Packed(np.compress(some, self.diffuse, axis=1),
+                      self.clamp and self.clamp._replace(softness=self.clamp.softness[some]),
+                      None if self.spheres is None else self.spheres[shines], lobes, self.shines & chosen,
+                      self.glossy & chosen)
+
 
 def pack(lights: PixelLights, settings: PairSettings, footprint: Array | None, dtype: npt.DTypeLike) -> Packed:
     """Pack the lights that have flux, each part for its kernel; `footprint` (N,) is the area each stands for, m^2."""
@@ -201,7 +217,7 @@ def clustered(unpacked: Unpacked, error: float) -> Packed:
 def joined_at_texels(packed: Packed, lights: PixelLights) -> tuple[Array, Clamp | None]:
     """Return diffuse lights and their clamp, those of one texel joined to one, where there are more than texels.
 
-    They differ in flux alone; lights of unequal areas stay as they are.
+    They must differ in flux alone, as draws from maps do: where any differs in place, normal or area all stay apart.
     """
     diffuse, clamp = packed.diffuse, packed.clamp
     if lights.texel is None or lights.map_index is None:
@@ -209,10 +225,13 @@ def joined_at_texels(packed: Packed, lights: PixelLights) -> tuple[Array, Clamp 
     texel = lights.texel[packed.shines].astype(np.int64)
     texel += lights.map_index[packed.shines] * (texel.max() + 1)
     places = int(texel.max()) + 1
+    if len(texel) <= places:
+        return diffuse, clamp
     first = np.full(places, -1)
     first[texel[::-1]] = np.arange(len(texel))[::-1]
-    alike = clamp is None or np.array_equal(clamp.softness[first[texel]], clamp.softness[:-1])
-    if len(texel) <= places or not alike:
+    of_first = first[texel]
+    shared = [*diffuse[:6], *([] if clamp is None else [clamp.softness])]
+    if any(not np.array_equal(values[of_first], values[:-1]) for values in shared):
         return diffuse, clamp
     some = np.append(first[first >= 0], len(texel))
     joined = np.take(diffuse, some, axis=1)

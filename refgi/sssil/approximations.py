@@ -15,8 +15,9 @@ import numpy as np
 from refgi.diagnostics import asked
 from refgi.jit import kernel, prange
 from refgi.method import Approximation, Extent
-from refgi.pairs.estimates import lost_share, sample_pixels, warn_of_loss
+from refgi.pairs.estimates import lost_share, warn_of_loss
 from refgi.pairs.irradiance import Receivers
+from refgi.pairs.sample import sample_pixels
 from refgi.settings import replaced
 from refgi.sssil.crown import level_factor
 from refgi.sssil.form_factor import Facing, SampleForm, disc_texels, form_of, term

@@ -13,15 +13,11 @@ import numpy as np
 from refgi.diagnostics import SamplingError, asked
 from refgi.lights.settings import LightSettings, MapLights, most_lights
 from refgi.method import Approximation, Extent, Method
-from refgi.pairs.estimates import (
-    error_of_halves,
-    half_of,
-    sample_pixels,
-    warn_of_mirrors,
-    warn_of_sampling,
-    with_seen_light,
-)
+from refgi.pairs.estimates import UNREACHED, error_of_halves, warn_of_mirrors, warn_of_sampling, with_seen_light
 from refgi.pairs.irradiance import Receivers
+from refgi.pairs.pixel_lights import pack
+from refgi.pairs.sample import sample_peaks
+from refgi.pairs.settings import PairSettings
 from refgi.pairs.shadow_rays import BATCH, Hidden, receivers, shadowed_sum
 from refgi.rays import Tracer
 from refgi.scene import Geometry
@@ -113,13 +109,14 @@ def vpl_sampling_error(frame: "Frame", lights: "PixelLights", settings: VplSetti
     """
     if lights.half is None:
         return None
-    sample = sample_pixels(Receivers(*frame.gbuffer.resolve("position", "normal", "covered")), SAMPLED)
+    seen = Receivers(*frame.gbuffer.resolve("position", "normal", "covered"))
+    sample = sample_peaks(seen, pack(lights, PairSettings(clamp=UNREACHED), None, seen.position.dtype), SAMPLED)
     points = receivers(frame.scene.geometry, sample.position, sample.normal,
                        frame.gbuffer.triangle_id.reshape(-1)[sample.place], frame.tracer.grain)
     shadowed = settings.visibility and settings.maps is None
-    first, second = (shadowed_sum(frame.tracer, points, half_of(lights, later)[0], visibility=shadowed,
+    first, second = (shadowed_sum(frame.tracer, points, lights.selected(lights.half == later), visibility=shadowed,
                                   batch=settings.batch) for later in (False, True))
-    return error_of_halves(first, second, lights.drawn)
+    return error_of_halves(first, second, lights.drawn, weight=sample.weight)
 
 
 def vpl_lobes(frame: "Frame", settings: VplSettings) -> Array:

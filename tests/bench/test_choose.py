@@ -122,6 +122,40 @@ def test_the_cheapest_probe_goes_first_and_what_takes_longer_is_not_run():
     assert {choice.changes for choice in small.ran if choice.method == "slow"} == {("16",)}
 
 
+@pytest.mark.parametrize(("wish", "tried"), [(0.2, False), (0.01, True)])
+def test_a_track_that_waits_is_tried_from_where_another_of_its_method_misses_the_wish(wish, tried):
+    """It is the fastest there; on few lights, which meet the wish, it is not run."""
+    laws = {"plain": (0.0, 1.0, 1.0, 1e-3, 1e-4), "cut": (0.0, 1.0, 1.0, 1e-3, 1e-5),
+            "other": (0.5, 1.0, 1.0, 1.0, 1.0)}
+
+    def choices(name, values):
+        return tuple(Choice("sii" if name == "cut" else name, (str(n), name), Settings()) for n in values)
+
+    class Named(Model):
+        def _at(self, choice):
+            self.ran.add(choice)
+            return self.laws[choice.changes[1]], int(choice.changes[0])
+
+    plain = Track(tuple(one._replace(method="sii") for one in choices("plain", VALUES)), VALUES)
+    waiting = Track(choices("cut", VALUES[12:]), VALUES[12:], waits=True)
+    tracks, small, full = [waiting, plain, Track(choices("other", VALUES), VALUES)], Named(laws, 0.05), Named(laws)
+    found = for_error(tracks, wish, small, full)
+    assert (found.best.choice.changes[1] == "cut") == tried
+    assert any(one.changes[1] == "cut" for one in small.ran | full.ran) == tried
+    assert for_error([waiting], 0.01, small, full).best is not None  # nobody to wait for
+
+
+@pytest.mark.parametrize(("wish", "tried"), [(0.01, False), (0.11, False), (0.12, True), (0.2, True)])
+def test_a_track_that_waits_is_timed_where_another_of_its_method_comes_to_it(wish, tried):
+    laws = {"sii": (0.0, 1.0, 1.0, 1e-3, 1e-4)}
+    (plain,), full = tracks_of(laws), Model(laws)
+    waiting = plain._replace(rungs=tuple(one._replace(changes=(*one.changes, "cut")) for one in plain.rungs[12:]),
+                             values=plain.values[12:], waits=True)
+    found = for_time([waiting, plain], wish, Model(laws), full)
+    assert found.best.seconds <= wish
+    assert any("cut" in one.changes for one in full.ran) == tried
+
+
 def test_a_track_whose_bias_is_above_the_wish_is_left_soon():
     laws = {"biased": (0.3, 1.0, 1.0, 1e-3, 1e-6), "sound": (0.0, 20.0, 1.0, 1.0, 1e-2)}
     small = Model(laws)

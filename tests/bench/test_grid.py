@@ -101,6 +101,21 @@ def test_a_track_goes_in_steps_of_the_root_of_two(tmp_path):
     assert all(rung.settings.half_resolution for rung in track.rungs)
 
 
+def test_a_track_may_wait(tmp_path):
+    text = '[[sii]]\nalong = "lights"\nfrom = 4\nto = 8\n[[sii]]\nalong = "lights"\nfrom = 8\nto = 8\nwaits = true\n'
+    plain, waiting = read_tracks(written(tmp_path, text))
+    assert (plain.waits, waiting.waits) == (False, True)
+    assert waiting.rungs[0].changes == ("lights=8",)
+
+
+def test_cuts_wait_for_many_lights():
+    """Tracks with a cut begin where a cut pays (docs/methods/sii_range.md)."""
+    cuts = {track.rungs[0].settings.reach.cut.share: track for track in built_in_tracks(["sii"]) if track.waits}
+    assert {share: track.values[0] for share, track in cuts.items()} == {0.01: 2048, 0.05: 1024}
+    assert all(rung.settings.reach.cut is None for track in built_in_tracks(["sii"]) if not track.waits
+               for rung in track.rungs)
+
+
 def test_every_method_has_a_track():
     assert {track.method for track in built_in_tracks()} == set(METHODS)
     assert {track.method for track in built_in_tracks(["val", "truth"])} == {"val", "truth"}
@@ -112,6 +127,7 @@ def test_every_method_has_a_track():
     ('[[sii]]\nalong = "lights"\nfrom = 0\nto = 4\n', "whole number from 1"),
     ('[[sii]]\nalong = "light"\nfrom = 1\nto = 4\n', "light"),
     ('[[siii]]\nalong = "lights"\nfrom = 1\nto = 4\n', "siii"),
+    ('[[sii]]\nalong = "lights"\nfrom = 4\nto = 8\nwaits = 3\n', "waits: expected true or false"),
     ("[[sii]\n", "no TOML"),
 ])
 def test_what_cannot_be_used_is_named(tmp_path, text, said):

@@ -14,8 +14,9 @@ from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import LightSettings
 from refgi.pairs import estimates
-from refgi.pairs.estimates import sample_pixels, seen_light
+from refgi.pairs.estimates import seen_light
 from refgi.pairs.irradiance import Receivers, irradiance
+from refgi.pairs.sample import sample_pixels
 from refgi.pairs.settings import PairSettings
 from refgi.scene import PointLight, load_scene
 from refgi.settings import of

@@ -83,9 +83,9 @@ def test_placed_cameras_and_stated_errors_know():
     dim = choose_lights(frames[1], LightSettings())
     dim = dim._replace(flux=1e-6 * dim.flux, lobe_flux=None)
     receivers = Receivers(*frames[1].gbuffer.resolve("position", "normal", "covered"))
-    silent, black, plain = ([equal_flux_points(frame)[1],
-                             with_seen_light(SamplingError(0.0, 0.0, 1, ""), frame, receivers, dim).pixel]
-                            for frame in frames)
+    stated = [with_seen_light(SamplingError(0.0, 0.0, 0.0, 1), frame, receivers, dim) for frame in frames]
+    assert all(one.most == one.pixel for one in stated)
+    silent, black, plain = ([equal_flux_points(frame)[1], one.pixel] for frame, one in zip(frames, stated, strict=True))
     assert silent == black
     assert all(one < other for one, other in zip(silent, plain, strict=True))
 

@@ -14,8 +14,9 @@ import numpy as np
 from refgi.diagnostics import SamplingError, asked, is_due
 from refgi.lights.settings import RSM_RESOLUTION, VISIBILITY, changed
 from refgi.method import Approximation
-from refgi.pairs.estimates import LEAST_SAMPLED, error_of_halves, sample_pixels, warn_of_loss, warn_of_sampling
+from refgi.pairs.estimates import LEAST_SAMPLED, error_of_halves, warn_of_loss, warn_of_sampling
 from refgi.pairs.irradiance import Receivers
+from refgi.pairs.sample import sample_pixels
 from refgi.pairs.tiles import clear, receiving
 from refgi.rsm.buffers.leaving import GlossyPoints, spread_over_picture
 from refgi.scene.values import LARGEST

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from refgi.jit import kernel, prange
-from refgi.pairs.estimates import lost_share, sample_pixels
+from refgi.pairs.estimates import lost_share
 from refgi.pairs.irradiance import Receivers
 from refgi.pairs.pair_sum import geometry_term
+from refgi.pairs.sample import sample_pixels
 from refgi.radiometry import lobe_gap, lobe_power, receiver_norm
 from refgi.rsm.buffers.leaving import GlossyPoints
 from refgi.sampling import GATHERING, draws, halton

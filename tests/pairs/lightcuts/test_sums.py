@@ -16,6 +16,7 @@ from refgi.pairs.settings import Lightcuts, PairSettings, SphereClamp
 from refgi.stages import observe
 from tests.naive import lightcuts as naive
 from tests.pairs.lightcuts.scenes import CLAMPS, GRID, scene
+from tests.pairs.sets import unit
 
 ROUNDING = {np.float32: 2e-5, np.float64: 1e-12}  # of the sum: terms near a light's plane, and 66 U
 ERRORS = (0.001, 0.02, 0.3)
@@ -128,18 +129,23 @@ def test_the_tree(count):
     assert not tree.nodes[-1].any()
 
 
-@pytest.mark.parametrize("equal_areas", [True, False])
-def test_lights_of_one_texel_are_one_leaf(equal_areas):
-    """The tree has the flux of all, at as many places as there are; of unequal areas lights stay apart."""
+@pytest.mark.parametrize("unlike", [None, "area", "position", "normal"])
+def test_lights_of_one_texel_are_one_leaf(unlike):
+    """The tree has the flux of all, at as many places as there are; what is not alike at a texel stays apart."""
     pairs = PairSettings(clamp=CLAMPS["disc"])
     lights, area, points = scene("floor", 60, 50, dtype=np.float64)
     texel, index = np.random.default_rng(4).integers(0, 20, 60), np.arange(60) % 2
     _, first, of = np.unique(texel + 20 * index, return_index=True, return_inverse=True)
     lights = lights._replace(position=lights.position[:, first][:, of], normal=lights.normal[:, first][:, of],
                              texel=texel.astype(np.int32), map_index=index.astype(np.int32))
-    area = area[first][of] if equal_areas else area
+    area = area if unlike == "area" else area[first][of]
+    last = np.flatnonzero(of == np.argmax(np.bincount(of)))[-1]  # of several at its texel
+    if unlike == "position":
+        lights.position[1, last] += 0.1
+    if unlike == "normal":
+        lights.normal[:, last] = unit(lights.normal[:, last] + np.array([0.3, 0.0, 0.0]))
     packed = clustered(Unpacked(lights, pairs, area, np.float64), 1e-6)
-    assert packed.tree.starts[1] == (len(first) if equal_areas else 60)
+    assert packed.tree.starts[1] == (60 if unlike else len(first))
     np.testing.assert_allclose(packed.tree.nodes[: packed.tree.starts[1], 6:9].sum(axis=0),
                                lights.flux.sum(axis=1) / np.pi, rtol=ROUNDING[np.float64])
     full = irradiance(points, lights, pairs, area)

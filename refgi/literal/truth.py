@@ -105,20 +105,21 @@ def reflected(w: Any, back: Any, m: Any, f: Any, diffuse: Any, specular: Any, ex
     pattern = diffuse / np.pi * np.maximum(0, (m * back).sum(axis=0))
     if specular.any():
         mirror = 2 * (m * w).sum(axis=0) * m - w
-        cosine = np.where((m * back).sum(axis=0) > 0, np.maximum(0, (mirror * back).sum(axis=0)), 0)
+        cosine = (mirror * back).sum(axis=0)
+        shape = np.where((cosine > 0) & ((m * back).sum(axis=0) > 0), np.maximum(0, cosine) ** exponent, 0)
         norm = np.zeros_like(exponent)
         for power in np.unique(exponent):
             here = exponent == power
-            norm[here] = np.interp((m * mirror).sum(axis=0)[here], *norms(power))
-        pattern = pattern + specular * norm * cosine**exponent
+            norm[here] = np.interp(np.arccos(np.clip((m * mirror).sum(axis=0)[here], -1, 1)), *norms(power))
+        pattern = pattern + specular * norm * shape
     return pattern / (f * back).sum(axis=0)
 
 
 @cache
 def norms(power: float) -> Any:
-    """Return cosines between axis and normal and the norm of a lobe there, 1/sr (`pairs.lobe_norm`)."""
-    cosine = np.linspace(-1, 1, 1001)
-    return cosine, lobe_norm(cosine, power)
+    """Return angles between axis and normal, rad, and the norm of a lobe there, 1/sr (`pairs.lobe_norm`)."""
+    angle = np.linspace(0, np.pi, 1001)
+    return angle, lobe_norm(np.cos(angle), power)
 
 
 def cosine_direction(n: Any, u: Any, v: Any) -> Any:

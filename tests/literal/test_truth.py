@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from refgi.literal.truth import cosine_direction, path_traced
+from refgi.literal.truth import cosine_direction, path_traced, reflected
 from tests.form_factors import polygon_form_factor
 
 SIGMAS = 4.0  # the cases are few and their numbers fixed
@@ -150,8 +150,60 @@ def test_what_blocks_and_what_a_camera_sees():
     camera = np.array([[0.0, 4, 0]]), axes, np.array([0.25, 0.5])
     found = traced(point, DOWN, mesh_of(floor()), of(0.6), lamp("directional", SUN), camera=camera)
     expect(found, 0.6 * SUN * polygon_form_factor(point, DOWN, [(-1, 0, 2), (1, 0, 2), (1, 0, -2), (-1, 0, -2)]))
+    roof = mesh_of([*floor(), *[np.add(one, (0, 2.7, 0)) for one in plate]], [0, 0, 1, 1])  # between the camera and the rest
+    assert traced(point, DOWN, roof, materials, low)[0].all()
+    assert not traced(point, DOWN, roof, materials, low, camera=camera)[0].any()
     up = camera[0], axes * np.array([1, 1, -1])[:, None], camera[2]
     assert not traced(point, DOWN, mesh_of(floor()), of(0.6), lamp("directional", SUN), camera=up)[0].any()
+
+
+def test_the_first_surface_counts_whichever_is_listed_first():
+    plate = rectangle((-30, 0.3, 30), (60, 0, 0), (0, 0, -60))
+    materials = np.array([[0.6] * 3, [0.0] * 3]), np.zeros((2, 3)), np.ones(2)
+    found = traced((0.2, 0.8, 0.1), DOWN, mesh_of([*plate, *floor()], [0, 0, 1, 1]), materials,
+                   lamp("directional", SUN), triangle=2)
+    expect(found, 0.6 * SUN)
+
+
+TILT = math.radians(50)
+TILTED = np.array([math.sin(TILT), math.cos(TILT), 0.0])  # a normal of vertices, its face's is y
+
+
+def test_interpolated_normals_turn_the_pattern_and_leave_the_flux():
+    """L = rho/pi E0 <m.w> / <f.w>, whose integral over f's hemisphere is rho E0 (1 + cos tilt) / 2."""
+    mesh = mesh_of(floor(), normals=np.tile(TILTED, (6, 1)))
+    expect(traced((0, 0.5, 0), DOWN, mesh, of(0.6), lamp("directional", SUN), side=64),
+           0.6 * SUN * (1 + math.cos(TILT)) / 2)
+
+
+def test_what_arrives_by_a_bounce_arrives_at_the_face():
+    """A ceiling that a sun from below lights shines on a small plate from all sides; its light alone is seen."""
+    plate, ceiling = floor(1.0), floor(1e4, 100.0)
+    normals = np.concatenate([np.tile(TILTED, (6, 1)), np.tile(DOWN, (6, 1))])
+    mesh, up = mesh_of([*plate, *ceiling], normals=normals), lamp("directional", SUN, direction=-DOWN)
+    assert not traced((0, 0.01, 0), DOWN, mesh, of(0.6), up)[0].any()
+    expect(traced((0, 0.01, 0), DOWN, mesh, of(0.6), up, bounces=2, side=64),
+           0.36 * SUN * (1 + math.cos(TILT)) / 2)
+
+
+def test_a_receiver_s_face_hides_what_lies_below_it():
+    """A vertical face with a normal that looks down sees half of the floor."""
+    speck = [np.array([[0, 1, 0], [0, 1, 1e-4], [0, 1 + 1e-4, 0]])]
+    tilted = np.array([1e-6, -1.0, 0.0])  # the face's side is that of the normal
+    expect(traced((0, 1, 0), tilted, mesh_of([*speck, *floor()]), of(0.6), lamp("directional", SUN)), 0.3 * SUN)
+
+
+@pytest.mark.parametrize(("exponent", "share"), [(0.0, lambda c: 1 - math.acos(c) / math.pi), (
+    1.0, lambda c: (1 + c) / 2)])
+def test_a_lobe_lies_about_the_mirrored_direction_of_the_interpolated_normal(exponent, share):
+    """L per irradiance: rho_s (P + 1) / (2 pi K) <r.v>^P / <f.v>, K in closed form for P = 0 and 1; E-SII-03."""
+    m, w, f = TILTED, np.array([0.8, 0.6, 0.0]), -DOWN
+    seen, below = np.array([0.28, 0.96, 0.0]), np.array([-0.96, 0.28, 0.0])  # the last below m's horizon
+    r = 2 * (m @ w) * m - w
+    for v, counts in ((seen, 1.0), (below, 0.0)):
+        args = (np.reshape(one, (3, 1, 1)) for one in (w, v, m, f, np.zeros(3), np.full(3, 0.7)))
+        expected = counts * 0.7 * (exponent + 1) / (2 * math.pi * share(m @ r)) * max(0, r @ v) ** exponent / (f @ v)
+        np.testing.assert_allclose(reflected(*args, np.full((1, 1), exponent)).ravel(), expected, rtol=1e-5)
 
 
 def test_directions_have_the_density_cos_over_pi():

@@ -150,7 +150,7 @@ def test_what_blocks_and_what_a_camera_sees():
     camera = np.array([[0.0, 4, 0]]), axes, np.array([0.25, 0.5])
     found = traced(point, DOWN, mesh_of(floor()), of(0.6), lamp("directional", SUN), camera=camera)
     expect(found, 0.6 * SUN * polygon_form_factor(point, DOWN, [(-1, 0, 2), (1, 0, 2), (1, 0, -2), (-1, 0, -2)]))
-    roof = mesh_of([*floor(), *[np.add(one, (0, 2.7, 0)) for one in plate]], [0, 0, 1, 1])  # between the camera and the rest
+    roof = mesh_of([*floor(), *[np.add(one, (0, 2.7, 0)) for one in plate]], [0, 0, 1, 1])  # hides all else
     assert traced(point, DOWN, roof, materials, low)[0].all()
     assert not traced(point, DOWN, roof, materials, low, camera=camera)[0].any()
     up = camera[0], axes * np.array([1, 1, -1])[:, None], camera[2]
@@ -197,10 +197,11 @@ def test_a_receiver_s_face_hides_what_lies_below_it():
     1.0, lambda c: (1 + c) / 2)])
 def test_a_lobe_lies_about_the_mirrored_direction_of_the_interpolated_normal(exponent, share):
     """L per irradiance: rho_s (P + 1) / (2 pi K) <r.v>^P / <f.v>, K in closed form for P = 0 and 1; E-SII-03."""
-    m, w, f = TILTED, np.array([0.8, 0.6, 0.0]), -DOWN
-    seen, below = np.array([0.28, 0.96, 0.0]), np.array([-0.96, 0.28, 0.0])  # the last below m's horizon
+    m, w, f = TILTED, np.array([math.cos(0.1), math.sin(0.1), 0.0]), -DOWN
+    seen, below, away = np.array([[0.28, 0.96, 0.0], [-0.8, 0.6, 0.0], [-0.995, 0.0999, 0.0]])
     r = 2 * (m @ w) * m - w
-    for v, counts in ((seen, 1.0), (below, 0.0)):
+    assert (m @ seen > 0, m @ below < 0, r @ below > 0, r @ away < 0) == (True,) * 4
+    for v, counts in ((seen, 1.0), (below, 0.0), (away, 0.0)):
         args = (np.reshape(one, (3, 1, 1)) for one in (w, v, m, f, np.zeros(3), np.full(3, 0.7)))
         expected = counts * 0.7 * (exponent + 1) / (2 * math.pi * share(m @ r)) * max(0, r @ v) ** exponent / (f @ v)
         np.testing.assert_allclose(reflected(*args, np.full((1, 1), exponent)).ravel(), expected, rtol=1e-5)

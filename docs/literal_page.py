@@ -137,7 +137,7 @@ def tests_of(file: Path, module: str) -> dict[str, set[str]]:
     found = {}
     for name, used in defined.items():
         if name.startswith("test") and known:
-            inner = reached(used, defined)
+            inner = used.union(*(defined.get(one, set()) for one in reached(used, defined)))  # by its helpers too
             found[f"{file.stem}::{name}"] = inner if inner & known else set()
     return found
 

@@ -13,7 +13,7 @@ from refgi.scene import SpotLight, load_scene
 from refgi.settings import of
 from refgi.splat.multires import MultiresSettings, multires
 from refgi.splat.multires.approximations import multires_ledger
-from tests.naive.truth import nearest_hit
+from tests.naive.crossings import corners_of, free
 from tests.truth.scenes import corner_room, rectangle, scene
 
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
@@ -82,8 +82,7 @@ def test_what_is_blocked_is_that_of_the_twin(method, settings, limit, evidence):
 def is_blocked(geometry, start, end):
     """Return whether a triangle lies between two points on surfaces."""
     way = np.subtract(end, start)
-    _, distance = nearest_hit(geometry.vertices, geometry.faces, start + 1e-6 * way, way)
-    return distance < 1 - 2e-6
+    return not free(corners_of(geometry), (start + 1e-6 * way)[None], (end - 1e-6 * way)[None])[0]
 
 
 @pytest.mark.feature("REF-04")

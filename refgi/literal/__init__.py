@@ -6,10 +6,10 @@ Nichols and Wyman 2009), with what they stand on: gathering from reflective shad
 2005) and imperfect shadow maps (Ritschel et al. 2008).
 
 This is what each equation says; kernels say how it is fast, and never import it. Read in this order: `buffers`,
-`light_flux`, `direct`, `lights`, `warp`, `pairs`, `gather`, `sii`, `vpl`, `imperfect`, `multires`, `multires_lights`,
-`multires_upsample`, `val_areas`, `val_series`, `val_maps`, `val_visibility`, `val_filters`, `val_back_projection`,
-`val`, `hssil_levels`, `hssil_crown`, `upsampling`, `hssil`, `temporal`. Whole methods, to step through: `sii.sii`,
-`multires_upsample.multires`, `val.val`, `hssil.hssil`.
+`light_flux`, `direct`, `lights`, `warp`, `pairs`, `gather`, `sii`, `vpl`, `imperfect`, `truth`, `multires`,
+`multires_lights`, `multires_upsample`, `val_areas`, `val_series`, `val_maps`, `val_visibility`, `val_filters`,
+`val_back_projection`, `val`, `hssil_levels`, `hssil_crown`, `upsampling`, `hssil`, `temporal`. Whole methods, to step
+through: `sii.sii`, `multires_upsample.multires`, `val.val`, `hssil.hssil`, `truth.path_traced`.
 
 Vectors are arrays whose first axis is x, y, z (or red, green, blue); metres, watts, radians, linear RGB. Arithmetic is
 in the type of the arrays. E-SII-02 and its like are errata of the papers (docs/errata), VAL-03 and its like features

@@ -38,7 +38,7 @@ def lamp_irradiance(
     x: Any, n: Any, strength: Any, place: Any, direction: Any, half_angles: Any, falloff: Any
 ) -> Any:
     """Return E (3, h, w), W/m^2, of one lamp, unblocked."""
-    d = -direction.reshape(3, 1, 1) + 0 * x if place is None else place.reshape(3, 1, 1) - x
+    d = to_lamp(x, place, direction)
     r = np.sqrt((d**2).sum(axis=0))
     w = unit(d)
     cosine = np.maximum(0, (n * w).sum(axis=0))
@@ -117,21 +117,25 @@ def shadow_rays(
     Rays begin `offset`, m, above the face, whose normal it is, and end as far before the lamp.
     """
     start = position + offset * normal
-    d = -direction.reshape(3, 1, 1) + 0 * start if place is None else place.reshape(3, 1, 1) - start
+    d = to_lamp(start, place, direction)
     reach = np.inf if place is None else 1 - offset / np.sqrt((d**2).sum(axis=0))
     faced = (normal * d).sum(axis=0) > 0
     blocked = np.zeros_like(faced)
-    for a, b, c in vertices[faces].reshape(-1, 3, 3, 1, 1):
-        # volumes of d with two edges at a time: Moeller and Trumbore 1997
-        across = np.cross(d, c - a, axis=0)
-        volume = ((b - a) * across).sum(axis=0)
-        volume = np.where(volume == 0, np.nan, volume)  # along the ray, or without area
-        u = ((start - a) * across).sum(axis=0) / volume
-        along = np.cross(start - a, b - a, axis=0)
-        v = (d * along).sum(axis=0) / volume
-        t = ((c - a) * along).sum(axis=0) / volume
-        blocked |= (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < reach)
+    for corners in vertices[faces]:
+        blocked |= distance(corners, start, d) < reach
     return (triangle_id >= 0) & faced & ~blocked
+
+
+def distance(corners: Any, o: Any, d: Any) -> Any:
+    """Return how many d (3, h, w) from o a triangle of corners (3, 3) lies; infinite where the ray passes it."""
+    a, b, c = corners
+    across = np.cross(b - a, c - a)
+    square = (across @ across) or np.nan  # without area nothing meets it
+    from_a, slope = o - a.reshape(3, 1, 1), np.tensordot(across, d, 1)
+    t = -np.tensordot(across, from_a, 1) / np.where(slope == 0, np.nan, slope)  # where the ray meets the plane
+    point = from_a + t * d
+    u, v = (np.tensordot(one / square, point, 1) for one in (np.cross(c - a, across), np.cross(across, b - a)))
+    return np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0), t, np.inf)
 
 
 def leaving_radiance(irradiance: Any, extra: Any = None, *, albedo: Any, emission: Any = None) -> Any:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from refgi.literal.direct import distance
 from refgi.literal.pairs import pair
 
 LIFT = 1e-5  # m: ends of rays off their surfaces, more than places in float32 are off them
@@ -36,23 +37,11 @@ def visible(
     sends = faces_light & ((m * toward).sum(axis=0) < 0) & (triangle_id.ravel() >= 0)
     start, end = x + LIFT * f, p + LIFT * m
     blocked = np.zeros(sends.shape, bool)
-    for a, b, c in vertices[faces]:
-        blocked = blocked | crosses(a, b, c, start, end)
+    for corners in vertices[faces]:
+        t = distance(corners, start, end - start)  # of the way
+        blocked = blocked | (t < 1)
     seen = sends & ~blocked
     return seen.reshape(-1, *triangle_id.shape)
-
-
-def crosses(a: Any, b: Any, c: Any, start: Any, end: Any) -> Any:
-    """Return which rays from starts (3, 1, n) to ends (3, N, 1) cross a triangle of corners (3,), (N, n)."""
-    across = np.cross(b - a, c - a)
-    square = (across**2).sum()
-    height, u, v = across, np.cross(c - a, across) / square, np.cross(across, b - a) / square  # gradients of functions
-    h0, u0, v0 = (np.tensordot(one, start - a[:, None, None], 1) for one in (height, u, v))
-    h1, u1, v1 = (np.tensordot(one, end - a[:, None, None], 1) for one in (height, u, v))
-    apart = np.where(h0 != h1, h0 - h1, 1)
-    t = np.where(h0 != h1, h0 / apart, -1)  # where the ray meets the plane, from 0 to 1
-    beta, gamma = (1 - t) * u0 + t * u1, (1 - t) * v0 + t * v1  # barycentric coordinates there
-    return (t > 0) & (t < 1) & (beta >= 0) & (gamma >= 0) & (beta + gamma <= 1)
 
 
 def shadowed_sum(

@@ -30,7 +30,7 @@ from tests.cluster.edge import SETTINGS as EDGE
 from tests.cluster.edge import receivers, square_light
 from tests.cluster.edge import scene as edge_scene
 from tests.literal.whole import val as literal
-from tests.naive import truth
+from tests.naive.crossings import corners_of, free
 
 # nothing near six large clusters, so that rays to a rectangle and one view from its centre meet the same surfaces
 SETTINGS = of(ValSettings, lights=200, clusters_count=6, maps_resolution=128, near_geometry="planes", near_distance=1.0)
@@ -66,7 +66,7 @@ def height_above(areas, m, points):
 def test_one_point_of_the_rectangle_is_a_ray_against_every_triangle(box, evidence):
     frame, _, areas, points, facing = box
     settings = replaced(SETTINGS, {"near_geometry": "keep", "behind": "raytrace"})
-    given, geometry = rectangle_rays(frame, areas, settings.maps, points=1), frame.scene.geometry
+    given, corners = rectangle_rays(frame, areas, settings.maps, points=1), corners_of(frame.scene.geometry)
     rng = np.random.default_rng(2)
     wrong, blocked = 0, 0
     for _ in range(PAIRS):
@@ -74,12 +74,12 @@ def test_one_point_of_the_rectangle_is_a_ray_against_every_triangle(box, evidenc
         q = rectangle_points(areas, m, np.full((2, 1), 0.5))[:, 0]
         side = np.sign(height_above(areas, m, points[:, i : i + 1])[0])
         if (q - points[:, i]) @ facing[:, i] <= 0:
-            free = True  # below the receiver's surface: does not count
+            seen = True  # below the receiver's surface: does not count
         else:
             start, end = points[:, i] + 1e-6 * facing[:, i], q + 1e-6 * side * areas.normal[:, m]
-            free = truth.nearest_hit(geometry.vertices, geometry.faces, start, end - start)[1] > 1
-        wrong += given(m, points[:, i : i + 1], facing[:, i : i + 1])[0] != free
-        blocked += not free
+            seen = free(corners, start[None], end[None])[0]
+        wrong += given(m, points[:, i : i + 1], facing[:, i : i + 1])[0] != seen
+        blocked += not seen
     evidence(f"{wrong} of {PAIRS} random rays to rectangles differ from a ray against every triangle; {blocked} are "
              "blocked")
     assert wrong == 0

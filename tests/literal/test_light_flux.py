@@ -7,8 +7,8 @@ import pytest
 
 from refgi.literal.light_flux import reflected_flux, solid_angle, spot_integral, spot_share, texel_sides
 from refgi.rsm.raster.projection import cube_projection, view_frame
+from tests.naive.radiometry import solid_angle_of_rectangle
 from tests.naive.raster import perspective_density
-from tests.naive.raster import solid_angle as by_quadrature
 
 FLOOR = {"vertices": np.array([[-9.0, 0, -9], [9, 0, -9], [0, 0, 9]]), "faces": np.array([[0, 1, 2]]),
          "material_of_face": np.array([0]), "diffuse": np.array([[0.5, 0.25, 1.0]]),
@@ -20,7 +20,7 @@ def test_six_faces_of_a_cube_are_a_sphere():
     angle = solid_angle(*texel_sides(np.ones(2), 6, 5, 7))
     assert angle.sum() == pytest.approx(4 * math.pi, rel=1e-14)
     x0, x1, y0, y1 = (side[1, 2] for side in texel_sides(np.ones(2), 1, 5, 7))
-    assert angle[1, 2] == pytest.approx(by_quadrature(perspective_density, x0, x1, y0, y1))
+    assert angle[1, 2] == pytest.approx(solid_angle_of_rectangle(perspective_density, x0, x1, y0, y1))
 
 
 @pytest.mark.parametrize("falloff", SHAPES)

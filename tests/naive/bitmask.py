@@ -107,16 +107,3 @@ def height(here, normal, there):
     if a <= 0:
         return 0.0
     return a / (a + abs(b)) if b >= 0 else 2 - a / (a + abs(b))
-
-
-def blocked_by_triangles(corners, start, end, margin):
-    """Whether a triangle (k, 3, 3) crosses the segment between `margin` and 1 - `margin` of its length."""
-    d = end - start
-    for a, b, c in corners:
-        matrix = np.stack([-d, b - a, c - a], axis=1)
-        if abs(np.linalg.det(matrix)) < 1e-14:
-            continue
-        t, u, v = np.linalg.solve(matrix, start - a)
-        if margin < t < 1 - margin and u >= 0 and v >= 0 and u + v <= 1:
-            return True
-    return False

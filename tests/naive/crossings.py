@@ -26,6 +26,12 @@ def crossings(corners, starts, directions):
     return far
 
 
+def nearest(corners, starts, directions):
+    """Return triangles, -1 for none, and distances of the nearest hits of rays, (R,) each."""
+    far = crossings(corners, starts, directions)
+    return np.where(np.isfinite(far).any(axis=1), far.argmin(axis=1), -1), far.min(axis=1)
+
+
 def free(corners, starts, ends, most=1.0):
     """Tell between which places, off their surfaces, nothing lies within the share `most` of the way."""
     t = crossings(corners, starts, ends - starts)

@@ -4,12 +4,8 @@ import math
 
 import numpy as np
 
+from refgi.literal.light_flux import solid_angle
 from refgi.literal.pairs import lobe_intensity, pair
-
-
-def corner(x, y):
-    """Solid angle of the rectangle [0, x] x [0, y] on the plane z = 1."""
-    return math.atan2(x * y, math.sqrt(1 + x * x + y * y))
 
 
 def pixel_solid_angle(camera, width, height, i, j):
@@ -17,7 +13,7 @@ def pixel_solid_angle(camera, width, height, i, j):
     half = math.tan(camera.vfov / 2)
     y0, y1 = ((2 * k / height - 1) * half for k in (i, i + 1))
     x0, x1 = ((2 * k / width - 1) * half * width / height for k in (j, j + 1))
-    return corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0)
+    return float(solid_angle(x0, x1, y0, y1))
 
 
 def area(camera, width, height, i, j, position, triangle):

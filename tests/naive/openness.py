@@ -9,8 +9,8 @@ from functools import cache
 
 import numpy as np
 
+from tests.naive.crossings import corners_of, nearest
 from tests.naive.draws import mix32
-from tests.naive.truth import nearest_hits
 
 WORD = 2**32
 LIFT = 1e-8  # m: a ray starts this far off its surface
@@ -20,7 +20,7 @@ def openness(geometry, position, normal, index, radius, rays, seed):
     """Return the share of free rays of points (n, 3), each with the index that its draws have."""
     directions = [directions_of(up, int(i), rays, seed) for up, i in zip(normal, index, strict=True)]
     starts = np.repeat(position + LIFT * normal, rays, axis=0)
-    _, far = nearest_hits(geometry.vertices, geometry.faces, starts, np.reshape(directions, (-1, 3)))
+    _, far = nearest(corners_of(geometry), starts, np.reshape(directions, (-1, 3)))
     return (far > radius).reshape(-1, rays).mean(axis=1)
 
 

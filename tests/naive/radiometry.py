@@ -5,6 +5,8 @@ from functools import cache
 
 import numpy as np
 
+from refgi.literal.pairs import lobe_share
+
 gauss_legendre = cache(np.polynomial.legendre.leggauss)
 
 
@@ -17,29 +19,6 @@ def solid_angle_of_rectangle(density, x0, x1, y0, y1, nodes=64):
 
 
 @cache
-def lobe_fraction(theta, exponent, nodes=400):
+def lobe_fraction(theta, exponent):
     """Share of the integral of cos^P over the half space of the lobe that lies above a surface tilted by theta."""
-    return float(lobe_fractions(theta, np.array([exponent]), nodes)[0])
-
-
-def lobe_fractions(theta, exponents, nodes=400):
-    """`lobe_fraction` of several exponents P.
-
-    Polar coordinates around the lobe's axis: at angle a off it, the circle lies above the surface for the azimuths
-    with cos(theta) cos(a) + sin(theta) sin(a) cos(phi) > 0. The integrand bends at a = pi/2 - theta, where the
-    circle first dips below; sin substitutions on both pieces take the square root out of it.
-    """
-    x, w = gauss_legendre(nodes)
-    turn = 0.5 * math.pi * (x + 1)
-    weights = 0.5 * math.pi * w
-    edge = math.pi / 2 - theta
-    total = np.zeros(len(exponents))
-    for low, high in ((0.0, edge), (abs(edge), math.pi / 2)):  # an axis below the surface: nothing up to -edge
-        a = low + (high - low) * 0.5 * (1 - np.cos(turn))
-        da = (high - low) * 0.5 * np.sin(turn) * weights
-        if high <= low:
-            continue
-        cosine = -math.cos(theta) * np.cos(a) / np.maximum(math.sin(theta) * np.sin(a), 1e-300)
-        azimuth = 2 * np.arccos(np.clip(cosine, -1, 1))
-        total += (azimuth * np.cos(a) ** np.reshape(exponents, (-1, 1)) * np.sin(a) * da).sum(axis=1)
-    return total * (np.asarray(exponents) + 1) / (2 * math.pi)
+    return float(lobe_share(np.array(math.cos(theta)), exponent))

@@ -1,9 +1,10 @@
 """Slow literal twin of the rasterizer: one ray per texel, every triangle tried; and what a ray finds there."""
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from refgi.literal.light_flux import spot_share
 
 
 def look(forward, up):
@@ -91,17 +92,6 @@ def attributes(direction, hit, vertices, faces, normals=None):
     return position, normal, t * np.linalg.norm(direction)
 
 
-def solid_angle(density, x0, x1, y0, y1, n=24):
-    """Gauss-Legendre quadrature of a density of solid angle over a rectangle of the image plane."""
-    nodes, weights = np.polynomial.legendre.leggauss(n)
-    x, y = (x0 + x1 + (x1 - x0) * nodes) / 2, (y0 + y1 + (y1 - y0) * nodes) / 2
-    total = 0.0
-    for i in range(n):
-        for j in range(n):
-            total += weights[i] * weights[j] * density(x[i], y[j])
-    return total * (x1 - x0) * (y1 - y0) / 4
-
-
 def perspective_density(x, y):
     return (1 + x * x + y * y) ** -1.5
 
@@ -110,26 +100,15 @@ def paraboloid_density(u, v):
     return 4 / (1 + u * u + v * v) ** 2
 
 
-def falloff(cos_angle, cos_inner, cos_outer):
-    """Smoothstep of the scene files."""
-    if cos_inner == cos_outer:
-        return 1.0 if cos_angle >= cos_inner else 0.0
-    t = min(max((cos_angle - cos_outer) / (cos_inner - cos_outer), 0.0), 1.0)
-    return t * t * (3 - 2 * t)
-
-
-def spot_texel(cosine, density, x0, x1, y0, y1, cos_inner, cos_outer, n=200):
+def spot_texel(cosine, density, x0, x1, y0, y1, inner, outer, n=200):
     """Midpoint sum of the falloff over a texel, n x n samples."""
-    total = 0.0
-    for i in range(n):
-        for j in range(n):
-            x, y = x0 + (x1 - x0) * (i + 0.5) / n, y0 + (y1 - y0) * (j + 0.5) / n
-            total += density(x, y) * falloff(cosine(x, y), cos_inner, cos_outer)
-    return total * (x1 - x0) * (y1 - y0) / n**2
+    middle = (np.arange(n) + 0.5) / n
+    x, y = x0 + (x1 - x0) * middle[:, None], y0 + (y1 - y0) * middle
+    return (density(x, y) * spot_share(cosine(x, y), inner, outer)).mean() * (x1 - x0) * (y1 - y0)
 
 
 def perspective_cosine(x, y):
-    return 1 / math.sqrt(1 + x * x + y * y)
+    return (1 + x * x + y * y) ** -0.5
 
 
 def paraboloid_cosine(u, v):

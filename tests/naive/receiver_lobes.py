@@ -12,9 +12,8 @@ import numpy as np
 from refgi.literal.light_flux import spot_share
 from tests.literal.whole.pairs import irradiance_of
 from tests.literal.whole.vpl import sender_faces
-from tests.naive.crossings import LIFT, corners_of, crossings, face_normals, free
+from tests.naive.crossings import LIFT, corners_of, crossings, face_normals, free, nearest
 from tests.naive.radiometry import gauss_legendre, lobe_fraction
-from tests.naive.truth import nearest_hits
 
 
 def unit(vectors):
@@ -159,8 +158,7 @@ def _around(axis, exponent, count, random):
 def _radiance(scene, origin, w, light):
     """Return the radiance (n, 3) of diffuse surfaces along rays: rho / pi I <g.l> / d^2 with the light's shadow."""
     geometry = scene.geometry
-    triangle, far = nearest_hits(np.asarray(geometry.vertices, float), geometry.faces, np.broadcast_to(origin, w.shape),
-                                 w)
+    triangle, far = nearest(corners_of(geometry), origin, w)
     result, hit = np.zeros((len(w), 3)), triangle >= 0
     y, triangle = (origin + far[hit, None] * w[hit]), triangle[hit]
     g = face_normals(geometry, triangle, -w[hit])

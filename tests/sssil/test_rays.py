@@ -15,6 +15,7 @@ from refgi.sssil.pattern import samples_at
 from refgi.sssil.rays import Surfels, Traced, _transfer, add_unoccluded, ray_gather
 from refgi.sssil.settings import HssilSettings
 from tests.naive import bitmask as naive
+from tests.naive.crossings import corners_of, free
 
 WHITE = Material("white", (0.6, 0.6, 0.6))
 ROUNDING = 1e-12  # float64 sums of some 20 terms of like sign
@@ -67,11 +68,12 @@ def twin(level, settings, frame=None):
         return naive.light(level._asdict(), around(level, 0, settings), settings.senders.form_factor,
                            share=settings.senders.disc_share)
     geometry, eye = frame.scene.geometry, np.asarray(frame.scene.camera.eye)
-    corners = geometry.vertices[geometry.faces]
+    corners = corners_of(geometry)
 
     def see(receiver, sender):
-        ends = (level.position[:, *texel] + eye for texel in (receiver, sender))
-        return float(not naive.blocked_by_triangles(corners, *ends, MARGIN))
+        start, end = (level.position[:, *texel] + eye for texel in (receiver, sender))
+        margin = MARGIN * (end - start)
+        return float(free(corners, (start + margin)[None], (end - margin)[None])[0])
 
     return naive.light(level._asdict(), around(level, 0, settings), settings.senders.form_factor, see,
                        settings.senders.disc_share)

@@ -1,16 +1,19 @@
-"""One-bounce light whose value is known in closed form, and a slow twin where it is not."""
+"""One-bounce light whose value is known in closed form, and the literal text where it is not."""
 
 import math
 
 import numpy as np
 import pytest
 
+from refgi.literal.truth import path_traced
 from refgi.rays import Tracer
 from refgi.scene import DirectionalLight, Geometry, Material, PointLight, Scene, SpotLight
+from refgi.scene.material import material_table
 from refgi.truth import TruthSettings
+from refgi.truth.steps import lamps_of
 from refgi.truth.truth import accumulate
 from tests.form_factors import polygon_form_factor
-from tests.naive.truth import one_bounce, truncated_series
+from tests.naive.truth import truncated_series
 from tests.truth.scenes import CAMERA, at, corner_room, floor, receivers_in_corner, rectangle, scene, spot_down
 
 ESTIMATORS = ["combined", pytest.param("hemisphere", marks=pytest.mark.slow),
@@ -163,20 +166,27 @@ def test_estimators_agree_without_visibility(evidence):
 
 
 @pytest.mark.feature("REF-03")
-@pytest.mark.slow("True-smoothstep")
 @pytest.mark.parametrize(("blocked", "falloff"), [(True, "smoothstep"), (False, "smoothstep"), (True, "squared_ramp")])
-def test_the_naive_twin(blocked, falloff, evidence):
+def test_the_literal_text_agrees(blocked, falloff, evidence):
     spot = SpotLight((0.5, 1.5, 0.6), (-0.6, -0.8, -0.7), 0.3, 0.6, (2.0, 1.5, 1.0), falloff)
     room = corner_room(spot)
-    points, normals, triangles = receivers_in_corner(4)
-    albedo = np.array([m.diffuse for m in room.materials])[room.geometry.material_of_face]
-    worst, own = 0.0, {"squared_ramp": slice(1, 2)}.get(falloff, slice(1, None, 2))  # away from edges
-    for x, n, triangle in zip(points[own], normals[own], triangles[own], strict=True):
-        expected = one_bounce(room.geometry.vertices, room.geometry.faces, albedo, spot, x, n, 72, blocked)
-        result = at(room, [x], [n], TruthSettings(samples=480, visibility=blocked), triangle=triangle, repeat=64)
-        worst = max(worst, np.abs(result.picture_mean / expected - 1).max())
-    assert worst < 0.01  # the midpoint rule of the twin: 72 cells a side leave about 0.5 % at edges (48: 1.5 %)
-    evidence(f"visibility={blocked}, {falloff}: within {worst:.1e} of the twin")
+    points, normals, triangles = (one[1::2] for one in receivers_in_corner(6))  # away from edges
+    x, n = (one.T[:, None] for one in (points, normals))
+    mesh = room.geometry.vertices, room.geometry.faces, room.geometry.material_of_face, None
+    xi = (np.mgrid[:64, :64].reshape(2, -1).repeat(2, axis=1)[..., None, None] + np.random.default_rng(6).random(
+        (1, 2, 2 * 64**2, 1, len(points)))) / 64
+    mean, variance, _ = path_traced(x, n, triangles[None], xi, mesh, material_table(room.materials)[:3],
+                                    lamps_of((spot,)), (falloff,), blocked)
+    worst, error = 0.0, np.sqrt(variance[:, 0] / mean[:, 0] ** 2).max()
+    for k, triangle in enumerate(triangles):
+        result = at(room, [points[k]], [normals[k]], TruthSettings(samples=480, visibility=blocked), triangle=triangle,
+                    repeat=64)
+        off = np.abs(result.picture_mean - mean[:, 0, k])
+        worst = max(worst, (off / np.sqrt(result.picture_variance + variance[:, 0, k])).max())
+    assert error < 0.02
+    assert worst < SIGMAS
+    evidence(f"visibility={blocked}, {falloff}: within {worst:.1f} standard errors of the literal text, which has "
+             f"{error:.1%} at most")
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)

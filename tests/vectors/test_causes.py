@@ -1,5 +1,7 @@
 """Each hypothesis names its bug on an array that has it, and nothing is blamed on a bug that is not there."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -172,6 +174,6 @@ def test_a_hypothesis_is_as_good_as_its_weaker_side(told, wrong, share):
     expected = np.arange(1, 1001, dtype=np.float64)
     ranks = np.arange(1000)
     got = expected * np.where(ranks < 10 - wrong, 2, np.where(ranks < 10, 3, 1))
-    difference = Difference("x", None, expected, got, ranks < 10, np.full(1000, 1e-3))
+    difference = Difference("x", SimpleNamespace(tier="T1"), expected, got, ranks < 10, np.full(1000, 1e-3))
     predicted = np.where(ranks < told, 2, 1) * expected
     assert explained(difference, predicted) == pytest.approx(share)

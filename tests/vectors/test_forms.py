@@ -13,8 +13,7 @@ from refgi.vectors.spec import kind_of, stored
 from tests.vectors.literal_port import form_of, written
 
 QUICK = tuple(kit_cases("quick"))
-WITHOUT_FORM = {"truth.path_traced": "random paths, judged by standard errors",
-                "cluster.traced_share": "what Embree answers of rays to points of a rectangle",
+WITHOUT_FORM = {"cluster.traced_share": "what Embree answers of rays to points of a rectangle",
                 "sssil.senders": "drawn by numbers that are hashes of pixels, made inside"}
 
 

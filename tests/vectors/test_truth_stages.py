@@ -1,22 +1,29 @@
-"""Statistical and oracle tests of the kit's path-traced truth: another estimate agrees, likely bugs do not."""
+"""Statistical and oracle tests of the kit's path-traced truth: others agree, likely bugs do not and are named."""
+
+import dataclasses
 
 import numpy as np
 import pytest
 
 from refgi.frame import Frame
+from refgi.literal import truth
 from refgi.settings import of
 from refgi.truth.settings import TruthSettings
 from refgi.truth.truth import trace_truth
 from refgi.vectors.cases.visibility import TRUTH, TRUTH_FULL, truth_settings
-from tests.naive.truth import one_bounce
-from tests.vectors.made import made
+from refgi.vectors.check import stage_of_array
+from refgi.vectors.forms.truth import CELLS
+from refgi.vectors.rows import edited, rows
+from refgi.vectors.spec import as_read, outputs_of, stored
+from tests.vectors.literal_port import form_of
+from tests.vectors.made import made, stage_of
 
-NAMES = tuple(f"truth.path_traced.{one}" for one in ("mean", "variance_of_mean", "samples"))
+STAGE = "truth.path_traced"
+NAMES = tuple(f"{STAGE}.{one}" for one in ("mean", "variance_of_mean", "samples"))
 PLANS = {name: plan() for name, plan in {**TRUTH, **TRUTH_FULL}.items()}
 AGREE = 2.0  # mean square of standardised differences: 1; to 1.7 where lobes are met by chance, which has heavy tails
 DIFFER = 5.0  # a bug stands out
 SAME = 0.1  # the same random numbers: paths differ by the rounding of receivers alone
-CELLS, QUADRATURE = 32, 0.03  # of the light's cone along a side; what their midpoint rule is off by, of the mean
 
 
 def frame_of(name):
@@ -60,22 +67,31 @@ def test_another_estimator_agrees(name):
     assert 0.5 < against(known, trace_truth(frame_of(name), other)) < AGREE
 
 
-@pytest.mark.slow
-def test_a_sum_over_the_light_s_cone_agrees():
-    """The twin: a midpoint rule over directions of the lamp, each ray against every triangle."""
-    known = made("truth-matte")[1]
-    light = PLANS["truth-matte"].scene.lights[0]
-    arrays = {key: array.astype(float) if array.dtype.kind == "f" else array for key, array in known.items()}
-    albedo = arrays["materials.diffuse"][arrays["scene.material_of_face"]]
-    pixels = np.argwhere(arrays["rsm.visible_triangles"] >= 0)[3::30]
-    apart = []
-    for at in (tuple(pixel) for pixel in pixels):
-        exact = one_bounce(arrays["scene.vertices"], arrays["scene.faces"], albedo, light,
-                           arrays["rsm.surface.position"][:, *at], arrays["rsm.surface.normal"][:, *at], CELLS)
-        error = arrays[NAMES[1]][:, *at] + (QUADRATURE * known[NAMES[0]].mean()) ** 2
-        apart.append((arrays[NAMES[0]][:, *at] - exact) ** 2 / error)
-    assert len(apart) >= 4
-    assert np.mean(apart) < AGREE
+@pytest.mark.slow("truth-two-bounces")
+@pytest.mark.parametrize("name", PLANS)
+def test_the_literal_text_agrees(name):
+    """Every ray against every triangle, other random numbers."""
+    known, step = made(name)[1], stage_of(name, STAGE)
+    got = outputs_of(step, known, np.float64, form_of(step))
+    assert 0.5 < deviation(*(one[array] for one in (known, got) for array in NAMES[:2])) < AGREE
+
+
+def test_likely_bugs_of_a_port_with_random_numbers_of_its_own_are_named(kit):
+    step = stage_of("truth-matte", STAGE)
+    read, form = as_read(made("truth-matte")[1], step.reads, np.float64), form_of(step)
+    cells = np.floor(form.numbers["xi"] * CELLS)
+    xi = (cells + np.random.default_rng(3).random(cells.shape)) / CELLS
+    named, unnamed = [], []
+    for row in rows(truth.__name__):
+        if row.cause in {bug.cause for bug in step.bugs}:
+            port = dataclasses.replace(form, numbers={**form.numbers, "xi": xi}, function=edited(
+                form.function, row.edits))
+            verdict = stage_of_array(kit, "truth-matte", NAMES[0], stored(port(read, None)[NAMES[0]]))
+            said = [one.cause for one in verdict.causes]
+            (named if said[:1] == [row.cause] else unnamed).append(row.cause)
+            assert not any("rounding" in one for one in said)
+    assert len(named) > 15
+    assert unnamed == [cause for cause in unnamed if cause.startswith("back faces are dark")]  # as little as the noise
 
 
 def test_values_without_an_error_must_be_equal():

@@ -1,104 +1,70 @@
-"""Literal forms of stages of pixel lights with visibility, and likely bugs of the ground truth.
-
-That is an estimate without a literal form: it is traced again with each of them.
-"""
+"""Literal forms of stages of pixel lights with visibility, and of the ground truth, with random numbers of its own."""
 
 import functools
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from refgi.literal import imperfect, vpl
-from refgi.settings import flat, replaced
-from refgi.types import Array
+from refgi.literal import imperfect, truth, vpl
+from refgi.rsm.raster.projection import camera_projection
+from refgi.scene import PointLight, SpotLight
+from refgi.settings import flat
 from refgi.vectors.forms.beside import Arguments, Described, Names, alone, form_of, own
-from refgi.vectors.leaves import run_of
-from refgi.vectors.spec import Arrays, Bug, Change, Run, reading, writing
+from refgi.vectors.rows import Form
+from refgi.vectors.spec import Arrays, Run
 
 RADIOMETRY = "docs/radiometry: E = integral of L cos over the hemisphere, L = albedo/pi of the direct irradiance there"
 ESTIMATE = {"tier": "T3", "paper": RADIOMETRY}
 
 
+CELLS = 20  # along a side of the unit square, of random numbers in pairs
+
+
 def _path_traced(arguments: Arguments) -> Described:
     facts = {key: value for key, value in flat(arguments["settings"]).items()
              if isinstance(value, bool | int | float | str)}
-    return Described(exact=("scene.geometry.vertices", "position"), paper=RADIOMETRY, facts=facts,
+    form = _paths(arguments)
+    lists = () if form is None else ("light", *_rows_of(form, arguments))
+    return Described(form, own(*lists), exact=("scene.geometry.vertices", "position"), paper=RADIOMETRY, facts=facts,
                      specs={"mean": ESTIMATE, "variance_of_mean": {**ESTIMATE, "unit": "(W/m^2)^2", "axes": (
-                         "rgb, row, column"), "space": "linear RGB"}, "samples": {"tier": "T3"}},
-                     bugs=(functools.partial(of_light, arguments), functools.partial(of_settings, arguments)))
+                         "rgb, row, column"), "space": "linear RGB"}, "samples": {"tier": "T3"}})
 
 
-def of_light(arguments: Arguments, stage: Run, reads: Names, writes: Names) -> tuple[Bug, ...]:
-    """Return bugs of what surfaces send and receive."""
-    mean, stage = writes["mean"], _once(stage)
-
-    def by(**changes: Change) -> Run:
-        return reading(stage, **{reads[leaf.replace("__", ".")].replace(".", "__"): change
-                                 for leaf, change in changes.items()})
-
-    def scaled(factor: float) -> Run:
-        return writing(stage, **{mean.replace(".", "__"): lambda a: a * factor,
-                                 writes["variance_of_mean"].replace(".", "__"): lambda a: a * factor**2})
-
-    def with_direct(arrays: Arrays, real: Any) -> Arrays:
-        made = dict(stage(arrays, real))
-        return {**made, mean: made[mean] + _direct(arguments)}
-
-    bugs = [
-        Bug("the emitter's radiance lacks 1/pi", scaled(np.pi), RADIOMETRY),
-        Bug("irradiance is divided by pi", scaled(1 / np.pi), "E excludes the receiver's albedo/pi"),
-        Bug("lights are twice as bright", scaled(2.0), RADIOMETRY),
-        Bug("the emitter's albedo is left out", by(materials__diffuse=np.ones_like, materials__specular=np.zeros_like),
-            RADIOMETRY),
-        Bug("direct light is added", with_direct, "one bounce alone"),
-        Bug("the receiver's normal points inwards", by(normal=lambda a: -a), RADIOMETRY)]
-    if np.any(arguments["materials"].specular > 0):
-        bugs.append(Bug("lobes are missing", by(materials__specular=np.zeros_like), "SII Eq. 3"))
-    count = len(arguments["lights"].intensity)
-    if count > 1:
-        bugs.append(Bug("the last light is left out", by(
-            lights__intensity=lambda a: a * (np.arange(count) < count - 1)[:, None]), "all lights"))
-    return tuple(bugs)
+def _rows_of(form: Form, arguments: Arguments) -> Iterator[str]:
+    """Yield the lists of rows of what a scene has and settings ask for."""
+    kinds, bounces = form.numbers["kinds"], len(form.numbers["xi"])
+    yield "bounces" if bounces > 1 else "once" if form.numbers["blocked"] else "open"
+    for name, has in {"near": set(kinds) != {"directional"}, "spot": set(kinds) - {"directional", "point"},
+                      "lamps": len(kinds) > 1, "glossy": np.any(arguments["materials"].specular > 0),
+                      "blocked": form.numbers["blocked"] and bounces == 1,
+                      "seen": form.numbers["camera"] is not None}.items():
+        if has:
+            yield name
 
 
-def _once(stage: Run) -> Run:
-    """Return a stage that runs once on the same arrays, the very objects."""
-    last: list[tuple[Arrays, Arrays]] = []
-
-    def run(arrays: Arrays, real: Any) -> Arrays:
-        if not last or any(last[0][0].get(name) is not array for name, array in arrays.items()):
-            last[:] = [(arrays, stage(arrays, real))]
-        return last[0][1]
-
-    return run
-
-
-def of_settings(arguments: Arguments, _: Run, reads: Names, writes: Names) -> tuple[Bug, ...]:
-    """Return bugs of how many bounces there are, and of what emits and blocks."""
-    from refgi.truth.steps import path_traced as traced
-
-    settings = arguments["settings"]
-
-    def changed(**values: Any) -> Run:
-        other = {**arguments, "settings": replaced(settings, values)}
-        return run_of(traced.__wrapped__, other, reads, writes)  # type: ignore[attr-defined]
-
-    if settings.bounces > 1:
-        bugs = [Bug("one bounce less", changed(bounces=settings.bounces - 1), "number of bounces: a fact")]
-    elif settings.visibility and settings.emitters == "all":
-        bugs = [Bug("one bounce more", changed(bounces=2), "number of bounces: a fact of the case")]
-    else:
-        bugs = [Bug("all surfaces emit and block", changed(visibility=True, emitters="all"), "facts of the case")]
-    if settings.visibility and settings.bounces == 1:
-        bugs.append(Bug("nothing blocks between emitter and receiver", changed(visibility=False), RADIOMETRY))
-    return tuple(bugs)
-
-
-def _direct(arguments: Arguments) -> Array:
-    from refgi.frame import Frame
-
-    rows, columns = arguments["triangle_id"].shape
-    return Frame(arguments["scene"], width=columns, height=rows, dtype=np.float64, shadows="exact").direct
+def _paths(arguments: Arguments) -> Form | None:
+    """Return the literal form with random numbers of its own; None of what it does not say."""
+    scene, settings, shape = arguments["scene"], arguments["settings"], arguments["triangle_id"].shape
+    geometry, materials = scene.geometry, arguments["materials"]
+    if (geometry.colours is not None or geometry.cut_outs is not None or settings.caustics or materials.textures
+            or np.any(materials.ior)):
+        return None
+    random = np.random.default_rng(settings.seed)
+    xi = random.random((settings.bounces, 2, 2 * CELLS**2, *shape))
+    cell = np.mgrid[:CELLS, :CELLS].reshape(2, -1).repeat(2, axis=1)
+    xi[0] = (cell[..., None, None] + xi[0]) / CELLS
+    view = camera_projection(scene.camera, *shape[::-1]) if settings.emitters == "visible" else None
+    kinds = tuple(one.falloff if isinstance(one, SpotLight) else "point" if isinstance(
+        one, PointLight) else "directional" for one in scene.lights)
+    mesh = *(f"scene.geometry.{one}" for one in ("vertices", "faces", "material_of_face")), (
+        None if geometry.vertex_normals is None else "scene.geometry.vertex_normals")
+    return Form(truth.path_traced, {
+        "position": "position", "normal": "normal", "triangle_id": "triangle_id", "mesh": mesh,
+        "materials": tuple(f"materials.{one}" for one in ("diffuse", "specular", "exponent")),
+        "lamps": tuple(f"lights.{one}" for one in ("position", "direction", "intensity", "half_angles"))},
+        ("mean", "variance_of_mean", "samples"), {"xi": xi, "kinds": kinds, "blocked": settings.visibility, "camera": (
+            None if view is None else (view.origin, view.frame, view.half))}, double=True)
 
 
 LIFT = 1e-3  # m: ports lift the ends of their rays off the surfaces by up to that; what it decides is masked

@@ -8,7 +8,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 # tests start many processes, which would compile all sources each time
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test quick test-for test-all check evidence bench stress mutate kit-score records docs clean
+.PHONY: demo test quick test-for test-all coverage check evidence bench stress mutate kit-score records docs clean
 
 demo: $(VENV)/run.stamp
 	$(BIN)/refgi compare cornell_box --methods sii,multires,val,hssil --out out/
@@ -27,6 +27,9 @@ test-all: $(VENV)/dev.stamp
 	$(PYTEST) --all
 	NUMBA_BOUNDSCHECK=1 $(PYTEST) tests/rsm tests/lights tests/pairs tests/splat tests/cluster tests/sssil
 	NUMBA_NUM_THREADS=1 $(PYTEST) tests/rsm tests/lights tests/pairs tests/splat tests/cluster tests/sssil tests/truth
+
+coverage: $(VENV)/dev.stamp
+	$(PYTEST) --cov=refgi --cov-report=term
 
 check: $(VENV)/dev.stamp
 	$(BIN)/ruff check .

@@ -1,8 +1,10 @@
 """Property tests of Frame: nothing is computed before it is asked for, and frames share what did not change."""
 
 import dataclasses
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,6 +32,24 @@ def scene():
 
 def ran(log):
     return {run.name for run in log.runs if run.status == "ran"}
+
+
+def test_what_the_page_on_new_methods_says_a_frame_offers_is_there_in_that_shape():
+    frame = Frame(load_scene("ring"), **SIZE)
+    map_of_light, = frame.rsms
+    sides = {"h": 32, "w": 48, "3": 3, "H": map_of_light.solid_angle.shape[0], "W": map_of_light.solid_angle.shape[1]}
+    page = (Path(__file__).parents[1] / "docs/new_method.md").read_text()
+    table = page.partition("## What a frame offers")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| (`.+?) \| ?(.*?) ?\| .*\|$", table, re.M)
+    assert len(rows) == 15
+    for names, shapes in rows:
+        of_map = "H" in shapes
+        printed = re.findall(r"\((.*?)\)", shapes)
+        for number, name in enumerate(re.findall(r"`(?:frame\.)?(\w+)[^`]*`", names)):
+            offered = next(one for one in (map_of_light if of_map else frame, frame.gbuffer) if hasattr(one, name))
+            if printed:
+                shape = printed[min(number, len(printed) - 1)]
+                assert getattr(offered, name).shape == tuple(sides[side] for side in shape.split(", ")), name
 
 
 def test_construction_computes_nothing(scene):

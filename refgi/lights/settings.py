@@ -7,10 +7,10 @@ from typing import Any, ClassVar, Literal, TypeVar
 from refgi.errors import expect
 from refgi.lights.walk import MOST_BOUNCES
 from refgi.method import Approximation
-from refgi.pairs.settings import LAST_SEED, AutoClamp, DiscClamp, PairSettings
+from refgi.pairs.settings import AutoClamp, DiscClamp, PairSettings
 from refgi.scene.material import SHARPEST
 from refgi.scene.values import LARGEST
-from refgi.settings import Settings, setting
+from refgi.settings import LAST_SEED, Settings, setting
 
 S = TypeVar("S", bound=Any)
 

@@ -8,7 +8,6 @@ from refgi.scene.values import LARGEST
 from refgi.settings import Settings, setting
 
 STRONGEST_CLAMP = 1e18  # m, 1/m^2 or 1: its square stays within float32
-LAST_SEED = 2**32 - 1
 LEAST_LIGHTS = 8192  # that lightcuts "auto" may cluster
 LARGEST_ERROR = "largest error of a receiver's sum over channels, as a share of it"
 

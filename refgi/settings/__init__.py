@@ -6,11 +6,12 @@ it has a dotted key, `lights.count` or `visibility.terms`, and the name of a cho
 stands for its most important value (`lights=1024`). `of` takes such keys in Python, with underscores for dots.
 """
 
-from refgi.settings.fields import Leaf, Settings, choices_of, leaves, schema, setting
+from refgi.settings.fields import LAST_SEED, Leaf, Settings, choices_of, leaves, schema, setting
 from refgi.settings.keys import changed, flat, of, replaced
 from refgi.settings.text import from_text, of_record
 
 __all__ = [
+    "LAST_SEED",
     "Leaf",
     "Settings",
     "changed",

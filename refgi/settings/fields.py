@@ -14,6 +14,8 @@ import numpy as np
 
 from refgi.errors import expect
 
+LAST_SEED = 2**32 - 1  # of whatever draws numbers
+
 
 def setting(
     default: Any, about: str, *, least: float | None = None, most: float | None = None, above: float | None = None,

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 from refgi.errors import expect
 from refgi.scene.model import Camera
-from refgi.settings import Settings, setting
+from refgi.settings import LAST_SEED, Settings, setting
 
 Start = Literal["full", "half", "quarter"]
 Pattern = Literal["interleaved", "row", "pixel", "fixed", "all"]
@@ -18,7 +18,6 @@ Form = Literal["recursive", "printed"]
 Fetch = Literal["bilinear", "nearest"]
 
 FIRST_LEVEL = {"full": 0, "half": 1, "quarter": 2}
-LAST_SEED = 2**32 - 1
 MOST_LEVELS, MOST_SAMPLES, MOST_SLICES, MOST_CAMERAS = 16, 1 << 16, 256, 16
 MOST_CLAMP_RADIUS = 64
 LARGEST_WINDOW, LARGEST_TILE = 16, 16

@@ -9,9 +9,9 @@ from refgi.diagnostics import FrameSession
 from refgi.errors import expect
 from refgi.frame import Frame
 from refgi.scene.model import Scene
-from refgi.settings import flat, replaced
+from refgi.settings import LAST_SEED, flat, replaced
 from refgi.sssil.hssil import hssil, hssil_lobes
-from refgi.sssil.settings import LAST_SEED, HssilSettings, TemporalSettings
+from refgi.sssil.settings import HssilSettings, TemporalSettings
 from refgi.sssil.temporal_filter import Filtered, History, first_light, history_of, temporal_filter, with_frames
 from refgi.stages import Memory, reusing, sharing
 from refgi.types import Array

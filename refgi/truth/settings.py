@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from refgi.errors import expect
-from refgi.settings import Settings, setting
+from refgi.settings import LAST_SEED, Settings, setting
 
 Estimator = Literal["combined", "hemisphere", "light"]
 Emitters = Literal["all", "visible"]
@@ -39,7 +39,7 @@ class TruthSettings(Settings):
     visibility: bool = setting(True, "surfaces block light between emitter and receiver")
     emitters: Emitters = setting("all", "which surfaces emit: all, or those visible to the camera")
     caustics: bool = setting(False, "photons carry light through mirror-like lobes and glass")
-    seed: int = setting(0, "which random numbers", least=0, most=2**32 - 1)
+    seed: int = setting(0, "which random numbers", least=0, most=LAST_SEED)
     estimator: Estimator = setting("combined", "both estimators combined by MIS, or one alone", study=True)
     photons: int = setting(1 << 18, "photons of each light in a pass", least=1, most=2**28, study=True)
     light_grid: int = setting(32, "directions along one side of each light's grid", least=1, most=1024, study=True)

@@ -10,8 +10,8 @@ import pytest
 from refgi import stages
 from refgi.errors import InputError
 from refgi.scene import load_scene
-from refgi.settings import of, replaced
-from refgi.sssil.settings import LAST_SEED, HssilSettings
+from refgi.settings import LAST_SEED, of, replaced
+from refgi.sssil.settings import HssilSettings
 from refgi.sssil.temporal import Sequence, TemporalSettings
 
 QUICK = {"rsm_resolution": 8}

@@ -20,7 +20,7 @@ from refgi.pairs.sample import sample_pixels
 from refgi.pairs.tiles import clear, receiving
 from refgi.rsm.buffers.leaving import GlossyPoints, spread_over_picture
 from refgi.scene.values import LARGEST
-from refgi.settings import Settings, setting
+from refgi.settings import LAST_SEED, Settings, setting
 from refgi.splat.gather.gather_sum import (
     GatherMap,
     SimilarityLimits,
@@ -50,7 +50,7 @@ class DiscSettings(Settings):
 
     samples: int = setting(308, "texels in a disc", least=1, most=1 << 28)
     radius: float = setting(0.3, "of the disc; over sqrt 2: the whole map", above=0.0, most=WIDEST, unit="map widths")
-    seed: int = setting(0, "of a shift of the samples; 0: none", least=0)
+    seed: int = setting(0, "of a shift of the samples; 0: none", least=0, most=LAST_SEED)
     offset: float = setting(0.0, "how far texels are moved back along their normals", least=-LARGEST, most=LARGEST,
                             unit="m", study=True)
     as_published: frozenset[str] = setting(frozenset(), "forms of the weights to use as printed", study=True)

@@ -20,7 +20,6 @@ from refgi.lights.settings import (
 from refgi.method import Extent
 from refgi.pairs.lightcuts.tree import tree_bytes
 from refgi.pairs.settings import (
-    LAST_SEED,
     LEAST_LIGHTS,
     AutoLightcuts,
     GeometryClamp,
@@ -29,7 +28,7 @@ from refgi.pairs.settings import (
     SphereClamp,
 )
 from refgi.scene.values import LARGEST
-from refgi.settings import Settings, setting
+from refgi.settings import LAST_SEED, Settings, setting
 
 
 @dataclasses.dataclass(frozen=True)

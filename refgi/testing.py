@@ -10,7 +10,7 @@ import functools
 import hashlib
 import os
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from refgi.types import Array
 
 if TYPE_CHECKING:
     from refgi.scene import Scene
+    from refgi.sssil.settings import TemporalSettings
     from refgi.vectors.check import Kit
 
 KIT_FOLDER = "REFGI_KIT"  # environment variable: a kit to use in place of one made here
@@ -124,15 +125,15 @@ class StageData(Mapping[str, Array]):
 
 
 def stages(
-    scene: "Scene | str | Path", method: str = "sii", settings: Any = None, *, folder: str | Path, only: str = "",
-    **options: Any,
+    scene: "Scene | str | Path | Sequence[Scene]", method: str = "sii", settings: Any = None, *, folder: str | Path,
+    only: str = "", temporal: "TemporalSettings | None" = None, **options: Any,
 ) -> StageData:
     """Return what every stage of a method reads and writes on a scene, with the bounds of a port's arrays.
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        A scene, or what `refgi.scene.load_scene` takes.
+    scene : Scene, str, Path or sequence of Scene
+        A scene, or what `refgi.scene.load_scene` takes; the scenes of all frames up to the one that is asked for.
     method : str
         Short name of the method.
     settings : object, optional
@@ -141,6 +142,8 @@ def stages(
         Where the arrays are written: a kit, such as below pytest's `tmp_path_factory`.
     only : str
         Start of the names of stages to keep; all where empty.
+    temporal : TemporalSettings, optional
+        The filter that blends the last frame's light with that of those before; none where absent.
     **options : object
         As of `refgi.methods.render`: width, height, rsm_resolution, shadows.
 
@@ -152,10 +155,11 @@ def stages(
     from refgi.scene import load_scene
     from refgi.vectors.check import Kit
     from refgi.vectors.export import export_case
-    from refgi.vectors.recorded import recorded_case
+    from refgi.vectors.frames import frame_case
 
-    loaded = load_scene(scene) if isinstance(scene, str | Path) else scene
-    export_case(recorded_case(method, loaded, method, settings, only=only, **options), Path(folder))
+    one = load_scene(scene) if isinstance(scene, str | Path) else scene
+    scenes = one if isinstance(one, Sequence) else [one]
+    export_case(frame_case(method, scenes, method, settings, temporal, only=only, **options), Path(folder))
     return StageData(Kit(Path(folder)))
 
 

@@ -198,6 +198,7 @@ OPTIONS: Mapping[str, Mapping[str, Any]] = MappingProxyType({
     "kit": _option("Ready cases, where no SCENE is named.  [quick]", ["quick", "full"]),
     "case": _option("Of a kit: only cases whose id begins so."),
     "stage": _option("Of SCENE: only stages whose name begins so.", default="", metavar="NAME"),
+    "frame": _option("Of --frames: the number of the frame, from 0 on; the last where absent.", click.IntRange(0)),
     "most": _option("Of SCENE: refuse what would take more.", click.FloatRange(min=0, min_open=True), default=50.0,
                     metavar="MB"),
     # of other verbs

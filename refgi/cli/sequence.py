@@ -57,10 +57,10 @@ def _sequence(session: Session, asked: Asked) -> int:
     light = KeepingEstimate(find_method(method))
     settings = settings_for(method, asked.pairs, asked.seed, asked.preset)
     require_repeatable(settings)
-    temporal = _temporal(asked)
+    temporal = temporal_of(asked)
     frame_options = {"dtype": asked.dtype, "rsm_resolution": asked.rsm_resolution,
                      "shadows": asked.shadows or usual_shadows(settings)}
-    scene, way, frames = _scene_and_way(asked)
+    scene, way, frames = scene_and_way(asked, asked.frames)
     require_memory(scene, asked.dtype, asked.rsm_resolution, traced=method == "truth", settings={method: settings})
     record = {**scene_record(scene, frame_options, exposure=exposure), **method_record(method, settings),
               **path_record(asked.path, frames, temporal)}
@@ -194,7 +194,8 @@ def _history_after(sequence: "Sequence", scene: "Scene", files: FrameFiles, numb
     return history_of(frame, scene.geometry, with_frames(*files.light(number)))
 
 
-def _temporal(asked: Asked) -> "TemporalSettings | None":
+def temporal_of(asked: Asked) -> "TemporalSettings | None":
+    """Return the filter that the options ask for; none where they do not and the method has none of its own."""
     from refgi.cli.view import filter_for
     from refgi.errors import expect
 
@@ -204,8 +205,11 @@ def _temporal(asked: Asked) -> "TemporalSettings | None":
         [asked.method], asked.preset, pairs)
 
 
-def _scene_and_way(asked: Asked) -> "tuple[Scene, Way, int]":
-    """Return the scene as it is without the path, the path, and how many frames; all of them are usable."""
+def scene_and_way(asked: Asked, frames: int | None) -> "tuple[Scene, Way, int]":
+    """Return the scene as it is without the path, the path, and how many frames; all of them are usable.
+
+    `frames`: how many where it is not as the path says.
+    """
     from refgi.cli.view import scene_of
     from refgi.errors import blame, expect
     from refgi.scene.path import camera_and_lights
@@ -214,8 +218,8 @@ def _scene_and_way(asked: Asked) -> "tuple[Scene, Way, int]":
     scene = scene_of(asked)
     with blame(file=asked.path):
         way, own = read_path(asked.path, scene)
-    count = own if asked.frames is None else asked.frames
-    expect(count is not None, "--frames", f"how many, as {asked.path} does not say", "nothing")
+    count = own if frames is None else frames
+    expect(count is not None, "--frames", f"how many, as {asked.path} has no line such as frames = 24", "nothing")
     assert count is not None
     for frame in range(count):
         camera_and_lights(scene, way, frame, count)

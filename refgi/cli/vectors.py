@@ -1,6 +1,7 @@
 """`refgi vectors`: stage-by-stage test vectors for ports, and the check of a port's arrays against them."""
 
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,8 @@ from refgi.cli.session import Session, progress, say, table
 from refgi.vectors.options import OPTIONS
 
 if TYPE_CHECKING:
+    from refgi.scene import Scene
+    from refgi.sssil.temporal import TemporalSettings
     from refgi.vectors.manifest import KitManifest
 
 SMALL, MAP = (64, 48), 64  # size of a picture and side of a light's map, where nothing is said
@@ -23,14 +26,17 @@ def _vectors() -> None:
 
 
 @verb("export", "SCENE", "kit", "case", "method", "preset", "set", *SEEN, "shadows", "rsm-resolution", "seed", "stage",
-      "most", "out", SCENE={"required": False}, method="Of SCENE: short name of a method.",
+      "frames", "frame", "temporal", "no-temporal", "most", "out", SCENE={"required": False},
+      method="Of SCENE: short name of a method.",
+      frames={"to": "path", "type": str, "metavar": "PATH", "help": "Of SCENE: a frame along a path of camera, lights "
+              "and objects, a TOML file as `refgi sequence` reads it, with the light of the frames before."},
       rsm_resolution={"default": MAP, "help": "Texels along a side of a light's map."},
       out={"required": True, "help": "Folder of the kit; a kit there is replaced."})
 def _export(session: Session, asked: Asked) -> None:
     """Write arrays of every stage, bounds, likely bugs, scene, schemas, and how to read them.
 
     Of SCENE by a method with its settings, at 64x48 pixels unless --size says otherwise; without SCENE a kit of ready
-    cases of all methods.
+    cases of all methods. With --frames those of one frame of a sequence, its temporal filter among them.
     """
     out = Path(asked.out)
     with progress() as tell:
@@ -57,19 +63,34 @@ def _of_kit(asked: Asked, out: Path, tell: Any) -> "KitManifest":
 def _of_scene(asked: Asked, out: Path, tell: Any) -> "KitManifest":
     from refgi.cli.view import scene_of, settings_for, stem
     from refgi.vectors.export import export_case
-    from refgi.vectors.recorded import recorded_case
+    from refgi.vectors.frames import frame_case
 
     if asked.kit is not None or asked.case is not None:
         raise click.UsageError("--kit and --case say which ready cases; they take no SCENE")
     method = asked.method
     settings = settings_for(method, asked.pairs, asked.seed, asked.preset)
     asked.size = asked.size or SMALL
-    scene = scene_of(asked)
-    what = f"{method} of {scene.name}"
+    scenes, filtering, what = _frames(asked) if asked.path else ([scene_of(asked)], None, "")
+    what = f"{method} of {scenes[-1].name}{what}"
     tell(what, 0.0)
-    case = recorded_case(f"{method}-{stem(asked.scene)}", scene, method, settings, only=asked.stage, what=what,
-                         rsm_resolution=asked.rsm_resolution, shadows=asked.shadows)
+    case = frame_case(f"{method}-{stem(asked.scene)}", scenes, method, settings, filtering, only=asked.stage, what=what,
+                      rsm_resolution=asked.rsm_resolution, shadows=asked.shadows)
     return export_case(case, out, tell, asked.most * 1e6)
+
+
+def _frames(asked: Asked) -> "tuple[list[Scene], TemporalSettings | None, str]":
+    """Return the scenes of a path up to the frame that is asked for, the filter that blends them, and a remark."""
+    from refgi.cli.sequence import scene_and_way, temporal_of
+    from refgi.errors import expect
+    from refgi.scene.path import scenes_along
+
+    scene, way, count = scene_and_way(asked, None)
+    filtering, number = temporal_of(asked), count - 1 if asked.frame is None else asked.frame
+    expect(count > 1, "--frames", f"2 frames or more, of which {asked.path} says how many", count)
+    expect((filtering is not None) <= number < count, "--frame",
+           f"1 to {count - 1}, a frame that follows on others" if filtering else f"0 to {count - 1}", number)
+    alone = "" if filtering else " by itself: the frames before leave nothing to it; --temporal blends their light"
+    return [*islice(scenes_along(scene, way, count), number + 1)], filtering, f", frame {number} of {count}{alone}"
 
 
 _vectors.add_command(_export)

@@ -27,6 +27,7 @@ from refgi.vectors.manifest import (
     Result,
     StageEntry,
     StageVerdict,
+    Told,
     Tolerance,
     Verdict,
 )
@@ -54,6 +55,7 @@ WRONG = ("out", "invalid")
 FOLLOWS = "made from stages that are expected to fail"
 DOUBTED = "made from inputs in doubt: not judged are "
 OF_A_KIT = ("bounds", "cases", "scenes", "schema")  # folders beside the cases where a kit itself is checked
+WIRED = 0.95  # share of the differing elements from which on a wrong wiring counts: there are hundreds to choose from
 ORDER: tuple[Verdict, ...] = ("out", "invalid", "not-judged", "within", "exact", "not-run")
 
 
@@ -205,8 +207,8 @@ def _summed(
     worst: Verdict = next((verdict for verdict in ORDER if verdict in found), "within")
     manifests = {case.id: case for case in cases}
 
-    def tried(verdict: StageVerdict) -> set[str]:
-        return {bug.cause for bug in kit.bugs(manifests[verdict.case]).of(verdict.stage) if not bug.blind}
+    def tried(verdict: StageVerdict) -> dict[str, BugEntry]:
+        return {bug.cause: bug for bug in kit.bugs(manifests[verdict.case]).of(verdict.stage) if not bug.blind}
 
     wrong = findings(counted, tried)
     return Result(kit=kit.manifest.kit, vectors=kit.manifest.vectors, mode="chained" if asked.chained else "isolated",
@@ -390,6 +392,11 @@ def _refutes(kit: Kit, case: CaseManifest, bugs: Bugs, bug: BugEntry, name: str,
     return bool(np.mean(off > judged.limit.reshape(-1)[told.places]) > MOST_SPARED)
 
 
+def _reach(told: Told, difference: Difference) -> float:
+    """Return the share of what differs that a bug changes at most, by numbers of elements alone."""
+    return min(1.0, told.differing / np.count_nonzero(difference.out)) if told.differing else 1.0
+
+
 def _alike(values: Array) -> bool:
     """Return whether nearly all values are one."""
     counts = np.unique(values, return_counts=True)[1]
@@ -411,13 +418,15 @@ def _causes(
             continue
         told = {name: bugs.told(bug, name, one.expected) for name, one in differing.items() if name in bug.arrays}
         shares = [explained(differing[name], one.values, one.places) for name, one in told.items()]
+        shares += [_reach(one, differing[name]) for name, one in told.items() if bug.wired]
         other_shape = any(case.arrays[name].shape != shape for name, shape in bug.shapes.items() if name in shapes)
-        share = min(shares, default=0.0) if len(shares) == len(differing) else 0.0
+        share = min(shares, default=0.0) if len(told) == len(differing) else 0.0
         share = 1.0 if other_shape and not differing else share
+        if share < (WIRED if bug.wired else EXPLAINED):
+            continue
         if bug.wired and told and all(_alike(one.values) for one in told.values()):
             share = min(share, SEEN)  # all dark, say: many wirings lead there
-        if share >= EXPLAINED:
-            found.append(Cause(cause=bug.cause, share=share, paper=bug.paper))
+        found.append(Cause(cause=bug.cause, share=share, paper=bug.paper))
     factors = {**case.factors, **_ratios(kit, case)} if differing else {}
     own = {name: explain(one, factors, {other: kit.array(case, other) for other in case.arrays
                                         if case.arrays[other].shape == one.expected.shape})

@@ -43,7 +43,7 @@ from refgi.vectors.manifest import (
     text_of,
 )
 from refgi.vectors.rows import sharing
-from refgi.vectors.spec import Case, as_read, expected_of, stored
+from refgi.vectors.spec import Arrays, Case, as_read, axes_of, expected_of, kind_of
 from refgi.vectors.standalone import is_plain, standalone_text, write_scene
 from refgi.vectors.trials import Right, Trials, keep_bug
 from refgi.vectors.wiring import wirings
@@ -52,6 +52,7 @@ SEED = 20090101  # of the changes that bounds are measured by
 PARTS = 2  # of the bytes of an array that it takes with its bounds
 SHARED = "bounds"  # folder of bounds and masks, by their hashes: equal ones are kept once
 SECONDS_BETWEEN_LOOKS = 0.2
+LEVELS, LEAST_SIDE = 8, 8  # of a smaller picture that is proposed: levels of its arrays that are told, pixels
 Report = tuple[str, str, float]  # method, what runs, how many of its cases are done
 Written = tuple[list[KitEntry], dict[tuple[str, str], int]]
 
@@ -115,14 +116,48 @@ def export_case(case: Case, out: Path, tell: Tell = lambda _, __: None, most: fl
     InputError
         If it would take more, the folder holds something else, or the disk is full.
     """
-    sizes = {name: stored(array).nbytes for name, array in case.given.items()}
-    sizes |= {name: PARTS * array.nbytes for name, array in expected_of(case).items() if name not in case.given}
+    known = expected_of(case)
+    sizes = {name: array.nbytes * (1 if name in case.given else PARTS) for name, array in known.items()}
     if (taken := sum(sizes.values())) > most:
         largest = max(sizes, key=lambda name: sizes[name])
         raise InputError(f"{out}: expected a kit of at most {most / 1e6:g} MB, got {taken / 1e6:.3g} MB, of which "
-                         f"{sizes[largest] / 1e6:.3g} are {largest}: a smaller size or map (--size, --rsm-resolution, "
-                         "--set), fewer stages (--stage) or more room (--most)")
+                         f"{sizes[largest] / 1e6:.3g} are {largest}: a smaller size or map "
+                         f"({_smaller(case, known, sizes, most)}; --set), fewer stages (--stage) or more room (--most)")
     return _write_kit("scene", {case.id: lambda: case}, out, tell, whole=False)
+
+
+def _smaller(case: Case, known: Arrays, sizes: Mapping[str, int], most: float) -> str:
+    """Return options for sides of picture and maps, halved until a kit of arrays of such bytes fits, as far as known.
+
+    Arrays of rows and columns shrink with the picture, whose level they may be, or with the maps, all others stay.
+    """
+    camera = case.facts.get("camera", {"rows": 1, "columns": 1})
+    picture, maps = (camera["rows"], camera["columns"]), [
+        array.shape for name, array in known.items() if kind_of(name) == "rsm.map_triangles"] or [(1, 1)]
+    sides: dict[str, tuple[int, ...]] = {  # faces of a cube lie below each other
+        "--size": picture, "--rsm-resolution": (maps[0][1], maps[0][1])}
+    options = {_level(side, k): option for option, some in (("--rsm-resolution", maps), ("--size", [picture]))
+               for side in some for k in range(LEVELS)}
+    taken = dict.fromkeys((*sides, "no option"), 0.0)
+    for name, size in sizes.items():
+        axes = dict(zip(axes_of(case.specs[name].axes), known[name].shape, strict=False))
+        taken[options.get((axes.get("row", 0), axes.get("column", 0)), "no option")] += size
+    halved = set()
+    while sum(taken.values()) > most:
+        option = max(sides, key=lambda one: taken[one])
+        side, sides[option] = sides[option], _level(sides[option], 1)
+        taken[option] *= math.prod(sides[option]) / math.prod(side)
+        halved.add(option)
+        if min(sides[option]) < LEAST_SIDE:
+            return ", ".join(sides)
+    rest = [f"{option} {'x'.join(map(str, side[::-1][:1 + (option == '--size')]))}" for option, side in sides.items()
+            if option in halved]
+    return f"{' '.join(rest)} would take {sum(taken.values()) / 1e6:.3g} MB"
+
+
+def _level(side: tuple[int, ...], number: int) -> tuple[int, ...]:
+    """Return rows and columns halved some times, rounded up."""
+    return tuple(-(-one // 2**number) for one in side)
 
 
 def _write_kit(

@@ -19,7 +19,7 @@ import pydantic
 from refgi.errors import InputError, shortened
 from refgi.types import Array
 
-VERSION = "2.3.0"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
+VERSION = "2.3.1"  # of the vectors, apart from the program's: a patch adds cases or mends, a minor adds arrays to
 # a case, a major changes what an array means or its name
 LONGEST_LINE = 118  # characters of JSON
 KIT, CASE, RESULT = "kit.json", "manifest.json", "result.json"
@@ -225,6 +225,7 @@ def read_model(model: type[M], file: Path) -> M:
 BUGS = "bugs.npz"
 UNSEEN = 1 / 16  # of an element's bound
 MANTISSA = 23  # bits of float32
+HANDFUL = 7  # elements that must differ for a wrong wiring to stand before other causes
 
 
 class Piece(pydantic.BaseModel):
@@ -233,6 +234,7 @@ class Piece(pydantic.BaseModel):
     model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
     start: int
     count: int
+    differing: int = 0  # elements of the whole array that tell the bug; 0 in kits before 2.3.1
 
 
 class BugEntry(pydantic.BaseModel):
@@ -246,12 +248,18 @@ class BugEntry(pydantic.BaseModel):
     blind: bool = False  # this case cannot tell it from the right stage
     wired: bool = False  # a wrong wiring
 
+    @property
+    def by_chance(self) -> bool:
+        """Whether it is a wrong wiring that so few elements tell that others fit as well."""
+        return self.wired and 0 < sum(one.differing for one in self.arrays.values()) < HANDFUL
+
 
 class Told(NamedTuple):
     """What a bug makes of some elements of an array."""
 
     places: Array  # (n,) flat indices
     values: Array  # (n,) of the array's type
+    differing: int  # elements of the whole array that tell it
 
 
 class BugWriter:
@@ -271,8 +279,8 @@ class BugWriter:
     ) -> None:
         """Keep a bug; the pieces of its entry follow from what it tells. `limits`: bounds of all elements."""
         pieces = {}
-        for name, (places, values) in told.items():
-            pieces[name] = Piece(start=self._count, count=len(places))
+        for name, (places, values, differing) in told.items():
+            pieces[name] = Piece(start=self._count, count=len(places), differing=differing)
             self._places.append(places)
             self._bits.append(_words(values) ^ _words(expected[name].reshape(-1)[places]))
             floats = values.dtype.kind == "f"
@@ -313,11 +321,13 @@ class Bugs:
 
     def told(self, bug: BugEntry, name: str, expected: Array) -> Told:
         """Return what a bug makes of an array whose expected values are given."""
-        piece = slice(bug.arrays[name].start, bug.arrays[name].start + bug.arrays[name].count)
+        own = bug.arrays[name]
+        piece = slice(own.start, own.start + own.count)
         places = self._places[piece]
         right = expected.reshape(-1)[places]
         words = self._bits[piece] ^ _words(right)
-        return Told(places, words.astype(np.bool_) if right.dtype.kind == "b" else words.view(right.dtype))
+        values = words.astype(np.bool_) if right.dtype.kind == "b" else words.view(right.dtype)
+        return Told(places, values, own.differing)
 
 
 def _seen(values: Array, limit: Array) -> Array:

@@ -39,13 +39,13 @@ TOLD_APART = 4  # distinct values that tell an array from a chance one of equal 
 
 def recorded_case(
     id: str, scene: Scene, method: str, settings: Any = None, *, only: str = "", what: str = "", indirect: bool = False,
-    **options: Any,
+    call: Callable[[], Array] | None = None, **options: Any,
 ) -> Case:
     """Return a method on a scene as a case `id`, stage by stage as they ran in float64; `what`: one line for people.
 
     `only`: start of the names of stages to keep, all where empty; what they read of others is given. `indirect`: end at
-    the indirect irradiance, without direct light and receivers' lobes. `options` are those of `refgi.methods.render`:
-    width, height, rsm_resolution, shadows.
+    the indirect irradiance, without direct light and receivers' lobes. `call` makes that irradiance in place of the
+    method alone. `options` are those of `refgi.methods.render`: width, height, rsm_resolution, shadows.
     """
     recipe = Recipe(id, method, what or f"{method} as it ran")
     recipe.scene = scene
@@ -57,7 +57,7 @@ def recorded_case(
         return known.function(Frame(scene, dtype=np.float64, **options), settings or known.settings())
 
     with diagnosing(False):
-        rows, columns = record(recipe, irradiance, only).shape[1:]
+        rows, columns = record(recipe, call or irradiance, only).shape[1:]
     recipe.facts |= {"camera": {"columns": columns, "rows": rows}}
     if settings is not None:
         recipe.facts["settings"] = plain(flat(settings))

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 from refgi.errors import InputError, nearest, printable
 from refgi.texts import annotation, table
 from refgi.vectors.kit import Asked, Kit, fits
-from refgi.vectors.manifest import ArrayVerdict, Cause, CommonCause, Finding, Result, StageVerdict
+from refgi.vectors.manifest import ArrayVerdict, BugEntry, Cause, CommonCause, Finding, Result, StageVerdict
 from refgi.vectors.spec import kind_of
 
 
@@ -106,11 +106,14 @@ CAUSES = 3  # that are told
 DIRTY = "made from wrong inputs"
 
 
-def findings(verdicts: Iterable[StageVerdict], tried: Callable[[StageVerdict], set[str]]) -> tuple[Finding, ...]:
+def findings(
+    verdicts: Iterable[StageVerdict], tried: Callable[[StageVerdict], dict[str, BugEntry]]
+) -> tuple[Finding, ...]:
     """Return one finding a kind of stage that is wrong by itself, in the order in which they are met.
 
     Those made from wrong inputs are not blamed. `tried` gives the likely bugs of a verdict's stage that its case can
-    tell: causes go by the share of wrong verdicts that they explain, of those that could know them.
+    tell, by their causes: causes go by the share of wrong verdicts that they explain, of those that could know them. A
+    wrong wiring that half of these refute is not told; one that fits a handful of elements stands behind others.
     """
     ran: dict[str, int] = {}
     wrong: dict[str, list[StageVerdict]] = {}
@@ -123,25 +126,32 @@ def findings(verdicts: Iterable[StageVerdict], tried: Callable[[StageVerdict], s
                          causes=_common(own, [tried(one) for one in own])) for kind, own in wrong.items())
 
 
-def _common(wrong: list[StageVerdict], tried: list[set[str]]) -> tuple[CommonCause, ...]:
+def _common(wrong: list[StageVerdict], tried: list[dict[str, BugEntry]]) -> tuple[CommonCause, ...]:
     """Return the causes that explain most, the best fit first where they explain as much."""
     fits: dict[str, list[Cause]] = {}
     for one in wrong:
         for cause in one.causes:
             if cause.share > 0:
                 fits.setdefault(cause.cause, []).append(cause)
-    likely = set().union(*tried)
+    likely = {cause: bug for known in tried for cause, bug in known.items()}
     told = []
     for name, own in fits.items():
         knowing = len(wrong) if name not in likely else len(own) + sum(
             name in known and all(cause.cause != name for cause in one.causes)
             for one, known in zip(wrong, tried, strict=True))
         share = round(sum(one.share for one in own) / len(own), 3)
-        told.append((-len(own) ** 2 / (knowing * (knowing + 1)) * share**2, -share, CommonCause(
-            cause=name, paper=own[0].paper, explained=len(own), tried=knowing)))
-    remarks = [CommonCause(cause=one.cause, explained=0, tried=len(wrong)) for one in wrong[0].causes]
-    best = [one for *_, one in sorted(told, key=lambda one: one[:2])]
-    return tuple(best or remarks)[:CAUSES]
+        common = CommonCause(cause=name, paper=own[0].paper, explained=len(own), tried=knowing)
+        bug = likely.get(name)
+        if bug is None or not bug.wired or 2 * len(own) > knowing:
+            told.append((bug is not None and bug.by_chance, -weight(common) * share**2, -share, common))
+    remarks = [one.cause for one in wrong[0].causes if not one.share] or ["no known cause fits"]
+    best = [one for *_, one in sorted(told, key=lambda one: one[:3])]
+    return tuple(best or [CommonCause(cause=one, explained=0, tried=len(wrong)) for one in remarks])[:CAUSES]
+
+
+def weight(cause: CommonCause) -> float:
+    """Return how much speaks for a cause: the share of verdicts that it explains, the less the fewer could know it."""
+    return cause.explained**2 / (cause.tried * (cause.tried + 1))
 
 
 KINDS = ("exact", "within", "not-judged", "out", "invalid")

@@ -27,7 +27,7 @@ from refgi.vectors.check import differences_of
 from refgi.vectors.kit import Asked, Kit
 from refgi.vectors.manifest import CaseManifest, Cause, CommonCause, Result, StageVerdict
 from refgi.vectors.port import Port
-from refgi.vectors.report import CAUSES
+from refgi.vectors.report import CAUSES, weight
 from refgi.vectors.rows import Form, Function, called_by, code_of, compiled
 from refgi.vectors.spec import as_read, kind_of, stored
 
@@ -59,15 +59,20 @@ def searched(
     if not result.findings:
         return result
     first = result.findings[0]
-    known = [one for one in first.causes if one.explained]
-    shares = {cause.cause: cause.share for one in result.stages if (one.case, one.stage) == first.first
-              for cause in one.causes}
-    sure = [one for one in known if shares.get(one.cause, 1.0) > SEEN and 2 * one.explained > one.tried]
     wrong: dict[str, str] = {}  # the first wrong stage of that kind in each case
     for one in result.stages:
         if one.verdict == "out" and one.upstream != "dirty" and kind_of(one.stage) == first.stage:
             wrong.setdefault(one.case, one.stage)
-    if len(sure) >= CAUSES or not wrong:
+    if not wrong:
+        return result
+    shares = {cause.cause: cause.share for one in result.stages if (one.case, one.stage) == first.first
+              for cause in one.causes}
+    wirings = {bug.cause for case in kit.cases(Asked(cases=(*wrong,))) for step in case.stages
+               if kind_of(step.name) == first.stage for bug in kit.bugs(case).of(step.name) if bug.wired}
+    known = [one for one in first.causes if one.explained]
+    sure = [one for one in known if shares.get(one.cause, 1.0) > SEEN and 2 * one.explained > one.tried
+            and one.cause not in wirings]  # one of hundreds that fits may do so by chance
+    if len(sure) >= CAUSES:
         return result
     trials = [Trial(kit, asked, output, case, stage) for case, stage in islice(wrong.items(), MOST_CASES)]
     found = _found([one for one in trials if one.usable], seconds, lambda done, count: tell(
@@ -76,8 +81,9 @@ def searched(
         return result
     common, own = zip(*found, strict=True)
     stages = (_told(one, own) if (one.case, one.stage) == first.first else one for one in result.stages)
-    causes = (*sure, *common, *(one for one in known if one not in sure))
-    finding = first.model_copy(update={"causes": causes[:CAUSES]})
+    rest = [one for one in known if one not in sure]
+    rest = sorted((*rest[:1], *common, *rest[1:]), key=weight, reverse=True)
+    finding = first.model_copy(update={"causes": (*sure, *rest)[:CAUSES]})
     return result.model_copy(update={"findings": (finding, *result.findings[1:]), "stages": tuple(stages)})
 
 

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from refgi.scene import DirectionalLight, Material, PointLight, Scene, SpotLight
+from refgi.provenance.record import light_json
+from refgi.scene import Material, Scene
 from refgi.types import Array
 
 FILES = Path(__file__).with_name("files")
@@ -194,16 +195,9 @@ def _scene(scene: Scene, size: tuple[int, int]) -> dict[str, Any]:
 
 
 def _light(light: Any) -> dict[str, Any]:
-    if isinstance(light, SpotLight):
-        return {"type": "spot", "position": list(light.position), "direction": list(light.direction),
-                "inner_half_angle_deg": math.degrees(light.inner_half_angle),
-                "outer_half_angle_deg": math.degrees(light.outer_half_angle),
-                "intensity_w_per_sr": list(light.intensity),
-                **({} if light.falloff == "smoothstep" else {"falloff": light.falloff})}
-    if isinstance(light, PointLight):
-        return {"type": "point", "position": list(light.position), "intensity_w_per_sr": list(light.intensity)}
-    assert isinstance(light, DirectionalLight)
-    return {"type": "directional", "direction": list(light.direction), "irradiance_w_per_m2": list(light.irradiance)}
+    units = {"intensity": "intensity_w_per_sr", "irradiance": "irradiance_w_per_m2"}
+    return {f"{key}_deg" if "angle" in key else units.get(key, key): math.degrees(value) if "angle" in key else value
+            for key, value in light_json(light).items()}
 
 
 def _obj(scene: Scene) -> str:

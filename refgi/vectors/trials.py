@@ -88,12 +88,12 @@ def keep_bug(bugs: BugWriter, right: Right, bug: Bug, *, wired: bool = False) ->
         if np.array_equal(array, expected):
             continue
         off = (distance(array, expected) > bounds[name].limit) & ~bounds[name].masked
-        differing += int(np.count_nonzero(off))
-        if off.any():
+        differing += (count := int(np.count_nonzero(off)))
+        if count:
             blind = False
-            places = np.concatenate([_spread(np.flatnonzero(one), count) for one, count in zip((off, ~off), counts,
-                                                                                               strict=True)])
-            told[name] = Told(places, array.reshape(-1)[places])
+            places = np.concatenate([_spread(np.flatnonzero(one), most) for one, most in zip((off, ~off), counts,
+                                                                                             strict=True)])
+            told[name] = Told(places, array.reshape(-1)[places], count)
     blind = blind or (wired and differing < FEWEST and 0 < elements < SMALL)
     if not (blind and wired):
         entry = BugEntry(cause=bug.cause, paper=bug.paper, arrays={}, blind=blind, wired=wired,

@@ -147,7 +147,7 @@ def test_every_likely_bug_of_the_kit_is_told_by_the_checker(kit, tmp_path, cases
                     continue
                 for name in bug.arrays:
                     wrong = port.arrays[name].copy()
-                    places, values = bugs.told(bug, name, wrong)
+                    places, values, _ = bugs.told(bug, name, wrong)
                     wrong.reshape(-1)[places] = values
                     port.write(name, wrong)
                 first = port.first()

@@ -1,7 +1,7 @@
 """Findings over all cases: kinds of stages in order, causes that explain most of them first."""
 
 from refgi.vectors.causes import SEEN
-from refgi.vectors.manifest import Cause, StageVerdict
+from refgi.vectors.manifest import BugEntry, Cause, Piece, StageVerdict
 from refgi.vectors.report import findings as found_in
 from refgi.vectors.spec import kind_of
 
@@ -11,8 +11,10 @@ def verdict(case, stage, *causes, verdict="out", upstream="isolated"):
     return StageVerdict(case=case, stage=stage, verdict=verdict, upstream=upstream, arrays=(), causes=told)
 
 
-def findings(verdicts, tried=lambda _: set()):
-    return found_in(verdicts, tried)
+def findings(verdicts, tried=lambda _: set(), *, wired=False, differing=50):
+    arrays = {"pairs.sum": Piece(start=0, count=1, differing=differing)}
+    return found_in(verdicts, lambda one: {cause: BugEntry(
+        cause=cause, shapes={}, arrays=arrays, wired=wired) for cause in tried(one)})
 
 
 def test_maps_levels_and_rounds_are_one_kind():
@@ -53,6 +55,21 @@ def test_a_bug_that_a_case_refutes_stands_behind_one_that_none_does():
              for case in "abc"]
     found = findings(wrong, lambda one: {"refuted", "bug"} if one.case == "a" else {"refuted"})
     assert [(one.cause, one.explained, one.tried) for one in found[0].causes] == [("bug", 1, 1), ("refuted", 2, 3)]
+
+
+def test_a_wiring_that_half_of_the_cases_refute_is_not_told():
+    """A port binds one buffer, whatever the case; a bug in one of several branches shows where that is taken."""
+    wrong = [verdict(case, "pairs.sum", *[("bound", 1.0)] * (case in "ab")) for case in "abcd"]
+    told = [findings(wrong, lambda _: {"bound"}, wired=wired)[0].causes[0] for wired in (False, True)]
+    assert [(one.cause, one.explained) for one in told] == [("bound", 2), ("no known cause fits", 0)]
+
+
+def test_a_wiring_that_fits_a_handful_of_elements_stands_behind_other_causes():
+    wrong = [verdict("a", "pairs.sum", ("bound", 1.0), ("bug", 0.95)), verdict("b", "pairs.sum")]
+    for differing, first in ((50, "bound"), (6, "bug")):
+        causes = findings(wrong, lambda one: {"bound"} if one.case == "a" else set(), wired=True,
+                          differing=differing)[0].causes
+        assert (causes[0].cause, len(causes)) == (first, 2)
 
 
 def test_no_more_are_explained_than_were_tried():

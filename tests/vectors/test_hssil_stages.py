@@ -8,6 +8,7 @@ import pytest
 from refgi.diagnostics import diagnosing
 from refgi.frame import Frame
 from refgi.sssil.hssil import hssil
+from refgi.sssil.temporal import Sequence
 from refgi.stages import observe
 from refgi.vectors.bounds import isolated_bounds, large_value
 from refgi.vectors.cases import hssil as cases
@@ -39,6 +40,13 @@ def picture(plan):
     return hssil(frame, cases.settings_of(plan))
 
 
+def sequence(name):
+    """Return the frames of the production method in double precision."""
+    width, height = cases.TEMPORAL_SIZE
+    return Sequence(cases.frames_of(name), cases.SEQUENCE, cases.TEMPORAL[name], width=width, height=height,
+                    dtype=np.float64, rsm_resolution=cases.MAPS)
+
+
 @pytest.mark.feature("HSS-02")
 @pytest.mark.filterwarnings("ignore:radius")
 @pytest.mark.parametrize("name", VIEWS)
@@ -55,7 +63,7 @@ def test_the_chain_is_the_method(name):
 def test_the_blend_is_that_of_a_sequence(name):
     case, known, _ = made(name)
     with diagnosing(False):
-        expected = [*cases.sequence(name, cases.frames_of(name))][-1].irradiance
+        expected = [*sequence(name)][-1].irradiance
     off = np.abs(known["sssil.blend.irradiance"] - expected) > CHAIN * large_value(expected)
     assert off.mean() <= FLIPPED
     step = next(one for one in case.stages if one.name == "sssil.reprojection")
@@ -73,7 +81,7 @@ def test_steps_make_what_their_stage_makes(name):
         if name in VIEWS:
             picture(VIEWS[name]())
         else:
-            list(cases.sequence(name, cases.frames_of(name)))
+            list(sequence(name))
     compared = set()
     for run in (one for one in log.runs if one.steps is not None and one.name.startswith("sssil.")):
         whole, steps = dict(leaves(run.output)), dict(leaves(run.steps))

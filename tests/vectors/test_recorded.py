@@ -274,6 +274,25 @@ def test_more_than_the_room_is_refused_before_anything_is_written(tmp_path):
     assert not (tmp_path / "kit").exists()
 
 
+def test_a_size_that_fits_is_proposed_and_fits(tmp_path):
+    """Of a light's map too; what is proposed takes about what is said, but for rows and lists that are rounded up."""
+    def made(width, height, side):
+        return recorded_case("sii-heap", heap(), "sii", width=width, height=height, rsm_resolution=side)
+
+    proposed = r"--size (\d+)x(\d+) --rsm-resolution (\d+) would take (\S+) MB"
+    with pytest.raises(InputError, match=proposed) as told:
+        export_case(made(96, 66, 64), tmp_path / "kit", most=2e6)
+    width, height, side, size = re.search(proposed, str(told.value)).groups()
+    assert (int(width) < 96, int(height) < 66, int(side) < 64) == (True, True, True)
+    smaller = made(int(width), int(height), int(side))
+    export_case(smaller, tmp_path / "kit", most=2e6)
+    with pytest.raises(InputError) as told:
+        export_case(smaller, tmp_path / "other", most=1.0)
+    assert float(re.search(r"got (\S+) MB", str(told.value))[1]) == pytest.approx(float(size), rel=0.2)
+    with pytest.raises(InputError, match=r"map \(--size, --rsm-resolution; --set\)"):
+        export_case(smaller, tmp_path / "other", most=1.0)
+
+
 def test_leaves_are_named_by_fields_and_indices():
     light = PointLight((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     value = {"one": [np.zeros(2), (np.ones(1), "text")], "two": light, "three": Scene}

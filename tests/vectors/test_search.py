@@ -159,6 +159,19 @@ def test_known_causes_come_first_and_time_ends_a_search(kit, wrong):
     assert searched(kit, output, Asked(), result, seconds=1e-9) == result
 
 
+@pytest.mark.usefixtures("few")
+def test_wirings_that_fit_keep_no_search_from_running(kit, wrong):
+    """Three of the stage's; a change that explains as many cases stands behind the first of them."""
+    output, result = wrong
+    case, = kit.cases(Asked(cases=("pairs-diffuse",)))
+    wired = [bug.cause for bug in kit.bugs(case).of("pairs.pairs") if bug.wired][:3]
+    causes = tuple(CommonCause(cause=one, explained=1, tried=1) for one in wired)
+    finding = result.findings[0].model_copy(update={"causes": causes})
+    told = searched(kit, output, Asked(), result.model_copy(update={"findings": (finding,)})).findings[0].causes
+    assert told[0].cause == wired[0]
+    assert "pairs.py" in told[1].cause
+
+
 def test_a_case_without_lobes_is_searched(kit, tmp_path):
     """The literal form makes fluxes of lobes too, which the stage of such a case does not write."""
     port = Port(kit, "hssil-paper", tmp_path)

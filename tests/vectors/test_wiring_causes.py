@@ -5,7 +5,9 @@ import pytest
 
 from refgi.vectors.cases import kit_cases
 from refgi.vectors.causes import FEWEST
+from refgi.vectors.check import check_stage
 from refgi.vectors.kit import Asked
+from refgi.vectors.port import Port as Read
 from refgi.vectors.rows import Form
 from refgi.vectors.spec import kind_of, outputs_of
 from tests.vectors.port import Port
@@ -111,6 +113,25 @@ def test_no_wiring_is_told_from_a_single_number(kit):
             assert elements >= FEWEST or not any(bug.wired for bug in bugs.of(step.name)), (case.id, step.name)
 
 
+def test_a_wiring_that_changes_less_than_differs_is_not_told(kit, tmp_path):
+    """What the kit keeps of it fits, all other elements differ as well."""
+    port = Port(kit, "sii-halton", tmp_path)
+    name, right = "pairs.sum", port.arrays["pairs.sum"]
+    step = next(one for one in port.case.stages if one.name == name)
+    wirings = [bug for bug in kit.bugs(port.case).of(name) if bug.wired and bug.arrays]
+    lit = np.count_nonzero(right)
+    whole = [bug for bug in wirings if 0.96 * lit < bug.arrays[name].differing < 0.8 * right.size][:5]
+    assert whole
+    for more, told in ((right.max(), False), (0.0, True)):
+        for bug in whole:
+            wrong = 1.5 * right + more
+            places, values, _ = kit.bugs(port.case).told(bug, name, right)
+            wrong.reshape(-1)[places] = values
+            port.write(name, wrong)
+            verdict = check_stage(Read(kit, port.case, port.folder, Asked()), step, dirty=False)
+            assert (bug.cause in [one.cause for one in verdict.causes]) == told, bug.cause
+
+
 def test_wirings_to_darkness_stand_behind_the_bug_that_makes_it(kit, tmp_path):
     """A bias of the wrong sign: each surface hides itself, as many wrong buffers would make it."""
     port = Port(kit, "vpl-maps", tmp_path)
@@ -129,7 +150,7 @@ def test_an_array_of_the_stage_that_is_right_refutes_what_would_change_it(kit, t
     for stage, bug in several:
         name = min(bug.arrays)
         wrong = port.arrays[name].copy()
-        places, values = bugs.told(bug, name, wrong)
+        places, values, _ = bugs.told(bug, name, wrong)
         wrong.reshape(-1)[places] = values
         port.write(name, wrong)
         assert bug.cause not in [one.cause for one in port.first().causes], (stage, bug.cause)

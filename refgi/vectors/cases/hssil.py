@@ -8,15 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from refgi.diagnostics import diagnosing
-from refgi.frame import Frame
-from refgi.rsm.raster.projection import camera_projection
 from refgi.scene import Scene, SpotLight
 from refgi.settings import of, replaced
 from refgi.sssil.settings import PRESETS, HssilSettings, TemporalSettings
-from refgi.sssil.temporal import Sequence, SequenceFrame
-from refgi.sssil.temporal_filter import History, history_of, with_frames
-from refgi.types import Array
 from refgi.vectors.cases.scenes import (
     BULB,
     DOWN,
@@ -32,11 +26,10 @@ from refgi.vectors.cases.scenes import (
     room,
     stored_scene,
 )
-from refgi.vectors.recorded import record
-from refgi.vectors.spec import Arrays, Bug, Case, Recipe, Run, expected_of, kind_of, reading
+from refgi.vectors.frames import frame_case
+from refgi.vectors.spec import Arrays, Bug, Case, Run, expected_of, kind_of
 
 LEVELS = "HSS Sec. 3.2: sums of disjoint crowns"
-WARP = "HSS Sec. 3.3: depth and normal decide whether it is the same surface (E-HSS-11)"
 MAPS = 16  # texels along the side of a lamp's map
 AWAY = SpotLight((0.5, 1.5, 0.625), (0.3, 1.0, 0.2), 0.3, 0.6, (4.0, 2.6, 1.3))  # shines into the void
 NARROW = math.radians(38)  # the room fills the picture: points enter at its edges
@@ -50,6 +43,7 @@ TEMPORAL = {
 }
 STEPS = {"hssil-temporal": (0.1, 0.15, -0.2), "hssil-entering": (-0.2, 0.1, 0.2), "hssil-moving": (0.01, 0.0, 0.02)}
 FRAMES, TEMPORAL_SIZE = 4, (32, 24)
+SEQUENCE = replaced(CLOSEST, {"samples": 8, "radius": 3.0, "levels": 3, "seed": 7})
 
 
 def settings_of(plan: Plan) -> HssilSettings:
@@ -96,45 +90,9 @@ def coherent(id: str, what: str) -> Case:
 
     So is what the frame before saw, where its triangles were elsewhere.
     """
-    scenes, recipe = frames_of(id), Recipe(id, "hssil", what)
-    recipe.scene = scenes[-1]
-    with diagnosing(False):  # few samples are what the case is made of
-        *_, before = sequence(id, scenes[:-1])
-        own, = sequence(id, scenes).over(scenes[-2:-1], FRAMES - 2)
-        history = _history(before, scenes[-2])
-
-        def last() -> Any:
-            left = history if id == "hssil-moving" else _history(before._replace(frame=_frame(scenes[-2])), scenes[-2])
-            return next(iter(sequence(id, scenes[-1:]).over(scenes[-1:], FRAMES - 1, left)))
-
-        record(recipe, last)
-    add_of_frames(recipe, scenes[-1], own.irradiance)
-    recipe.facts["temporal"] = {key: value for key, value in dataclasses.asdict(TEMPORAL[id]).items()
-                                if value is not None}
-    return with_other_light(recipe.case())
-
-
-def add_of_frames(recipe: Recipe, scene: Scene, own: Array) -> None:
-    """Add likely bugs of the look-up in the frame before: this frame's camera, of `scene`; that frame's `own` light."""
-    now = camera_projection(scene.camera, *TEMPORAL_SIZE)
-    place, step = next((k, one) for k, one in enumerate(recipe.stages) if one.name == "sssil.reprojection")
-    wrong = {"this frame's camera in place of that of the frame before": {
-        name: getattr(now, field) for name in step.reads
-        if "projection" in name and (field := name.rpartition(".")[2]) in ("origin", "frame", "half")},
-        "the earlier frame's own light, as printed, not its filtered one": {
-            name: own for name in step.reads if name.endswith(".irradiance")}}
-    bugs = (Bug(cause, reading(step.run, **{
-        name.replace(".", "__"): lambda a, one=one: np.asarray(one, a.dtype) for name, one in taken.items()}), WARP)
-        for cause, taken in wrong.items())
-    recipe.stages[place] = dataclasses.replace(step, bugs=(*bugs, *step.bugs))
-
-
-def _history(before: SequenceFrame, scene: Scene) -> History:
-    return history_of(before.frame, scene.geometry, with_frames(before.irradiance, before.frames))
-
-
-def _frame(scene: Scene) -> Frame:
-    return Frame(scene, width=TEMPORAL_SIZE[0], height=TEMPORAL_SIZE[1], dtype=np.float64)
+    width, height = TEMPORAL_SIZE
+    return with_other_light(frame_case(id, frames_of(id), "hssil", SEQUENCE, TEMPORAL[id], what=what, width=width,
+                                       height=height, rsm_resolution=MAPS))
 
 
 def frames_of(id: str) -> list[Scene]:
@@ -154,13 +112,6 @@ def frames_of(id: str) -> list[Scene]:
             scene = dataclasses.replace(scene, geometry=scenes[0].geometry)
         scenes.append(scene)
     return scenes
-
-
-def sequence(id: str, scenes: list[Scene]) -> Sequence:
-    """Return the frames of the production method in double precision."""
-    settings = replaced(CLOSEST, {"samples": 8, "radius": 3.0, "levels": 3, "seed": 7})
-    width, height = TEMPORAL_SIZE
-    return Sequence(scenes, settings, TEMPORAL[id], width=width, height=height, dtype=np.float64, rsm_resolution=MAPS)
 
 
 QUICK_PLANS: Plans = {

@@ -17,7 +17,7 @@ from refgi.diagnostics import SamplingError, asked, is_due
 from refgi.errors import RefgiWarning
 from refgi.pairs.irradiance import Receivers, add_lights
 from refgi.pairs.pixel_lights import pack
-from refgi.pairs.sample import Sample, sample_peaks, sample_pixels
+from refgi.pairs.sample import LOOKED, Sample, sample_peaks, sample_pixels
 from refgi.pairs.settings import STRONGEST_CLAMP, DiscClamp, GeometryClamp, PairSettings
 from refgi.stages import stage
 from refgi.types import Array
@@ -62,6 +62,7 @@ def warn_of_mirrors(frame: "Frame", lights: "PixelLights", method: str) -> None:
 
 
 PAIRS = 1 << 20  # about as many are summed: a millisecond's work
+ALL_PAIRS = 1 << 24  # up to which all pixels that are looked at are summed, and none are searched for
 LEAST_SAMPLED = 2048  # pixels, however many lights there are
 THINNED = 2048  # lights, where there are too many to sum in full
 UNREACHED = GeometryClamp(STRONGEST_CLAMP)  # a bound in place of no clamp: one kernel less to compile
@@ -152,7 +153,8 @@ def sampling_error(
     if lights.half is None:
         return None
     packed = pack(lights, settings, footprint, np.asarray(receivers.position).dtype)
-    sample = sample_peaks(receivers, packed, pixels_for(lights, least))
+    every = LOOKED * lights.flux.shape[1] <= ALL_PAIRS
+    sample = sample_pixels(receivers, LOOKED) if every else sample_peaks(receivers, packed, pixels_for(lights, least))
     halves = []
     for second in (False, True):
         sums = np.zeros_like(sample.position)

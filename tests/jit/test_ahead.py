@@ -14,7 +14,7 @@ from refgi.jit.kernelfile import text_of, types_of
 from refgi.methods import BUILT_IN
 
 ROOT = Path(__file__).parents[2]
-MOST = {"sii": 15, "multires": 23, "val": 38, "hssil": 18, "gather": 14, "vpl": 15, "truth": 20}  # kernels
+MOST = {"sii": 14, "multires": 22, "val": 37, "hssil": 18, "gather": 14, "vpl": 15, "truth": 20}  # kernels
 KINDS = [types.float32, types.boolean, types.none, types.int64[:], types.float32[:, ::1], types.float64[::1, :],
          types.float32[:, :, ::1], types.float32[:, :, :], types.float32[::1].copy(readonly=True),
          types.Tuple((types.int64, types.float32)), types.UniTuple(types.float32[::1], 1), types.Omitted(1.5)]

@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from refgi.methods import METHODS
+from refgi.settings import of
+from refgi.testing import stages
 from refgi.vectors.check import ALL_WITHIN, Asked, Kit, check_output
 from refgi.vectors.manifest import Result
 
@@ -59,3 +62,19 @@ def test_stages_that_read_own_outputs_are_within_bounds(kit: Kit, cases: str, tm
 
 def test_half_floats_are_within_bounds_of_tier_2(kit: Kit, cases: str, tmp_path: Path) -> None:
     expect_all_within(run(kit, cases, tmp_path / "out", "--variant", "half", tiers={"": "T2"}), cases)
+
+
+@pytest.mark.usefixtures("_gl")
+@pytest.mark.parametrize(("method", "only", "settings", "ran"), [
+    ("sii", "pairs.", {"lights": 64}, 1), ("hssil", "sssil.gather_samples", {"samples": 16}, 1),
+    ("val", "cluster.", {"lights": 64, "maps.resolution": 16, "clusters": 2}, 5)])
+def test_stages_of_any_scene_are_within_bounds(
+    tmp_path: Path, method: str, only: str, settings: dict[str, int], ran: int
+) -> None:
+    data = stages("cornell_box", method, of(METHODS[method].settings, **settings), folder=tmp_path / "kit", only=only,
+                  width=16, height=12, rsm_resolution=32)
+    done = subprocess.run([sys.executable, PORT, data.kit.folder, tmp_path / "out"], capture_output=True, text=True,
+                          check=False)
+    made = check_output(data.kit, tmp_path / "out", Asked())
+    assert made.exit_code == ALL_WITHIN, done.stderr
+    assert sum(one.verdict != "not-run" for one in made.stages) >= ran

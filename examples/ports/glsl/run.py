@@ -68,13 +68,15 @@ def footprints(gpu: Gpu, arrays: Arrays, stage: dict) -> None:
 
 def gather(gpu: Gpu, arrays: Arrays, stage: dict) -> None:
     """Run gather.comp on a level."""
-    position, normal, radiance, area, offsets, weight = (arrays[name] for name in stage["reads"])
+    position, normal, *senders, radiance, area, offsets, weight = (arrays[name] for name in stage["reads"])
+    sender_position, sender_normal = senders or (position, normal)
     result = gpu.empty(3 * area.size)
     gpu.run("gather.comp", (), {
         0: gpu.stored(position, place=True), 1: gpu.stored(normal), 2: gpu.stored(radiance), 3: gpu.stored(area),
-        4: offsets, 5: gpu.stored(weight), 6: result,
+        4: offsets, 5: gpu.stored(weight), 6: result, 7: gpu.stored(sender_position, place=True),
+        8: gpu.stored(sender_normal),
     }, area.size * (GROUP if "TREE" in gpu.variant else 1), size=area.shape[::-1], tile=offsets.shape[1::-1],
-        weight_tile=weight.shape[1::-1], samples=offsets.shape[2])
+        weight_tile=weight.shape[1::-1], samples=offsets.shape[2], share=arrays.facts[stage["name"]]["share"])
     arrays.write(stage["writes"][0], gpu.read(result))
 
 
@@ -107,7 +109,9 @@ def main() -> int:
         arrays = Arrays(asked.kit, asked.out, case["id"], asked.chained)
         for stage in arrays.manifest["stages"]:
             run, facts = STAGES.get(kind_of(stage)), arrays.facts.get(stage["name"], {})
-            if run is not None and not facts.get("in_bytes"):  # a basis in 8 and 16 bits
+            if run is None or facts.get("in_bytes"):  # a basis in 8 and 16 bits
+                continue
+            if facts.get("form_factor", "disc") == "disc" and facts.get("factor", 1) == 1:  # as Eq. 4 is meant
                 run(gpu, arrays, stage)
                 print(case["id"], stage["name"])
     return 0

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from refgi.errors import InputError, RefgiWarning
+from refgi.errors import InputError, RefgiWarning, expect
 from refgi.types import Array
 
 if TYPE_CHECKING:
@@ -125,14 +125,14 @@ class StageData(Mapping[str, Array]):
 
 
 def stages(
-    scene: "Scene | str | Path | Sequence[Scene]", method: str = "sii", settings: Any = None, *, folder: str | Path,
-    only: str = "", temporal: "TemporalSettings | None" = None, **options: Any,
+    scene: "Scene | str | Path | Sequence[Scene | str | Path]", method: str = "sii", settings: Any = None, *,
+    folder: str | Path, only: str = "", temporal: "TemporalSettings | None" = None, **options: Any,
 ) -> StageData:
     """Return what every stage of a method reads and writes on a scene, with the bounds of a port's arrays.
 
     Parameters
     ----------
-    scene : Scene, str, Path or sequence of Scene
+    scene : Scene, str, Path or sequence of these
         A scene, or what `refgi.scene.load_scene` takes; the scenes of all frames up to the one that is asked for.
     method : str
         Short name of the method.
@@ -157,8 +157,10 @@ def stages(
     from refgi.vectors.export import export_case
     from refgi.vectors.frames import frame_case
 
-    one = load_scene(scene) if isinstance(scene, str | Path) else scene
-    scenes = one if isinstance(one, Sequence) else [one]
+    several = isinstance(scene, Sequence) and not isinstance(scene, str)
+    scenes = [load_scene(one) if isinstance(one, str | Path) else one for one in (scene if several else [scene])]
+    expect(len(scenes) > 0, "scene", "a scene, or one or more of a sequence", "none")
+    expect(len(scenes) > 1 or temporal is None, "temporal", "the scenes of two frames or more to blend", "one")
     export_case(frame_case(method, scenes, method, settings, temporal, only=only, **options), Path(folder))
     return StageData(Kit(Path(folder)))
 

@@ -148,8 +148,11 @@ class _Walk:
         return meets
 
     def _may_meet(self, track: Track, rung: int) -> bool:
-        """Return whether a track whose error goes on falling as it did last comes to the wish at its end."""
-        if rung == 0:
+        """Return whether a track whose error goes on falling as it did last comes to the wish at its end.
+
+        Its first two errors may be alike by chance.
+        """
+        if rung <= STRIDE:
             return True
         ahead = math.log(track.values[-1] / track.values[rung])
         return DOUBT * self._probe(track, rung).error * math.exp(self._slope(track, rung) * ahead) <= self._wish

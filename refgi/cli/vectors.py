@@ -62,6 +62,7 @@ def _of_kit(asked: Asked, out: Path, tell: Any) -> "KitManifest":
 
 def _of_scene(asked: Asked, out: Path, tell: Any) -> "KitManifest":
     from refgi.cli.view import scene_of, settings_for, stem
+    from refgi.errors import expect
     from refgi.vectors.export import export_case
     from refgi.vectors.frames import frame_case
 
@@ -70,11 +71,15 @@ def _of_scene(asked: Asked, out: Path, tell: Any) -> "KitManifest":
     method = asked.method
     settings = settings_for(method, asked.pairs, asked.seed, asked.preset)
     asked.size = asked.size or SMALL
+    if not asked.path and (asked.frame is not None or asked.filtering or asked.unfiltered):
+        raise click.UsageError("--frame, --temporal and --no-temporal say what of --frames PATH, which is absent")
     scenes, filtering, what = _frames(asked) if asked.path else ([scene_of(asked)], None, "")
     what = f"{method} of {scenes[-1].name}{what}"
     tell(what, 0.0)
     case = frame_case(f"{method}-{stem(asked.scene)}", scenes, method, settings, filtering, only=asked.stage, what=what,
                       rsm_resolution=asked.rsm_resolution, shadows=asked.shadows)
+    expect(len(case.stages) > 0, "--stage", f"the start of a stage's name (docs/stages.md) that {method} has here",
+           asked.stage)
     return export_case(case, out, tell, asked.most * 1e6)
 
 

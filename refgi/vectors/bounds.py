@@ -63,7 +63,7 @@ class Budget(NamedTuple):
     masked: Array | None = None  # as the array, bool: elements that may differ at will
 
 
-NO_BUDGET = Budget(0.0, 0.0, 1.0)  # of estimates, which have standard errors instead
+NO_BUDGET = Budget(0.0, 0.0, 1.0)  # of estimates, which have standard errors instead, and of what chains make of them
 
 
 def isolated_bounds(case: Case, step: Stage, known: Arrays, seed: int) -> dict[str, Bound]:
@@ -149,12 +149,16 @@ def chained_budgets(case: Case, known: Arrays, seed: int, *, in_halves: bool = F
     exact = {name for step in case.stages for name in step.exact}
     halved = {name for step in case.stages for name in step.writes if in_halves and name not in exact}
     rounding = {name: HALF_ROUNDING / CHANGE for name in halved}
+    estimates = set[str]()  # and what is made of them
+    for step in case.stages:
+        if is_estimate(case, step) or not estimates.isdisjoint(step.reads):
+            estimates.update(step.writes)
 
     def run(number: int) -> dict[str, Array]:
         random, real = np.random.default_rng([seed, number]), np.float32 if number % 2 else np.float64
         chain = {name: stored(array) for name, array in case.given.items()}
         for step in case.stages:
-            if not is_estimate(case, step):
+            if estimates.isdisjoint(step.writes):
                 changed = {name: array if name in step.exact else _rounded_at_random(
                     name, array, random, rounding.get(name, ROUNDING))
                     for name, array in as_read(chain, step.reads, real).items()}
@@ -162,7 +166,6 @@ def chained_budgets(case: Case, known: Arrays, seed: int, *, in_halves: bool = F
                               for name, array in _run(step, changed, real).items()})
         return chain
 
-    estimates = {name for step in case.stages if is_estimate(case, step) for name in step.writes}
     written = [name for step in case.stages for name in step.writes if name not in estimates]
     return dict.fromkeys(estimates, NO_BUDGET) | _budgets(
         {name: Measures(known[name], HALF_ROUNDING if name in halved else ROUNDING, _large(case, name, known[name]),

@@ -116,6 +116,7 @@ def export_case(case: Case, out: Path, tell: Tell = lambda _, __: None, most: fl
     InputError
         If it would take more, the folder holds something else, or the disk is full.
     """
+    expect(most > 0, "most", "a number of bytes above 0", most)
     known = expected_of(case)
     sizes = {name: array.nbytes * (1 if name in case.given else PARTS) for name, array in known.items()}
     if (taken := sum(sizes.values())) > most:
@@ -166,8 +167,9 @@ def _write_kit(
     """Write cases; `whole`: all of a kit, some of which must tell each likely bug."""
     from refgi.provenance import program
 
-    if out.exists() and any(out.iterdir()) and not (out / KIT).is_file():
-        raise InputError(f"{out}: expected a new folder or a kit, got a folder of other files", file=str(out))
+    if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / KIT).is_file())):
+        found = "a folder of other files" if out.is_dir() else "a file"
+        raise InputError(f"{out}: expected a new folder or a kit, got {found}", file=str(out))
     part = out.with_name(f".{out.name}.{secrets.token_hex(4)}.part")
     groups: dict[str, list[str]] = {}
     for name in cases:

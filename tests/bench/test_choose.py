@@ -156,6 +156,16 @@ def test_a_track_that_waits_is_timed_where_another_of_its_method_comes_to_it(wis
     assert any("cut" in one.changes for one in full.ran) == tried
 
 
+def test_a_track_whose_first_errors_are_alike_is_not_left():
+    """16 and 64 lights may err alike by chance."""
+    class Alike(Model):
+        def error(self, choice):
+            return 0.125 if int(choice.changes[0]) == 16 else super().error(choice)
+
+    laws = {"one": (0.0, 1.0, 1.0, 1e-3, 1e-6)}
+    assert for_error(tracks_of(laws), 0.01, Alike(laws), Model(laws)).best is not None
+
+
 def test_a_track_whose_bias_is_above_the_wish_is_left_soon():
     laws = {"biased": (0.3, 1.0, 1.0, 1e-3, 1e-6), "sound": (0.0, 20.0, 1.0, 1.0, 1e-2)}
     small = Model(laws)

@@ -8,6 +8,7 @@ from click.testing import CliRunner
 
 from refgi.cli.group import VerbGroup
 from refgi.diagnostics import diagnosing
+from refgi.errors import InputError
 from refgi.methods import find_method
 from refgi.scene import load_scene
 from refgi.scene.path import scenes_along
@@ -199,3 +200,32 @@ def test_what_is_no_frame_is_refused(tmp_path, text, options, said):
     assert done.exit_code == 2
     assert said in done.stderr
     assert not (tmp_path / "kit").exists()
+
+
+@pytest.mark.parametrize(("options", "said"), [
+    (("--frame", 1), "--frames PATH, which is absent"),
+    (("--temporal", "weight=0.5"), "--frames PATH, which is absent"),
+    (("--method", "sii", "--stage", "nothing."), "--stage: expected the start of a stage's name"),
+    (("--method", "sii", "--stage", "pairs.", "--most", "nan"), "most: expected a number of bytes above 0, got nan")])
+def test_what_would_be_no_kit_is_refused(tmp_path, options, said):
+    done = export("cornell_box", "--size", "12x9", "--rsm-resolution", 8, *options, "--out", tmp_path / "kit")
+    assert done.exit_code == 2
+    assert said in done.stderr
+    assert not (tmp_path / "kit").exists()
+
+
+def test_a_file_in_the_kit_s_place_stays(tmp_path):
+    (tmp_path / "kit").write_text("mine")
+    done = export("cornell_box", "--method", "sii", "--size", "12x9", "--rsm-resolution", 8, "--stage", "pairs.",
+                  "--out", tmp_path / "kit")
+    assert (done.exit_code, (tmp_path / "kit").read_text()) == (2, "mine")
+    assert "expected a new folder or a kit, got a file" in done.stderr
+
+
+def test_stages_takes_a_sequence_of_names_and_no_empty_one(tmp_path):
+    whole = {"folder": tmp_path / "kit", "only": "pairs.", "width": 12, "height": 9, "rsm_resolution": 8}
+    assert "pairs.sum" in stages(["cornell_box"], "sii", **whole)
+    with pytest.raises(InputError, match="one or more of a sequence"):
+        stages([], "sii", **whole)
+    with pytest.raises(InputError, match="two frames or more"):
+        stages("cornell_box", "hssil", temporal=TemporalSettings(), **whole)

@@ -297,3 +297,16 @@ def test_leaves_are_named_by_fields_and_indices():
     light = PointLight((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     value = {"one": [np.zeros(2), (np.ones(1), "text")], "two": light, "three": Scene}
     assert [name for name, _ in leaves(value)] == ["one.0", "one.1.0"]
+
+
+@pytest.mark.feature("REF-33")
+def test_what_is_made_of_an_estimate_is_not_judged_in_a_chain(tmp_path):
+    """A port's light has its own noise, and so has what it makes of it."""
+    settings = replaced(find_method("truth").settings(), {"samples": 8})
+    case = recorded_case("truth-heap", heap(), "truth", settings, **SIZE)
+    export_case(case, tmp_path / "kit")
+    (tmp_path / "out/truth-heap").mkdir(parents=True)
+    np.save(tmp_path / "out/truth-heap/rsm.leaving_radiance.npy", expected_of(case)["rsm.leaving_radiance"] * 1.1)
+    for chained, verdict in ((False, "out"), (True, "not-judged")):
+        made = check_output(Kit(tmp_path / "kit"), tmp_path / "out", Asked(chained=chained))
+        assert [one.verdict for one in made.stages if one.verdict != "not-run"] == [verdict]

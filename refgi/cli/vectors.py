@@ -132,12 +132,15 @@ def _check(kit: str, output: str, **options: Any) -> int:
     Exit codes: 0 all within their bounds, 1 a stage is out, 2 a wrong option or no such OUTPUT, 4 not comparable (a
     missing array, a wrong shape or type, an empty OUTPUT), 5 kit or output damaged.
     """
+    from refgi.errors import expect
     from refgi.vectors.check import DAMAGED, DamagedError, Kit, asked_from, check_output
     from refgi.vectors.report import github, report, write_junit
 
     asked = asked_from(options)
     try:
         opened = Kit(Path(kit))
+        expect(options["seconds"] is None or opened.manifest.kit != "scene", "--search",
+               "a kit of ready cases: one of a scene does not keep its stages' literal forms", kit)
         result = check_output(opened, Path(output), asked)
         if options["seconds"] is not None:
             from refgi.vectors.search import searched

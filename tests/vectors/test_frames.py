@@ -214,6 +214,13 @@ def test_what_would_be_no_kit_is_refused(tmp_path, options, said):
     assert not (tmp_path / "kit").exists()
 
 
+def test_a_scene_s_own_kit_is_not_searched(tmp_path):
+    stages("cornell_box", "sii", folder=tmp_path / "kit", only="pairs.", width=12, height=9, rsm_resolution=8)
+    done = CliRunner().invoke(VerbGroup.refgi(), ["vectors", "check", *[str(tmp_path / "kit")] * 2, "--search", "9"])
+    assert done.exit_code == 2
+    assert "--search: expected a kit of ready cases" in done.stderr
+
+
 def test_a_file_in_the_kit_s_place_stays(tmp_path):
     (tmp_path / "kit").write_text("mine")
     done = export("cornell_box", "--method", "sii", "--size", "12x9", "--rsm-resolution", 8, "--stage", "pairs.",

@@ -157,8 +157,8 @@ def stages(
     from refgi.vectors.export import export_case
     from refgi.vectors.frames import frame_case
 
-    several = isinstance(scene, Sequence) and not isinstance(scene, str)
-    scenes = [load_scene(one) if isinstance(one, str | Path) else one for one in (scene if several else [scene])]
+    every = scene if isinstance(scene, Sequence) and not isinstance(scene, str) else [scene]
+    scenes = [load_scene(one) if isinstance(one, str | Path) else one for one in every]
     expect(len(scenes) > 0, "scene", "a scene, or one or more of a sequence", "none")
     expect(len(scenes) > 1 or temporal is None, "temporal", "the scenes of two frames or more to blend", "one")
     export_case(frame_case(method, scenes, method, settings, temporal, only=only, **options), Path(folder))

@@ -8,7 +8,7 @@ PYTEST := $(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 # tests start many processes, which would compile all sources each time
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test quick test-for test-all coverage check evidence bench stress mutate kit-score records docs clean
+.PHONY: demo test quick test-for test-all coverage check evidence bench stress mutate kit-score records wheel docs clean
 
 demo: $(VENV)/run.stamp
 	$(BIN)/refgi compare cornell_box --methods sii,multires,val,hssil --out out/
@@ -56,6 +56,11 @@ kit-score: $(VENV)/dev.stamp
 
 records: $(VENV)/dev.stamp
 	$(BIN)/python -m benchmarks records --make
+
+wheel: $(VENV)/dev.stamp
+	$(BIN)/python -m refgi.jit.ahead
+	$(BIN)/pip wheel --no-deps -w dist .
+	rm -r refgi/jit/brought
 
 docs: $(VENV)/dev.stamp docs/extra
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html

@@ -1,11 +1,16 @@
 """Compile kernels ahead, in as many processes as there are cores.
 
 `signatures.txt` lists which specialisations the methods need at their defaults: a line holds a kernel, its argument
-types as `refgi.jit.kernelfile` writes them, and what needs them.
+types as `refgi.jit.kernelfile` writes them, and what needs them. `python -m refgi.jit.ahead` compiles them for every
+level of processors into the package itself, for a wheel to bring along.
 """
 
 import importlib
 import os
+import shutil
+import subprocess
+import sys
+import tempfile
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -13,6 +18,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from refgi.jit.cache import BROUGHT, FOLDER, LEVELS, levels, target_of
 from refgi.jit.kernelfile import types_of
 
 LIST = Path(__file__).with_name("signatures.txt")
@@ -55,7 +61,7 @@ def _is_kept(one: Specialisation) -> bool:
     """Return whether a specialisation is on disk, or cannot be made from this list any more."""
     try:
         kernel, arguments = one.find()
-        kept: bool = kernel._cache.path(arguments).exists()
+        kept: bool = kernel._cache.has(arguments)
     except (ImportError, AttributeError, TypeError, ValueError):
         return True
     return kept
@@ -89,3 +95,20 @@ def _compile(group: Sequence[Specialisation]) -> int:
 def cores() -> int:
     """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def bring_along() -> None:
+    """Compile for each level, into `BROUGHT`, anew: what the methods need in float32, and what a comparison needs.
+
+    What a comparison needs is found by running it, so for those levels alone that this processor has.
+    """
+    shutil.rmtree(BROUGHT, ignore_errors=True)
+    for level in LEVELS:
+        environment = os.environ | target_of(level) | {FOLDER: str(BROUGHT)}
+        with tempfile.TemporaryDirectory() as folder:
+            for command in (["warm"], ["compare", "cornell_box", "--out", folder])[:1 + (level in levels())]:
+                subprocess.run([sys.executable, "-m", "refgi", *command], check=True, env=environment)
+
+
+if __name__ == "__main__":
+    bring_along()

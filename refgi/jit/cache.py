@@ -11,6 +11,9 @@ One file holds one specialisation of one kernel. Its name says the kernel, the k
 of the argument types, and nothing about where the sources lie or when they were written. What is in it stands in
 `refgi.jit.kernelfile`; one that is damaged, even inside machine code, counts as absent and is written anew.
 
+A wheel may bring kernels along, in `BROUGHT`. They are compiled for a level of the x86-64 psABI, of which the
+processor's best is taken; they compute the same bits, since arithmetic is strict.
+
 Machine code of a file is run, so only what nobody else can have written is read: neither the folder nor a file may
 belong to another user, or be writable by one.
 """
@@ -43,29 +46,55 @@ from refgi.jit.kernelfile import FORMAT, packed, unpacked
 LIBRARIES = sys.stdlib_module_names | {"llvmlite", "numba", "numpy"}  # known by their versions
 COMPILERS = ("dispatch.py", "bands.py", "launcher.py")  # of this package
 # of the environment, where it is set: what Numba compiles for and how
-TARGET = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE", "NUMBA_OPT",
-          "NUMBA_SLP_VECTORIZE")
+NAMED = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
+TARGET = (*NAMED, "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE", "NUMBA_OPT", "NUMBA_SLP_VECTORIZE")
+V3 = "avx avx2 bmi bmi2 cx16 f16c fma lzcnt movbe popcnt sahf sse4.2"
+LEVELS = {"x86-64-v4": f"{V3} avx512f avx512bw avx512cd avx512dq avx512vl", "x86-64-v3": V3}  # features; the best first
+BROUGHT = Path(__file__).with_name("brought")  # kernels of a wheel
 OVERLOADS = "__overloads__"  # attribute of a function that stands for others, by argument types
 READS = frozenset({"LOAD_GLOBAL", "LOAD_NAME"})  # operations that read a global
 EXACT = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
 
 
-def code_key(function: Callable[..., Any]) -> str:
-    """Return the key of a kernel's code, 32 hexadecimal digits; `function` is the Python function that is compiled."""
-    digest = hashlib.sha256(_platform().encode())
-    for part in _function(function, set()):
-        digest.update(part.encode() + b"\0")
-    return digest.hexdigest()[:32]
+def code_key(function: Callable[..., Any], level: str = "") -> str:
+    """Return the key of a kernel's code, 32 hexadecimal digits; `function` is the Python function that is compiled.
+
+    `level`: of `LEVELS`, what it is compiled for; by default what Numba compiles for here.
+    """
+    return hashlib.sha256(f"{_platform(level)} {_reached(function)}".encode()).hexdigest()[:32]
 
 
 @cache
-def _platform() -> str:
-    features = llvmlite.binding.get_host_cpu_features().flatten()
+def _reached(function: Callable[..., Any]) -> str:
+    """Return a digest of a kernel's code and of what it reaches."""
+    digest = hashlib.sha256()
+    for part in _function(function, set()):
+        digest.update(part.encode() + b"\0")
+    return digest.hexdigest()
+
+
+@cache
+def _platform(level: str = "") -> str:
+    chosen = {name: os.environ[name] for name in TARGET if os.environ.get(name)} | target_of(level)
+    if not all(name in chosen for name in NAMED):
+        chosen["host"] = llvmlite.binding.get_host_cpu_features().flatten()
     bounds = os.environ.get("NUMBA_BOUNDSCHECK", "")
-    target = "".join(f" {name}={os.environ[name]}" for name in TARGET if os.environ.get(name))
     ours = hashlib.sha256(b"".join(Path(__file__).with_name(name).read_bytes() for name in COMPILERS))
-    return (f"{sys.version_info[:2]} {numba.__version__} {llvmlite.__version__} {np.__version__} {features} {bounds} "
-            f"{ours.hexdigest()}{target}")
+    return (f"{sys.version_info[:2]} {sys.platform} {platform.machine()} {numba.__version__} {llvmlite.__version__} "
+            f"{np.__version__} {bounds} {ours.hexdigest()} {sorted(chosen.items())}")
+
+
+def target_of(level: str) -> dict[str, str]:
+    """Return the environment in which Numba compiles for a level; of no level an empty one."""
+    return {} if not level else {
+        "NUMBA_CPU_NAME": level, "NUMBA_CPU_FEATURES": ",".join(f"+{name}" for name in LEVELS[level].split())}
+
+
+@cache
+def levels() -> list[str]:
+    """Return the levels that the processor has, the best first."""
+    features = llvmlite.binding.get_host_cpu_features()
+    return [level for level, needed in LEVELS.items() if all(features.get(name) for name in needed.split())]
 
 
 def _function(function: Callable[..., Any], known: set[int]) -> Iterator[str]:
@@ -178,17 +207,31 @@ class KernelCache:
 
     def path(self, signature: Any) -> Path:
         """Return the file of a specialisation."""
+        return _usable(cache_root()) / self._name(signature)
+
+    def brought(self, signature: Any) -> Path | None:
+        """Return the file of a specialisation that came with the package, None where none is for this target."""
+        if not BROUGHT.is_dir() or any(os.environ.get(name) for name in NAMED):
+            return None
+        paths = (BROUGHT / self._name(signature, level) for level in levels())
+        return next((path for path in paths if path.exists()), None)
+
+    def has(self, signature: Any) -> bool:
+        """Return whether there is a file of a specialisation."""
+        return self.path(signature).exists() or self.brought(signature) is not None
+
+    def _name(self, signature: Any, level: str = "") -> str:
         arguments, _ = sigutils.normalize_signature(signature)
         text = " ".join(part for argument in arguments for part in _type(argument))
         name = f"{self._function.__module__.rpartition('.')[2]}.{self._function.__name__}"
         mark = hashlib.sha256(FORMAT + text.encode()).hexdigest()[:16]
-        return _usable(cache_root()) / f"{name}-{_code_key(self._function)}-{mark}.kernel"
+        return f"{name}-{code_key(self._function, level)}-{mark}.kernel"
 
     @contextlib.contextmanager
     def made_by_one(self, signature: Any) -> Iterator[None]:
         """Let one process at a time make a specialisation; others wait, and then find it on the disk."""
         path = self.path(signature)
-        if path.exists() or (lock := _lock(path.parent)) is None:
+        if self.has(signature) or (lock := _lock(path.parent)) is None:
             yield
             return
         byte = int.from_bytes(hashlib.sha256(path.name.encode()).digest()[:6])
@@ -206,10 +249,13 @@ class KernelCache:
             content = _own_bytes(path)
             return None if content is None else unpacked(content, self._function, signature, target)
         except FileNotFoundError:
-            return None
+            pass
         except Exception:  # damaged, or written by what this program no longer understands
             path.unlink(missing_ok=True)
-            return None
+        if (brought := self.brought(signature)) is not None:
+            with contextlib.suppress(Exception):  # damaged; it is as trusted as the sources beside it
+                return unpacked(brought.read_bytes(), self._function, signature, target)
+        return None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
         """Write a specialisation, whole or not at all; one that holds addresses of this process stays in memory."""
@@ -272,7 +318,7 @@ def _stranger(status: os.stat_result) -> str:
 def _type(kind: Any) -> Iterator[str]:
     """Describe an argument's type; named tuples by their fields, kernels by their code."""
     if isinstance(kind, types.Dispatcher):
-        yield _code_key(kind.dispatcher.py_func)
+        yield _reached(kind.dispatcher.py_func)
     else:
         yield str(kind)
     if (named := getattr(kind, "instance_class", None)) is not None:
@@ -281,11 +327,6 @@ def _type(kind: Any) -> Iterator[str]:
         items: Any = kind
         for item in items:
             yield from _type(item)
-
-
-@cache
-def _code_key(function: Callable[..., Any]) -> str:
-    return code_key(function)
 
 
 @cache

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from refgi.jit.cache import LEVELS, levels, target_of
+
 CALL = "import package_a.outer as o; print(o.outer(1.5), sum(o.outer.stats.cache_hits.values()))"
 
 
@@ -283,6 +285,51 @@ def test_processes_that_compile_ahead_share_the_folder_that_takes_the_place(pack
             "    print(len(missing(few)))\n")
     done = process(package, code)
     assert (done.stdout.strip(), done.stderr) == ("0", "")
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> Path:
+    """The package, and beside it the folder `brought` of its kernel for every level that the processor has."""
+    package = written(tmp_path_factory.mktemp("wheel") / "package_a")
+    for level in levels():
+        subprocess.run([sys.executable, "-c", CALL], check=True, env=surroundings(package) | target_of(level) | {
+            "REFGI_CACHE_DIR": str(package.parent / "brought")})
+    return package
+
+
+def from_wheel(folder: Path, then: str = "") -> str:
+    return f"import refgi.jit.cache as c, pathlib; c.BROUGHT = pathlib.Path({str(folder)!r}) / 'brought'; {then}{CALL}"
+
+
+needs_a_level = pytest.mark.skipif(not levels(), reason="wheels bring kernels for x86-64-v3 and better")
+
+
+@needs_a_level
+@pytest.mark.parametrize("level", LEVELS)
+def test_kernels_of_a_wheel_run_at_the_best_level_that_is_there(wheel, package, level):
+    """And none is written."""
+    assert run(package, call=from_wheel(wheel.parent, f"c.levels = lambda: [{level!r}]; ")) == (
+        "5.0 1" if level in levels() else "5.0 0")
+    assert bool(list((package.parent / "cache").glob("*.kernel"))) == (level not in levels())
+
+
+@needs_a_level
+@pytest.mark.parametrize("then", [
+    "c.levels = lambda: []; ", "import os; os.environ['NUMBA_CPU_NAME'] = 'x86-64'; ",
+    "import os; os.environ['NUMBA_OPT'] = '2'; ",
+    "[f.write_bytes(f.read_bytes()[:-1]) for f in c.BROUGHT.iterdir()]; "],
+    ids=["no level", "another target", "another optimisation", "damaged"])
+def test_kernels_of_a_wheel_that_do_not_fit_are_compiled(wheel, package, then):
+    shutil.copytree(wheel.parent / "brought", package.parent / "brought")
+    assert run(package, call=from_wheel(package.parent, then)) == "5.0 0"
+
+
+@pytest.mark.parametrize(("lacks", "found"), [
+    ("", ["x86-64-v4", "x86-64-v3"]), ("avx512vl", ["x86-64-v3"]), ("fma", [])])
+def test_a_level_is_there_with_all_its_features(monkeypatch, lacks, found):
+    features = {name: name != lacks for level in LEVELS.values() for name in level.split()}
+    monkeypatch.setattr("llvmlite.binding.get_host_cpu_features", lambda: features)
+    assert levels.__wrapped__() == found
 
 
 RESULTS = """\

@@ -95,7 +95,8 @@ def _frames(asked: Asked) -> "tuple[list[Scene], TemporalSettings | None, str]":
     expect((filtering is not None) <= number < count, "--frame",
            f"1 to {count - 1}, a frame that follows on others" if filtering else f"0 to {count - 1}", number)
     alone = "" if filtering else " by itself: the frames before leave nothing to it; --temporal blends their light"
-    return [*islice(scenes_along(scene, way, count), number + 1)], filtering, f", frame {number} of {count}{alone}"
+    said = f", frame {number} of 0 to {count - 1}{alone}"
+    return [*islice(scenes_along(scene, way, count), number + 1)], filtering, said
 
 
 _vectors.add_command(_export)

@@ -242,8 +242,14 @@ def report_sampling(
 def with_seen_light(
     stated: SamplingError | None, frame: "Frame", receivers: Receivers, lights: "PixelLights"
 ) -> SamplingError | None:
-    """Return a sampling error that is no less than what lights lack of the light of visible surfaces."""
+    """Return a sampling error that is no less than what lights lack of the light of visible surfaces.
+
+    Warns where none that was drawn has flux, which a picture alone does not tell from a scene without indirect light.
+    """
     if stated is None:
+        if lights.drawn and not lights.flux.any() and (frame.direct * frame.sent_albedo).any():
+            warnings.warn(RefgiWarning(f"none of {lights.drawn:,} pixel lights has flux, but the camera sees lit "
+                                       "surfaces: more of them, or another seed, bring light"), stacklevel=3)
         return None
     lacking = seen_light(frame.scene.camera, frame.sent_albedo, frame.direct, receivers, lights) - 1
     return stated._replace(pixel=max(stated.pixel, lacking), mean=max(stated.mean, lacking),

@@ -1,17 +1,21 @@
 """Pixels at which errors are looked for, more of them where lights are near; what is stated from these holds at all."""
 
+import dataclasses
 import functools
 import importlib
 import math
+import warnings
 
 import numpy as np
 import pytest
 
 from refgi.diagnostics import diagnosing
+from refgi.errors import RefgiWarning
 from refgi.frame import Frame
 from refgi.lights.selection import choose_lights, footprints
-from refgi.lights.settings import with_clamp
+from refgi.lights.settings import LightSettings, with_clamp
 from refgi.literal.pairs import pair
+from refgi.methods import find_method, render
 from refgi.pairs import estimates
 from refgi.pairs.estimates import (
     FEW_SAMPLED,
@@ -180,3 +184,17 @@ def test_lights_at_one_place_and_extreme_ones_leave_a_sample(flux):
     sample = sample_peaks(points, packed, 100)
     assert 50 <= len(sample.place) <= 101
     assert sample.weight.sum() == pytest.approx(900, rel=0.2)
+
+
+@pytest.mark.parametrize("method", ["sii", "vpl"])
+def test_lights_without_flux_are_no_scene_without_indirect_light(method):
+    """Of the first seed the one light lies beside the spot's cone; a lamp that lights nothing gives no warning."""
+    options = {"width": 16, "height": 12, "rsm_resolution": 32}
+    settings = find_method(method).settings(lights=LightSettings(count=1))
+    with pytest.warns(RefgiWarning, match="none of 1 pixel lights has flux"):
+        assert not render("cornell_box", method, settings, **options).irradiance.any()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        scene = load_scene("cornell_box")
+        outside = dataclasses.replace(scene.lights[0], position=(0.0, 9.0, 0.0), direction=(0.0, 1.0, 0.0))
+        render(scene.with_lights(outside), method, settings, **options)

@@ -196,6 +196,19 @@ def test_what_numba_compiles_for_changes_the_key(monkeypatch, name):
     assert _platform.__wrapped__() != plain
 
 
+def test_the_processor_changes_the_key_but_that_of_a_level(monkeypatch):
+    """Kernels of a wheel are found on any processor that has their level, those made here on one like this."""
+    from refgi.jit.cache import LEVELS, NAMED, _platform
+
+    for name in NAMED:
+        monkeypatch.delenv(name, raising=False)
+    here = {level: _platform.__wrapped__(level) for level in ("", *LEVELS)}
+    monkeypatch.setattr(llvmlite.binding, "get_host_cpu_features", lambda: llvmlite.binding.FeatureMap(sse2=True))
+    there = {level: _platform.__wrapped__(level) for level in here}
+    assert [level for level in here if here[level] == there[level]] == list(LEVELS)
+    assert len(set(here.values())) == len(here)
+
+
 @pytest.mark.parametrize(("name", "features", "wide"), [
     (None, "+sse2,+avx512f", True), (None, "+avx2,-avx512f", False), ("skylake-avx512", None, False),
     ("skylake-avx512", "+avx2,+avx512f", True), ("x86-64", None, False)])

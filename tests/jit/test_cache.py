@@ -151,6 +151,23 @@ def test_a_damaged_cache_is_dropped_and_rebuilt(compiled, damage):
     assert run(compiled) == "5.0 1"
 
 
+def test_a_kernel_that_is_an_argument_counts_by_its_code(package):
+    (package / "outer.py").write_text(textwrap.dedent("""\
+        from package_a.inner import inner
+        from refgi.jit import kernel
+
+        @kernel
+        def other(x):
+            return x - 1.0
+
+        @kernel
+        def outer(function, x):
+            return function(x)
+        """))
+    call = "import package_a.outer as o; print(o.outer(o.{}, 1.5), sum(o.outer.stats.cache_hits.values()))"
+    assert [run(package, call=call.format(name)) for name in ("inner", "other", "inner")] == ["2.5 0", "0.5 0", "2.5 1"]
+
+
 def test_only_entry_points_are_kept(once):
     assert [path.name.partition("-")[0] for path in (once.parent / "cache").glob("*.kernel")] == ["outer.outer"]
 

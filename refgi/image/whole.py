@@ -11,6 +11,7 @@ import os
 import platform
 import re
 import secrets
+import shutil
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -61,7 +62,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def temporary_name(path: Path) -> Path:
-    """Return a new name for a file that is not whole yet; it tells who writes it.
+    """Return a new name for a file or folder that is not whole yet; it tells who writes it.
 
     Parameters
     ----------
@@ -105,12 +106,12 @@ def is_dead(name: str) -> bool:
 
 @cache
 def remove_dead(folder: Path) -> None:
-    """Remove temporary files of ended processes from a folder, which may be missing, when it is first written to."""
+    """Remove temporary files and folders of ended processes from a folder when it is first written to; it may lack."""
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
             if is_dead(entry.name):
                 with contextlib.suppress(OSError):
-                    Path(entry.path).unlink()
+                    shutil.rmtree(entry.path) if entry.is_dir(follow_symlinks=False) else Path(entry.path).unlink()
 
 
 @cache

@@ -8,7 +8,6 @@ import functools
 import hashlib
 import io
 import math
-import secrets
 import shutil
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
@@ -21,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from refgi.errors import InputError, expect
+from refgi.image.whole import temporary_name
 from refgi.jit import threads
 from refgi.processes import pool
 from refgi.types import Array, Tell
@@ -170,7 +170,7 @@ def _write_kit(
     if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / KIT).is_file())):
         found = "a folder of other files" if out.is_dir() else "a file"
         raise InputError(f"{out}: expected a new folder or a kit, got {found}", file=str(out))
-    part = out.with_name(f".{out.name}.{secrets.token_hex(4)}.part")
+    part = temporary_name(out)
     groups: dict[str, list[str]] = {}
     for name in cases:
         groups.setdefault(name.partition("-")[0], []).append(name)

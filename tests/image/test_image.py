@@ -25,6 +25,7 @@ from refgi.image import (
     write_png,
     write_text,
 )
+from refgi.image.whole import temporary_name
 
 
 def bits(plane):
@@ -288,3 +289,15 @@ def test_a_kill_leaves_a_whole_file(tmp_path, evidence):
             seen.append(attributes["n"])
     assert seen
     evidence(f"{len(seen)} of {len(seen)} files whole after kill -9")
+
+
+def test_folders_of_killed_processes_are_removed_and_those_of_living_ones_stay(tmp_path):
+    code = ("import os, sys; from pathlib import Path; from refgi.image.whole import temporary_name\n"
+            "part = temporary_name(Path(sys.argv[1])); part.mkdir(); (part / 'file').touch(); os.kill(os.getpid(), 9)")
+    (mine := temporary_name(tmp_path / "kit")).mkdir()
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", code, str(tmp_path / "kit")], check=False)
+        assert done.returncode == -signal.SIGKILL
+        left = set(tmp_path.iterdir())
+        assert len(left) == 2
+        assert mine in left

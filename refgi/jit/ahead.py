@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 from refgi.jit.cache import BROUGHT, FOLDER, LEVELS, levels, target_of
 from refgi.jit.kernelfile import types_of
 
+FIRST = (("compare", "cornell_box"), ("vectors", "export", "--kit", "quick"))  # what a newcomer runs
 LIST = Path(__file__).with_name("signatures.txt")
 
 Progress = Callable[[str, float], None]
@@ -98,15 +99,16 @@ def cores() -> int:
 
 
 def bring_along() -> None:
-    """Compile for each level, into `BROUGHT`, anew: what the methods need in float32, and what a comparison needs.
+    """Compile for each level, into `BROUGHT`, anew: what the methods need in float32, and what `FIRST` does.
 
-    What a comparison needs is found by running it, so for those levels alone that this processor has.
+    What a command needs is found by running it, so for those levels alone that this processor has.
     """
     shutil.rmtree(BROUGHT, ignore_errors=True)
     for level in LEVELS:
         environment = os.environ | target_of(level) | {FOLDER: str(BROUGHT)}
         with tempfile.TemporaryDirectory() as folder:
-            for command in (["warm"], ["compare", "cornell_box", "--out", folder])[:1 + (level in levels())]:
+            commands = [(*command, "--out", str(Path(folder, command[0]))) for command in FIRST]
+            for command in [("warm",), *(commands if level in levels() else [])]:
                 subprocess.run([sys.executable, "-m", "refgi", *command], check=True, env=environment)
 
 

@@ -196,6 +196,14 @@ def test_what_numba_compiles_for_changes_the_key(monkeypatch, name):
     assert _platform.__wrapped__() != plain
 
 
+def test_what_compiles_changes_the_key(monkeypatch):
+    from refgi.jit import cache
+
+    plain = cache._platform.__wrapped__()
+    monkeypatch.setattr(cache, "COMPILERS", cache.COMPILERS[:-1])
+    assert cache._platform.__wrapped__() != plain
+
+
 def test_the_processor_changes_the_key_but_that_of_a_level(monkeypatch):
     """Kernels of a wheel are found on any processor that has their level, those made here on one like this."""
     from refgi.jit.cache import LEVELS, NAMED, _platform

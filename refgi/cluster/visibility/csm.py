@@ -109,16 +109,18 @@ def find_penumbra(
             rows[DEPTH, i] += w * (cosine * means[2 * terms + k, i] - sine * means[3 * terms + k, i])
             rows[SINE, i] = sine * rows[STEP_COSINE, i] + cosine * rows[STEP_SINE, i]
             rows[COSINE, i] = cosine * rows[STEP_COSINE, i] - sine * rows[STEP_SINE, i]
+    for i in range(size):  # four loops: one would be too long for the compiler to join into SIMD lanes
+        pending[i] = pending[i] & (half - rows[SHADE, i] >= real(LEAST_BLOCKED))
     for i in range(size):
-        blocked = half - rows[SHADE, i]
-        found = pending[i] & (blocked >= real(LEAST_BLOCKED))
-        pending[i] = found
-        d = rows[D, i]
         # Sec. 4.1: z_avg
-        depth = (half * means[4 * terms, i] - rows[DEPTH, i]) / blocked if found else rows[ON_SERIES, i]
-        depth = min(max(series_distance(scale, depth), near), d) if found else d
-        rows[DEPTH, i] = depth
-        extent = rows[EXTENT, i]
+        depth = (half * means[4 * terms, i] - rows[DEPTH, i]) / (half - rows[SHADE, i])
+        rows[DEPTH, i] = depth if pending[i] else rows[ON_SERIES, i]
+    for i in range(size):
+        d = rows[D, i]
+        depth = min(max(series_distance(scale, rows[DEPTH, i]), near), d)
+        rows[DEPTH, i] = depth if pending[i] else d
+    for i in range(size):
+        extent, d, depth = rows[EXTENT, i], rows[D, i], rows[DEPTH, i]
         # Sec. 4.2: alpha = arctan(p cos(beta) / d)
         rows[RADIUS, i] = published_tangent(extent, d, depth) if sizing.alpha else cone_tangent(extent, d, depth)
     place_filters(sizing.alpha_over_pi, size, rows)

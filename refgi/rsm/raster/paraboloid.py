@@ -136,8 +136,8 @@ def clear_outside_disc(projection: Projection, nearness: Array, ids: Array) -> N
 @kernel
 def to_distance(projection: Projection, keys: Array, distance: Array) -> float:
     """Write distances of a map from its keys, inf where there is no surface and outside the disc."""
-    n, half, least = projection.width, projection.half[0], np.inf
-    step, real, nearness = 2.0 * half / n, distance.dtype.type, keys.view(np.float64)
+    n, half, real = projection.width, projection.half[0], distance.dtype.type
+    step, nearness, least = 2.0 * half / n, keys.view(np.float64), np.full(n, real(np.inf))
     for row in range(n):
         t = (row + 0.5) * step - half
         line, place = np.uint64(row), np.uint64(row * (n + LANES))
@@ -147,9 +147,12 @@ def to_distance(projection: Projection, keys: Array, distance: Array) -> float:
             # no surface: nearness 0, distance inf
             far = (1.0 + square) / nearness[place + np.uint64(column)]
             distance[line, np.uint64(column)] = real(far if square <= 1.0 else np.inf)
-        for column in range(n):
-            least = min(least, distance[row, column])
-    return least
+        for column in range(n):  # of each column: one least of all would wait for the one before
+            least[column] = min(least[column], distance[line, np.uint64(column)])
+    nearest = np.inf
+    for column in range(n):
+        nearest = min(nearest, least[column])
+    return nearest
 
 
 @kernel

@@ -150,7 +150,7 @@ def _even(count: int) -> Array:
     return np.stack([(np.arange(count) + 0.5) / count, second])
 
 
-Weights = Literal["even", "flux", "light"]
+Weights = Literal["flux", "light"]
 
 
 def vpl_visibility(
@@ -158,7 +158,7 @@ def vpl_visibility(
 ) -> VisibilityFunction:
     """Return V of an area light as the share of its lights that a receiver sees.
 
-    A light counts 1 ("even"), its "flux" in all channels, or the "light" that it would give a diffuse receiver. Lights
+    A light counts its "flux" in all channels, or the "light" that it would give a diffuse receiver. Lights
     that face away from a receiver, or lie below its horizon, do not count; where none is left V is 1. Those above the
     horizon of an interpolated normal and below the face are hidden. There is no rule for receivers behind the area
     light.
@@ -176,7 +176,7 @@ def vpl_visibility(
         def contribution(toward: Array, up: Array) -> Array:
             away: Array = -np.einsum("nkc,ck->nk", toward, normal[:, of])
             if weights != "light":
-                counted: Array = np.where(away > 0, flux[of] if weights == "flux" else 1.0, 0.0)
+                counted: Array = np.where(away > 0, flux[of], 0.0)
                 return counted
             square = np.einsum("nkc,nkc->nk", toward, toward)
             above = np.einsum("nkc,nc->nk", toward, up)

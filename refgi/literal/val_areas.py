@@ -189,19 +189,6 @@ def facing(normal: Any, triangle_id: Any, vertices: Any = None, faces: Any = Non
     return np.where(triangle_id >= 0, turned, 0)
 
 
-def sampled_pixels(position: Any, normal: Any, triangle_id: Any, shifts: Any) -> Any:
-    """Return position, normal (3, 1, n) and triangle (1, n) of pixels, one of each of n equal parts of the surface.
-
-    Pixels without surface, triangle_id < 0, do not count; shifts (n,) are places within the parts, in rows.
-    """
-    surface, n = np.flatnonzero(triangle_id >= 0), len(shifts)
-    part = len(surface) / n
-    place = np.floor((np.arange(n) + shifts) * part).astype(int)
-    at = surface[np.minimum(place, len(surface) - 1)]
-    x, up = position.reshape(3, -1), normal.reshape(3, -1)
-    return x[:, None, at], up[:, None, at], triangle_id.reshape(-1)[None, at]
-
-
 def interleaving(of: Any, side: int, assignment: str) -> Any:
     """Return the subset of each light (N,), 0 to n^2 - 1, n = `side` (Sec. 6, E-VAL-13).
 

@@ -1,8 +1,8 @@
 """`ValSettings` as arguments of refgi.literal.val, over the n pixels that see a surface.
 
 Of the frame it takes the G-buffer, the shadow maps of lamps and the pixel lights chosen. What the literal text has no
-word for: rays in place of maps (tests/naive), the search for as many area lights as an error asks for. A picture of
-subsplats is within its error of this one, in which every pixel sums all lights.
+word for: rays in place of maps (tests/naive). A picture of subsplats is within its error of this one, in which every
+pixel sums all lights.
 """
 
 import math
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from refgi.cluster.settings import AdaptiveClusters, BackProjection, GeometryBlur, RaysRectangle, RaysVpls
+from refgi.cluster.settings import BackProjection, GeometryBlur, RaysRectangle, RaysVpls
 from refgi.lights.selection import choose_lights, footprints
 from refgi.literal import val as literal
 from refgi.literal import val_areas, val_maps
@@ -21,8 +21,6 @@ from tests.literal.shadows import shadows_of
 from tests.literal.whole.pairs import contributions
 from tests.naive import area_rays
 from tests.naive.crossings import corners_of
-
-BACK = 0.75  # of the area lights that were enough: the one step back
 
 
 class View(NamedTuple):
@@ -79,40 +77,15 @@ def clustered(view, areas, shares):
     return (view.light * shares[areas.of][..., None]).sum(axis=0)
 
 
-# how many area lights
+# area lights
 
 
 def grouped(view):
-    """Return area lights and V (K, n) of each at every pixel, as many as are set or as an error asks for."""
-    clusters = view.settings.clusters
-    if not isinstance(clusters, AdaptiveClusters):
-        return trial(view, clusters.count)
-    members = np.array([area_rays.visible_members(view, [i]) for i in range(len(view.light))])
-    exact = (view.light * members[..., None]).sum(axis=0)
-    assert len(view.pixels) <= 2048  # of more the error is estimated
-
-    def error(attempt):
-        return math.sqrt(((clustered(view, *attempt) - exact) ** 2).mean()) / exact.mean()
-
-    most, count = len(view.light), 1
-    best = latest = trial(view, 1)
-    while error(latest) > clusters.target_error and count < most:
-        count = min(2 * count, most)
-        latest = trial(view, count)
-        best = latest if error(latest) <= clusters.target_error or error(latest) < error(best) else best
-    back = math.ceil(BACK * count)
-    if error(latest) <= clusters.target_error and (count + 1) // 2 < back < count:
-        latest = trial(view, back)
-        best = latest if error(latest) <= clusters.target_error else best
-    return best
-
-
-def trial(view, count):
-    """Return so many area lights and V of each at every pixel."""
+    """Return area lights and V (K, n) of each at every pixel."""
     kind, how, lights = view.settings.clusters, view.settings.area, view.lights
     normal = lights.normal.astype(float) / np.linalg.norm(lights.normal.astype(float), axis=0)
     areas = literal.area_lights(
-        lights.position.astype(float), normal, illuminated(view.frame), count=count, distance=kind.distance,
+        lights.position.astype(float), normal, illuminated(view.frame), count=kind.count, distance=kind.distance,
         w_x=kind.position_weight, w_a=kind.normal_weight, rounds=kind.rounds, axes=how.axes, extent=how.extent,
         unbiased=how.unbiased_area)
     if how.single_light == "footprint":

@@ -17,8 +17,6 @@ CLUSTERS = [
     vary("extent", "longer", "shorter"),
     vary("unbiased_area", True),
     vary("foreshortened", True),
-    vary("single_light", "footprint", area_lights=96),
-    vary("single_light", "footprint", area_lights=96, visibility="step"),
 ]
 MAPS = [
     vary("map_resolution", 33),

@@ -56,8 +56,6 @@ class AreaLightSettings(Settings):
     extent: Extent = setting("root", "Delta: root of the area, longer or shorter side", study=True)
     unbiased_area: bool = setting(False, "the rectangle grows by what a sample of n lights misses", study=True)
     foreshortened: bool = setting(False, "Delta shrinks with the cosine towards the receiver", study=True)
-    single_light: Literal["point", "footprint"] = setting(
-        "point", "a cluster of one light is a point, or has its light's footprint", study=True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -210,8 +208,6 @@ class ValSettings(Settings):
     def check(self) -> None:
         """Check what parts ask of each other."""
         expect_footprints(self.lights, self.pairs)
-        expect(self.area.single_light == "point" or self.lights.has_footprints, "area.single_light",
-               "'point' with the source 'walk' or the flux 'roulette'", self.area.single_light)
 
     @property
     def drawn_maps(self) -> ShadowMapSettings:

@@ -33,7 +33,7 @@ from refgi.error_target.error_driven import error_driven
 from refgi.error_target.near import shadowed_by_clusters
 from refgi.jit import thread_count
 from refgi.ledger import Ledger, account
-from refgi.lights.selection import choose_lights, footprints, light_areas
+from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import (
     CLAMP,
     FINER,
@@ -162,9 +162,8 @@ def cluster_lights(
     frame: "Frame", lights: "PixelLights", settings: ValSettings
 ) -> tuple[AreaLights, ShadowMaps | None]:
     """Group N pixel lights into M area lights and draw what each sees (Sec. 5, 6); no maps where none are read."""
-    surface = None if settings.area.single_light == "point" else light_areas(frame, settings.lights)
     clusters = clusters_of(lights.position, lights.normal, settings.clusters, frame.illuminated_extent)
-    areas = area_lights(lights, clusters, settings.area, surface)
+    areas = area_lights(lights, clusters, settings.area)
     if settings.visibility is None or isinstance(settings.visibility, WITHOUT_MAPS):
         chosen = "none" if settings.visibility is None else settings.visibility.name()
         skip("cluster.shadow_maps", f"visibility {chosen!r} reads none")

@@ -47,7 +47,7 @@ def ball():
     {}, {"visibility": "pcss"}, {"visibility": "hard"}, {"visibility": "rays_vpls"}, {"visibility": "rays_rectangle"},
     {"visibility": "back_projection"}, {"visibility": "pcf"}, {"prefilter": "brute"}, {"interleaving": 4},
     {"quantisation": "published"}, {"behind": "dual_paraboloid"}, {"behind": "raytrace"}, {"clamp": "disc"},
-    {"single_light": "footprint"}, {"near_geometry": "keep"}, {"near_geometry": "ball"}, {"renderer": "rays"},
+    {"near_geometry": "keep"}, {"near_geometry": "ball"}, {"renderer": "rays"},
     {"distance": "raw"}, {"distance": "squared"}, {"axes": "pca"}, {"axes": "min_area"},
     {"as_published": ("val_alpha", "val_search_solid_angle")}, {"as_published": ("val_alpha_over_pi",)},
 ], ids=str)
@@ -214,7 +214,6 @@ def test_a_setting_that_cannot_be_is_named(key, value):
 
 
 @pytest.mark.parametrize(("key", "how"), [
-    ("single_light", {"single_light": "footprint", "source": "walk"}),
     ("visibility.terms", {"visibility": "pcss", "terms": 4}), ("blur.extent", {"blur": "box", "blur_extent": 0.1})])
 def test_settings_that_do_not_go_together_are_refused(key, how):
     with pytest.raises(InputError, match=key):

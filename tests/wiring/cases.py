@@ -213,5 +213,4 @@ def differences(one: Any, other: Any) -> Iterator[str]:
 
 
 def name_of(choice: Any) -> str:
-    """Return the name of what a choice holds."""
     return "none" if choice is None else choice.name()

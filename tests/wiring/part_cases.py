@@ -137,7 +137,6 @@ def shadow_cases(kind):
         "the shorter side": few({"area.extent": "shorter"}),
         "unbiased areas": few({"area.unbiased_area": True}),
         "foreshortened": few({"area.foreshortened": True}),
-        "single lights with their footprint": Case({"area.single_light": "footprint"}, {"clusters.count": 40, **pcss}),
         "finer maps": few({"maps.resolution": 24}),
         "maps by rays": few({"maps.renderer": "rays"}, same="both renderers find the same distances"),
         "near geometry kept": few({"maps.near_geometry": "keep"}, {"maps.near_distance": 0.6}),

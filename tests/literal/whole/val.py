@@ -15,8 +15,6 @@ from refgi.lights.selection import choose_lights, footprints
 from refgi.literal import val as literal
 from refgi.literal import val_areas, val_maps
 from refgi.literal.val_filters import blur
-from refgi.pairs.settings import PairSettings
-from refgi.settings import of
 from tests.literal.shadows import shadows_of
 from tests.literal.whole.pairs import contributions
 from tests.naive import area_rays
@@ -35,6 +33,7 @@ class View(NamedTuple):
     lights: object
     light: np.ndarray  # (N, n, 3) W/m^2 of each pixel light, not shadowed
     corners: np.ndarray  # (T, 3, 3) of all triangles
+    drawn: np.ndarray | None = None  # those of maps, which rays meet where planes are left out
 
 
 def picture(frame, settings):
@@ -88,10 +87,6 @@ def grouped(view):
         lights.position.astype(float), normal, illuminated(view.frame), count=kind.count, distance=kind.distance,
         w_x=kind.position_weight, w_a=kind.normal_weight, rounds=kind.rounds, axes=how.axes, extent=how.extent,
         unbiased=how.unbiased_area)
-    if how.single_light == "footprint":
-        surface = footprints(view.frame, view.settings.lights, of(PairSettings, clamp="disc"))
-        for k in np.flatnonzero(areas.members == 1):
-            areas.side[:, k] = areas.delta[k] = math.sqrt(surface[areas.of == k].item())
     return areas, visibility(view, areas)
 
 
@@ -111,6 +106,8 @@ def visibility(view, areas):
         return np.ones((len(areas.members), len(view.pixels)))
     parts = [area_rays.Area(areas.center[:, k], areas.frame[k], areas.axes[k], areas.side[:, k], areas.offset[:, k],
                             areas.radius[k], np.flatnonzero(areas.of == k)) for k in range(len(areas.members))]
+    if view.settings.maps.near_geometry == "planes":
+        view = view._replace(drawn=drawn(view))
     if isinstance(kind, RaysVpls | RaysRectangle):
         rays = area_rays.visible_rectangle if isinstance(kind, RaysRectangle) else (
             lambda view, area: area_rays.visible_members(view, area.members))
@@ -125,19 +122,25 @@ def visibility(view, areas):
     return shares
 
 
+def drawn(view):
+    """Return the corners of the triangles that maps are drawn from, (T, 3, 3)."""
+    seen = val_maps.seen_vertices(*indexed(view.corners), view.frame.gbuffer.triangle_id)
+    boxes = val_areas.box(view.position.T), illuminated(view.frame)
+    return view.corners[val_maps.occluders(*indexed(view.corners), seen, view.lights.position.astype(float), *boxes,
+                                           not view.settings.maps.occluders_alone)]
+
+
 def by_maps(view, areas, sign):
     """Return V by the maps ahead (1), or by those of the hemispheres behind (-1): right and forward turned round."""
     settings, boxes = view.settings.maps, (val_areas.box(view.position.T), illuminated(view.frame))
     center, ball, far = val_maps.map_views(*boxes, areas.center, areas.normal, areas.radius,
                                            area_rays.near_share(view.settings))
-    seen = val_maps.seen_vertices(*indexed(view.corners), view.frame.gbuffer.triangle_id)
-    blocks = val_maps.occluders(*indexed(view.corners), seen, view.lights.position.astype(float), *boxes,
-                                not settings.occluders_alone)
+    blockers = drawn(view)
     turned = areas._replace(frame=areas.frame * np.array([sign, 1.0, sign])[:, None], normal=sign * areas.normal)
     ignored = ball if settings.near_geometry == "ball" else 0 * ball
     depth = []
     for k in range(len(center)):
-        corners = view.corners[blocks]
+        corners = blockers
         if settings.near_geometry == "planes":
             corners = area_rays.without_near_planes(corners, center[k], ball[k])
         one = slice(k, k + 1)

@@ -94,7 +94,6 @@ def make(root: Path, records: Mapping[str, Record]) -> list[str]:
 
 
 def table(root: Path, records: Mapping[str, Record]) -> Table:
-    """Return a row for each record."""
     result = Table("record", "read by", "made", "state", title="measured records")
     known = stamps(root)
     for name, record in records.items():
@@ -106,7 +105,6 @@ def table(root: Path, records: Mapping[str, Record]) -> Table:
 
 
 def stamps(root: Path) -> dict[str, Stamp]:
-    """Return the stamps that are there."""
     path = root / STAMPS
     return {name: Stamp(**stamp) for name, stamp in json.loads(path.read_text()).items()} if path.exists() else {}
 

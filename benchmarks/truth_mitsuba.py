@@ -46,8 +46,6 @@ WAYS = ("sobol", "cosine", "light")
 
 
 class Score(NamedTuple):
-    """What a run has come to."""
-
     seconds: float
     relative_mse: float  # without the reference's noise
     mean: float  # of the picture

@@ -52,7 +52,6 @@ This page is made by `python docs/literal_page.py` from `docs/equations.toml`.
 
 
 def page() -> str:
-    """Return the page."""
     lines = [HEAD]
     for name in order():
         module = import_module(f"refgi.literal.{name}")
@@ -64,7 +63,6 @@ def page() -> str:
 
 
 def equations_page() -> str:
-    """Return the page of the papers' equations."""
     rows = tomllib.loads(ROWS.read_text(encoding="utf-8"))["equation"]
     lines = [EQUATIONS_HEAD]
     for short, title in PAPERS.items():
@@ -73,7 +71,6 @@ def equations_page() -> str:
 
 
 def equation(row: dict[str, Any]) -> list[str]:
-    """Return the lines of one equation."""
     said = [f"In print, {row['what']}:", "", f"$${row['printed']}$$", "",
             *(["Here:", "", f"$${row['here']}$$", ""] if "here" in row else [])]
     tests = {test: None for one in row["literal"] for test in tests_of_function(one)}

@@ -39,7 +39,6 @@ This page is made by `python docs/stages_page.py`.
 
 
 def page() -> str:
-    """Return the page."""
     _import_all()
     return "\n".join([HEAD, *_runs(), *_tables()]) + "\n"
 

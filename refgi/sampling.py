@@ -169,7 +169,7 @@ def cosine_hemisphere(u: Any, v: Any) -> Any:
 
 
 # uses; docs/conventions.md lists what each draws
-(PIXEL_LIGHTS, LIGHT_PATHS, ROULETTE, RANGE, ERROR_SAMPLES, GATHERING, AREA_LIGHT_SAMPLES, IMPERFECT_MAPS) = range(8)
+(PIXEL_LIGHTS, LIGHT_PATHS, ROULETTE, RANGE, ERROR_SAMPLES, GATHERING), IMPERFECT_MAPS = range(6), 7
 PARTS = 1 << 24  # of one use
 
 

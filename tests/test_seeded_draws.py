@@ -157,22 +157,6 @@ def test_samples_of_the_error_target_of_multires(seed):
     assert draw_samples(covered, seed).pixel.tolist() == expected
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_samples_of_the_error_target_of_val(seed, monkeypatch):
-    from refgi.cluster import adaptive
-    from refgi.cluster.settings import ValSettings
-
-    frame = Frame(load_scene("cornell_box"), width=64, height=48)
-    lights = choose_pixel_lights(frame.rsms, count=16, pattern="halton")
-    monkeypatch.setattr(adaptive, "SAMPLES", 100)
-    monkeypatch.setattr(adaptive, "clustered_irradiance", lambda *_: np.zeros((3, 1, 100), np.float32))
-    settings = of(ValSettings, seed=seed, clusters="adaptive", target_error=0.1)
-    position = adaptive._samples(frame, lights, settings).receivers.position
-    surface = np.flatnonzero(frame.gbuffer.covered)
-    drawn = [surface[math.floor((k + draw(seed, 6, k)) * len(surface) / 100)] for k in range(100)]
-    np.testing.assert_array_equal(position[:, 0], frame.gbuffer.position.reshape(3, -1)[:, drawn])
-
-
 A, B = 0.7548776662466927, 0.5698402909980532  # 1 / g, 1 / g^2
 
 

@@ -28,8 +28,6 @@ LEDGER = "/stage/float64/"  # in the names of its cases
 
 
 class Picture(NamedTuple):
-    """A picture by name."""
-
     name: str
     method: str
     make: Callable[[], Any]

@@ -125,8 +125,6 @@ MEMORY = 12 << 30  # bytes of address space: a fault may ask for any size
 
 
 class Ended(NamedTuple):
-    """How a program ended."""
-
     code: int | None  # negative: a signal; None: it took too long
     seconds: float
 

@@ -137,7 +137,6 @@ def _is_alias(node: ast.AST) -> bool:
 
 
 def is_kernel(function: ast.FunctionDef) -> bool:
-    """Return whether a function is compiled."""
     return any(called(decorator) in KERNELS for decorator in function.decorator_list)
 
 

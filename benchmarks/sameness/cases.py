@@ -68,8 +68,6 @@ AS_IS, BASE = "default", "base"
 
 
 class Case(NamedTuple):
-    """One picture."""
-
     name: str
     method: str
     scene: str

@@ -67,7 +67,7 @@ def picture(case: Case) -> Any:
 
 def _size(case: Case) -> dict[str, int]:
     levels = case.method == "hssil" and not case.flat  # the default's need room
-    drawn = case.method in ("multires", "val") and "target_error" in case.flat  # more pixels than are drawn of them
+    drawn = case.method == "multires" and "target_error" in case.flat  # more pixels than are drawn of them
     return WIDER if levels or drawn else SIZE
 
 

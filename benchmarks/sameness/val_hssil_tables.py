@@ -8,8 +8,6 @@ BLOCKS = {"interleaving": 3}
 
 CLUSTERS = [
     vary("area_lights", 3, 20),
-    vary("target_error", 0.3, 0.1, area_lights=30),
-    vary("seed", 7, on=("stage",), area_lights=30, target_error=0.1, pattern="grid"),
     vary("distance", "raw"),
     vary("distance", "squared"),
     vary("position_weight", 0.1),
@@ -19,8 +17,6 @@ CLUSTERS = [
     vary("extent", "longer", "shorter"),
     vary("unbiased_area", True),
     vary("foreshortened", True),
-    vary("single_light", "footprint", area_lights=96),
-    vary("single_light", "footprint", area_lights=96, visibility="step"),
 ]
 MAPS = [
     vary("map_resolution", 33),
@@ -75,7 +71,7 @@ LIGHTING = [
 
 VAL = Table({"lights": 96, "area_lights": 8, "map_resolution": 64, "clamp": "none"},
               [*PAIRS, *LIGHTS, *CLUSTERS, *MAPS, *VISIBILITY, *LIGHTING],
-              {"clusters": "target_error chooses it", "visibility.constant_bias": "receiver_plane=False chooses it",
+              {"visibility.constant_bias": "receiver_plane=False chooses it",
                "visibility.constant_bias.value": "bias is it with visibility=step",
                "visibility.constant_bias.scale": "depth_scale is it with visibility=step"})
 
@@ -136,11 +132,10 @@ HSSIL = Table({"radius": 3.0, "levels": 3, "samples": 16, "downsample": "closest
     vary("visibility", "bitmask", "rays"),
     vary("slices", 2, **SLICED),
     vary("thickness", 0.2, **SLICED),
-    vary("cameras", 1, 2),
     *(vary("views", view, on=(scene,)) for scene, view in VIEWS),
     *(vary("views", view, on=(scene,), **TRACED) for scene, view in VIEWS),
-    vary("depth_tolerance", 0.0001, 0.5, cameras=1, normal_cosine=-1.0),
-    vary("normal_cosine", -1.0, cameras=1),
+    *(vary("depth_tolerance", 0.0001, 0.5, on=(scene,), views=view, normal_cosine=-1.0) for scene, view in VIEWS),
+    *(vary("normal_cosine", -1.0, on=(scene,), views=view) for scene, view in VIEWS),
     vary("as_published", "hss_tan_f", "hss_disc_pi", "hss_level_factor"),
     vary("as_published", "hss_tan_f", "hss_disc_pi", "hss_level_factor", **SLICED),
 ])

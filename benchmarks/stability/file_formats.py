@@ -272,7 +272,6 @@ def places(tree: Any, above: tuple[str | int, ...] = ()) -> Iterator[tuple[str |
 
 
 def with_value(tree: Any, place: tuple[str | int, ...], value: Any) -> Any:
-    """Return the tree with one value replaced."""
     if not place:
         return value
     changed = json.loads(json.dumps(tree))

@@ -57,7 +57,6 @@ class Hostile(NamedTuple):
 
 
 def hostile(seed: int) -> Hostile:
-    """Return a random scene."""
     rng = np.random.default_rng(seed)
     scale = 10.0 ** rng.uniform(-8, 8)
     place = np.zeros(3) if rng.random() < 0.7 else scale * 10.0 ** rng.uniform(0, 4) * _direction(rng)

@@ -53,7 +53,6 @@ class Promise(NamedTuple):
 
 
 def case_of(promise: Promise, seed: int, case: int) -> Case:
-    """Return one case."""
     return promise.draw(np.random.default_rng((seed, case)))
 
 
@@ -70,7 +69,6 @@ def row_of(promise: Promise, part: str, short: bool, seed: int = SEED) -> Row:
 
 
 def promise_tasks(promises: Iterable[Promise], part: str, short: bool) -> list[Task]:
-    """Return a task for each promise."""
     def run(promise: Promise, _: Tell) -> Iterable[Row]:
         return [row_of(promise, part, short)]
 
@@ -78,7 +76,6 @@ def promise_tasks(promises: Iterable[Promise], part: str, short: bool) -> list[T
 
 
 def again(promise: Promise, seed: int, case: int) -> str:
-    """Return one case in words."""
     found = case_of(promise, seed, case)
     return (f"{promise.name}, seed {seed}, case {case}\n  {found.about}\n  figure     {found.figure:.6g} {promise.unit}"
             f", limit {promise.limit:g}")

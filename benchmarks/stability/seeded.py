@@ -42,7 +42,6 @@ class PrecisionFault(NamedTuple):
 
 
 def faults() -> list[PrecisionFault]:
-    """Return all faults."""
     return [PrecisionFault(**one) for one in tomllib.loads(FAULTS.read_text())["fault"]]
 
 

@@ -70,8 +70,6 @@ def _batch(session: Session, asked: Asked) -> int:
 
 
 class _Request(NamedTuple):
-    """What is asked for."""
-
     plan: "Plan"
     all_jobs: "list[Job]"  # of the plan: those that results are of
     jobs: "list[Job]"  # that this run is to do, unless they are done

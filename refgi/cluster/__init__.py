@@ -3,8 +3,8 @@
 `val` (Dong, Grosch, Ritschel, Kautz and Seidel 2009) groups pixel lights by `kmeans` into area lights (`rectangle`),
 draws one paraboloid shadow map for each (`occluders`, `maps`) and filters it (`filters`) into soft `visibility`, which
 the lights of a cluster share: `interleave`, `area_sum` and `clustered` sum them, `geometry_blur` joins the blocks.
-`adaptive` finds a number of area lights; `reference` and `back_projection` hold the references of soft shadows. Unlike
-the paper, each light counts n^2 times in the pixels that sum it, and irradiance is blurred instead of radiance.
+`reference` and `back_projection` hold the references of soft shadows. Unlike the paper, each light counts n^2 times in
+the pixels that sum it, and irradiance is blurred instead of radiance.
 """
 
 from refgi.cluster.clustered import clustered_irradiance

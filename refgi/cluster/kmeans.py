@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from refgi.cluster.rounds import LINES, TILE, Metric, Rounds, iterate, move_to_means, sort_lights
-from refgi.cluster.settings import Distance, KMeansSettings
+from refgi.cluster.settings import Clusters, Distance
 from refgi.errors import expect
 from refgi.jit import thread_count, threads
 from refgi.rsm.buffers.extent import Extent
@@ -36,17 +36,17 @@ class Clustering(NamedTuple):
 
 @stage("cluster.kmeans", steps="refgi.cluster.kmeans.kmeans_steps")
 def clusters_of(
-    position: Array, normal: Array, count: int, settings: KMeansSettings, illuminated: "Extent"
+    position: Array, normal: Array, settings: Clusters, illuminated: "Extent"
 ) -> Clustering:
     """Group lights by k-means as settings say (VAL Sec. 5.1).
 
     position (3, light): Lights, m.
     normal (3, light): Their normals.
-    count: M; no more than N are made.
+    settings: `count` is M; no more than N are made.
     illuminated: Box of what reflects direct light, in shares of whose diagonal distances are.
     -> Clustering: As of `cluster`.
     """
-    return cluster(position, normal, count, distance=settings.distance,
+    return cluster(position, normal, settings.count, distance=settings.distance,
                    weights=(settings.position_weight, settings.normal_weight), diagonal=illuminated.diagonal,
                    rounds=settings.rounds)
 
@@ -273,14 +273,14 @@ def kmeans_each(position: Array, normal: Array) -> tuple[Array, Array, Array]:
 
 
 def kmeans_steps(
-    position: Array, normal: Array, count: int, settings: KMeansSettings, illuminated: Extent
+    position: Array, normal: Array, settings: Clusters, illuminated: Extent
 ) -> dict[str, Array]:
     """Return clusters, made by steps."""
-    if count >= position.shape[1]:
+    if settings.count >= position.shape[1]:
         center, axis, of = kmeans_each(position, normal)
     else:
         metric = settings.distance, settings.position_weight, settings.normal_weight
-        center, axis = kmeans_start(position, normal, count)
+        center, axis = kmeans_start(position, normal, settings.count)
         shown = min(ROUNDS, settings.rounds - 1)
         for _ in range(shown):
             of, _ = kmeans_assign(position, normal, illuminated, center, axis, *metric)

@@ -91,19 +91,16 @@ class AreaLights(NamedTuple):
 
 
 @stage("cluster.area_lights", steps="refgi.cluster.rectangle.area_steps")
-def area_lights(
-    lights: "PixelLights", clusters: Clustering, settings: AreaLightSettings, footprint: Array | None = None
-) -> AreaLights:
+def area_lights(lights: "PixelLights", clusters: Clustering, settings: AreaLightSettings) -> AreaLights:
     """Return the rectangle that stands for each cluster.
 
-    footprint (light,): Surface area of each light, m^2; for single lights that are their footprint.
-    -> AreaLights: M rectangles around the projections of their lights. A cluster of no lights, of one that is a point,
-        or of lights in one place has sides of 0; one of lights in a row along an axis has one side of 0.
+    -> AreaLights: M rectangles around the projections of their lights. A cluster of no lights, of one, or of lights in
+        one place has sides of 0; one of lights in a row along an axis has one side of 0.
 
     Raises
     ------
     InputError
-        If lights, clusters and footprints do not fit, or footprints are missing.
+        If lights and clusters do not fit.
 
     Notes
     -----
@@ -115,16 +112,11 @@ def area_lights(
     position = np.asarray(lights.position, np.float64)
     total = position.shape[1]
     expect(clusters.of.shape == (total,), "clusters.of", f"shape ({total},)", clusters.of.shape)
-    if settings.single_light == "footprint":
-        expect(footprint is not None and footprint.shape == (total,), "footprint",
-               f"the area of each of {total} lights", None if footprint is None else footprint.shape)
-    return rectangles(position, clusters, settings, footprint)
+    return rectangles(position, clusters, settings)
 
 
-def rectangles(
-    position: Array, clusters: Clustering, settings: AreaLightSettings, footprint: Array | None = None
-) -> AreaLights:
-    """Return the rectangles around lights at places (3, N) float64, m; footprint (N,), m^2."""
+def rectangles(position: Array, clusters: Clustering, settings: AreaLightSettings) -> AreaLights:
+    """Return the rectangles around lights at places (3, N) float64, m."""
     frames, count = map_frames(clusters.normal), clusters.center.shape[1]
     used, away, starts = _grouped(position, clusters)
     axes = _axes(away, frames, clusters, settings.axes)
@@ -137,9 +129,6 @@ def rectangles(
     side[side < FLAT * radius] = 0.0
     n = clusters.members
     side *= np.where(n > 1, (n + 1) / np.maximum(n - 1, 1), 1.0) if settings.unbiased_area else 1.0
-    if settings.single_light == "footprint" and footprint is not None:
-        single = np.flatnonzero(clusters.members[clusters.of] == 1)
-        side[:, clusters.of[single]] = np.sqrt(footprint[single])
     delta = {"root": np.sqrt(side[0] * side[1]), "longer": side.max(axis=0),
              "shorter": side.min(axis=0)}[settings.extent]
     return AreaLights(clusters.center, clusters.normal, frames, side, axes, offset, delta, radius, clusters.members,
@@ -179,8 +168,7 @@ def _axes(away: Array, frames: Array, clusters: Clustering, axes: Axes) -> Array
 
 @stage("cluster.areas", kept=False)
 def areas(
-    position: Array, center: Array, normal: Array, of: Array, axes: Axes, extent: Size, unbiased: bool,
-    footprint: Array | None = None,
+    position: Array, center: Array, normal: Array, of: Array, axes: Axes, extent: Size, unbiased: bool
 ) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
     """Bound each cluster's lights by a rectangle in its plane (VAL Sec. 6, E-VAL-10).
 
@@ -191,7 +179,6 @@ def areas(
     axes: Axes of the rectangle: the map's, of the lights' spread, of least area.
     extent: Delta: root of the area, longer or shorter side.
     unbiased: Whether sides grow by (n + 1) / (n - 1), n lights.
-    footprint (light,): Surface each light stands for, m^2, where a cluster of one light is a square of that area.
     -> frame (cluster, right down forward, 3): Axes of the map, unit vectors.
     -> axes (cluster, side, 3): Axes of the rectangle, unit vectors, the first at most a quarter turn from right.
     -> side (side, cluster): How long it is along its axes, m.
@@ -202,15 +189,12 @@ def areas(
     """
     x, c, n = (np.asarray(one, np.float64) for one in (position, center, normal))
     clusters = Clustering(c, n, np.bincount(of, minlength=c.shape[1]), of, 0, np.zeros(1))
-    made = rectangles(x, clusters, AreaLightSettings(
-        axes, extent, unbiased, single_light="point" if footprint is None else "footprint"), footprint)
+    made = rectangles(x, clusters, AreaLightSettings(axes, extent, unbiased))
     return made.frame, made.axes, made.side, made.offset, made.delta, made.radius, made.members
 
 
-def area_steps(
-    lights: PixelLights, clusters: Clustering, settings: AreaLightSettings, footprint: Array | None = None
-) -> dict[str, Array]:
+def area_steps(lights: PixelLights, clusters: Clustering, settings: AreaLightSettings) -> dict[str, Array]:
     """Return the rectangles of clusters, made by a step."""
     made = areas(lights.position, clusters.center, clusters.normal, clusters.of, settings.axes, settings.extent,
-                 settings.unbiased_area, footprint if settings.single_light == "footprint" else None)
+                 settings.unbiased_area)
     return dict(zip(("frame", "axes", "side", "offset", "delta", "radius", "members"), made, strict=True))

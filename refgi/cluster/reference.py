@@ -6,7 +6,7 @@ x, no error of clustering is left, and none of soft shadows.
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -38,15 +38,15 @@ class Ball(NamedTuple):
 
 def free_share(
     tracer: "Tracer", points: Array, facing: Array, targets: Array, upward: Array,
-    contribution: Callable[[Array, Array], Array] | None, grain: float, ball: Ball | None = None,
+    contribution: Callable[[Array], Array] | None, grain: float, ball: Ball | None = None,
     shading: Array | None = None,
 ) -> Array:
     """Return the share of each receiver's rays that arrives, weighted by contribution: (n,), 1 without weight.
 
     Receivers and the unit normals of their faces are (3, n), `targets` on lights (3, k), m, `upward` (3, k) or (3, 1)
-    normals there. `contribution` takes vectors (n, k, 3) to the targets and the receivers' normals (n, 3) to weights
-    (n, k). Targets below the horizon of `shading` (3, n), the normals of cosines, do not count; those above it and
-    below the face are hidden. `grain` is that of `ray_offset`, m; rays end where they enter `ball`.
+    normals there. `contribution` takes vectors (n, k, 3) to the targets to weights (n, k). Targets below the horizon of
+    `shading` (3, n), the normals of cosines, do not count; those above it and below the face are hidden. `grain` is
+    that of `ray_offset`, m; rays end where they enter `ball`.
     """
     from refgi.rays import STEPS
 
@@ -58,7 +58,7 @@ def free_share(
         up = face if shading is None else shading[:, part].T.astype(np.float64)
         toward = targets.T[None] - at[:, None]
         counts, above = (np.einsum("nkc,nc->nk", toward, n) > 0 for n in (up, face))
-        weight = np.where(counts, 1.0 if contribution is None else contribution(toward, up), 0.0)
+        weight = np.where(counts, 1.0 if contribution is None else contribution(toward), 0.0)
         reach = np.where(above & (weight > 0), _way_to(ball, at, toward), 0.0)
         starts = at + STEPS * (np.abs(at).sum(axis=1, keepdims=True) + grain) * face
         lift = STEPS * (np.abs(targets).sum(axis=0) + grain + np.abs(toward).sum(axis=2))
@@ -150,18 +150,12 @@ def _even(count: int) -> Array:
     return np.stack([(np.arange(count) + 0.5) / count, second])
 
 
-Weights = Literal["even", "flux", "light"]
+def vpl_visibility(tracer: Tracer, lights: "PixelLights", areas: AreaLights) -> VisibilityFunction:
+    """Return V of an area light as the share of its lights, by their flux in all channels, that a receiver sees.
 
-
-def vpl_visibility(
-    tracer: Tracer, lights: "PixelLights", areas: AreaLights, weights: Weights = "flux"
-) -> VisibilityFunction:
-    """Return V of an area light as the share of its lights that a receiver sees.
-
-    A light counts 1 ("even"), its "flux" in all channels, or the "light" that it would give a diffuse receiver. Lights
-    that face away from a receiver, or lie below its horizon, do not count; where none is left V is 1. Those above the
-    horizon of an interpolated normal and below the face are hidden. There is no rule for receivers behind the area
-    light.
+    Lights that face away from a receiver, or lie below its horizon, do not count; where none is left V is 1. Those
+    above the horizon of an interpolated normal and below the face are hidden. There is no rule for receivers behind the
+    area light.
     """
     position, normal = (np.asarray(a, np.float64) for a in (lights.position, lights.normal))
     flux = np.asarray(lights.flux, np.float64).sum(axis=0)
@@ -173,16 +167,10 @@ def vpl_visibility(
     def visibility_of(m: int, points: Array, facing: Array, shading: Array | None = None) -> Array:
         of = order[first[m] : first[m + 1]]
 
-        def contribution(toward: Array, up: Array) -> Array:
-            away: Array = -np.einsum("nkc,ck->nk", toward, normal[:, of])
-            if weights != "light":
-                counted: Array = np.where(away > 0, flux[of] if weights == "flux" else 1.0, 0.0)
-                return counted
-            square = np.einsum("nkc,nkc->nk", toward, toward)
-            above = np.einsum("nkc,nc->nk", toward, up)
-            faced = (away > 0) & (above > 0)
-            light: Array = np.divide(flux[of] * away * above, square**2, out=np.zeros_like(square), where=faced)
-            return light
+        def contribution(toward: Array) -> Array:
+            away = -np.einsum("nkc,ck->nk", toward, normal[:, of])
+            counted: Array = np.where(away > 0, flux[of], 0.0)
+            return counted
 
         return free_share(tracer, points, facing, position[:, of], normal[:, of], contribution, tracer.grain,
                           shading=shading)

@@ -29,9 +29,12 @@ PRINTED = frozenset({"val_alpha", "val_alpha_over_pi", "val_search_solid_angle"}
 
 
 @dataclasses.dataclass(frozen=True)
-class KMeansSettings(Settings):
+class Clusters(Settings):
     """K-means over position and normal (Sec. 5.1): d = w_x dx + w_a dalpha."""
 
+    PRINCIPAL = "count"
+
+    count: int = setting(30, "area lights", least=1, most=MOST_LIGHTS)
     distance: Distance = setting(
         "normalised", "distance in shares of the scene's diagonal and of pi, as printed (raw), or squared", study=True)
     position_weight: float = setting(0.7, "w_x", least=0.0, most=LARGEST_WEIGHT, study=True)
@@ -45,26 +48,6 @@ class KMeansSettings(Settings):
 
 
 @dataclasses.dataclass(frozen=True)
-class Clusters(KMeansSettings):
-    """A number of clusters."""
-
-    NAME = "fixed"
-    PRINCIPAL = "count"
-
-    count: int = setting(30, "area lights", least=1, most=MOST_LIGHTS)
-
-
-@dataclasses.dataclass(frozen=True)
-class AdaptiveClusters(KMeansSettings):
-    """As many clusters as bring the estimated error of visibility below a target (beyond the paper)."""
-
-    NAME = "adaptive"
-
-    # the least is about what rays for a thousand pixels can tell
-    target_error: float = setting(0.1, "RMSE of visibility, as a share of the mean", least=1e-4, most=1e6)
-
-
-@dataclasses.dataclass(frozen=True)
 class AreaLightSettings(Settings):
     """The rectangle of a cluster, whose extent is the paper's Delta (Sec. 6)."""
 
@@ -73,8 +56,6 @@ class AreaLightSettings(Settings):
     extent: Extent = setting("root", "Delta: root of the area, longer or shorter side", study=True)
     unbiased_area: bool = setting(False, "the rectangle grows by what a sample of n lights misses", study=True)
     foreshortened: bool = setting(False, "Delta shrinks with the cosine towards the receiver", study=True)
-    single_light: Literal["point", "footprint"] = setting(
-        "point", "a cluster of one light is a point, or has its light's footprint", study=True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -213,7 +194,7 @@ class ValSettings(Settings):
 
     lights: LightSettings = setting(LightSettings(count=1024), "pixel lights")
     pairs: PairSettings = setting(PairSettings(), "how one light lights one receiver")
-    clusters: Clusters | AdaptiveClusters = setting(Clusters(), "how many area lights")
+    clusters: Clusters = setting(Clusters(), "how many area lights")
     area: AreaLightSettings = setting(AreaLightSettings(), "the rectangle of an area light")
     maps: ShadowMapSettings = setting(ShadowMapSettings(), "shadow maps")
     visibility: Visibility | None = setting(Csm(), "soft shadow of an area light; none: no shadows")
@@ -227,10 +208,6 @@ class ValSettings(Settings):
     def check(self) -> None:
         """Check what parts ask of each other."""
         expect_footprints(self.lights, self.pairs)
-        expect(self.area.single_light == "point" or self.lights.has_footprints, "area.single_light",
-               "'point' with the source 'walk' or the flux 'roulette'", self.area.single_light)
-        expect(self.visibility is not None or isinstance(self.clusters, Clusters), "visibility",
-               "another one with clusters 'adaptive'", "none")
 
     @property
     def drawn_maps(self) -> ShadowMapSettings:
@@ -258,7 +235,7 @@ class ClusteredShadows(Settings):
 
     NAME = "val"
 
-    clusters: Clusters | AdaptiveClusters = setting(Clusters(), "how many area lights")
+    clusters: Clusters = setting(Clusters(), "how many area lights")
     area: AreaLightSettings = setting(AreaLightSettings(), "the rectangle of an area light", study=True)
     maps: ShadowMapSettings = setting(ShadowMapSettings(), "shadow maps")
     shadow: Visibility = setting(Csm(), "soft shadow of an area light, the `visibility` of val")

@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from refgi.cluster.adaptive import MOST_TEXELS, count_for_error, group_lights
 from refgi.cluster.clustered import clustered_irradiance, clustered_radiance
 from refgi.cluster.filters.pyramid import EIGHT
 from refgi.cluster.geometry_blur import blur
-from refgi.cluster.maps import ShadowMaps
-from refgi.cluster.rectangle import AreaLights
+from refgi.cluster.kmeans import clusters_of
+from refgi.cluster.maps import ShadowMaps, shadow_maps
+from refgi.cluster.occluders import ends_of
+from refgi.cluster.rectangle import AreaLights, area_lights
 from refgi.cluster.reference import reference_visibility
 from refgi.cluster.settings import (
     BY_MAPS,
     LARGEST_MAP,
     WITHOUT_MAPS,
-    AdaptiveClusters,
     BackProjection,
     Clusters,
     Csm,
@@ -33,7 +33,7 @@ from refgi.error_target.error_driven import error_driven
 from refgi.error_target.near import shadowed_by_clusters
 from refgi.jit import thread_count
 from refgi.ledger import Ledger, account
-from refgi.lights.selection import choose_lights, footprints, light_areas
+from refgi.lights.selection import choose_lights, footprints
 from refgi.lights.settings import (
     CLAMP,
     FINER,
@@ -161,13 +161,16 @@ def sum_at_pixels(
 def cluster_lights(
     frame: "Frame", lights: "PixelLights", settings: ValSettings
 ) -> tuple[AreaLights, ShadowMaps | None]:
-    """Group pixel lights into as many area lights as asked for, or as an error asks for; draw maps that are read."""
-    surface = None if settings.area.single_light == "point" else light_areas(frame, settings.lights)
-    if isinstance(settings.clusters, AdaptiveClusters):
-        chosen = count_for_error(frame, lights, settings, surface)
-        return chosen.areas, chosen.maps
-    skip("cluster.adaptive", "the number of area lights is set")
-    return group_lights(frame, lights, settings, settings.clusters.count, surface)  # Sec. 5
+    """Group N pixel lights into M area lights and draw what each sees (Sec. 5, 6); no maps where none are read."""
+    clusters = clusters_of(lights.position, lights.normal, settings.clusters, frame.illuminated_extent)
+    areas = area_lights(lights, clusters, settings.area)
+    if settings.visibility is None or isinstance(settings.visibility, WITHOUT_MAPS):
+        chosen = "none" if settings.visibility is None else settings.visibility.name()
+        skip("cluster.shadow_maps", f"visibility {chosen!r} reads none")
+        return areas, None
+    tracer = frame.tracer if settings.maps.renderer == "rays" else None
+    ends = ends_of(frame, lights)
+    return areas, shadow_maps(frame.scene.geometry, areas, settings.drawn_maps, frame.dtype, tracer, ends)
 
 
 def block_side(pixels: int, settings: ValSettings) -> int | None:
@@ -205,9 +208,7 @@ def extra_bytes(settings: ValSettings, extent: Extent) -> int:
 def _most_maps(settings: ValSettings, extent: Extent) -> int:
     if settings.visibility is None or isinstance(settings.visibility, WITHOUT_MAPS):
         return 0
-    most = max(1, MOST_TEXELS // settings.maps.resolution**2)
-    count = settings.clusters.count if isinstance(settings.clusters, Clusters) else most
-    return min(count, most_lights(settings.lights, extent.maps, extent.texels))
+    return min(settings.clusters.count, most_lights(settings.lights, extent.maps, extent.texels))
 
 
 def _filtered_bytes(csm: Csm, float_bytes: int) -> int:

@@ -108,15 +108,12 @@ def kmeans_each(position: Any, normal: Any) -> Any:
     return position, normal / length, of
 
 
-def areas(
-    position: Any, center: Any, normal: Any, of: Any, axes: str, extent: str, unbiased: bool, footprint: Any = None,
-) -> Any:
+def areas(position: Any, center: Any, normal: Any, of: Any, axes: str, extent: str, unbiased: bool) -> Any:
     """Return the rectangle around each cluster's lights, projected along its normal (Sec. 6, E-VAL-10).
 
     Frames of maps (M, 3, 3); axes of rectangles (M, 2, 3), the map's ("fixed"), along the lights' spread ("pca") or of
     least area ("min_area"); sides, and middles from the centres (2, M), m; Delta (M,), m, the "root" of both sides'
     product, the "longer" or the "shorter"; distances of the farthest lights (M,), m; numbers of lights (M,).
-    A cluster of one light is a point, or a square of its footprint (N,), m^2.
     """
     frame, count = map_frames(normal), center.shape[1]
     along, members = frame[:, :2].copy(), np.bincount(of, minlength=count)
@@ -134,9 +131,6 @@ def areas(
     side = np.where(side < FLAT * radius, 0, side)
     if unbiased:  # E-VAL-10: n lights span (n - 1) / (n + 1) of a side on average
         side = side * ((members + 1) / np.maximum(members - 1, 1)).astype(side.dtype)
-    if footprint is not None:
-        single = members[of] == 1
-        side[:, of[single]] = np.sqrt(footprint[single])
     sizes = {"root": np.sqrt(side[0] * side[1]), "longer": side.max(axis=0), "shorter": side.min(axis=0)}
     delta = sizes[extent]
     return frame, along, side, offset, delta, radius, members
@@ -187,19 +181,6 @@ def facing(normal: Any, triangle_id: Any, vertices: Any = None, faces: Any = Non
     own = np.moveaxis(flat[triangle_id], 2, 0)
     turned = np.where((own * normal).sum(axis=0) < 0, -own, own)
     return np.where(triangle_id >= 0, turned, 0)
-
-
-def sampled_pixels(position: Any, normal: Any, triangle_id: Any, shifts: Any) -> Any:
-    """Return position, normal (3, 1, n) and triangle (1, n) of pixels, one of each of n equal parts of the surface.
-
-    Pixels without surface, triangle_id < 0, do not count; shifts (n,) are places within the parts, in rows.
-    """
-    surface, n = np.flatnonzero(triangle_id >= 0), len(shifts)
-    part = len(surface) / n
-    place = np.floor((np.arange(n) + shifts) * part).astype(int)
-    at = surface[np.minimum(place, len(surface) - 1)]
-    x, up = position.reshape(3, -1), normal.reshape(3, -1)
-    return x[:, None, at], up[:, None, at], triangle_id.reshape(-1)[None, at]
 
 
 def interleaving(of: Any, side: int, assignment: str) -> Any:

@@ -94,8 +94,6 @@ class Filter:
 
 
 def _pointer_of(_: Any, address: Any) -> Any:  # noqa: ARG001
-    """Type and emit a pointer from an address."""
-
     def generate(context: Any, builder: Any, _: Any, arguments: Any) -> Any:  # noqa: ARG001
         return builder.inttoptr(arguments[0], BYTES)
 

@@ -219,7 +219,6 @@ def _attach(
 
 
 def _made(library: ctypes.CDLL, device: int | None, face_count: int, handle: int | None) -> int:
-    """Return a handle that Embree has made."""
     _check(library, device, face_count)
     if not handle:
         raise MemoryError(_out_of_memory(face_count))

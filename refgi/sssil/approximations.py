@@ -140,7 +140,7 @@ def extra_bytes(settings: HssilSettings, extent: Extent) -> int:
     padded = columns + 2 * min(math.ceil(2 * radius), columns) + PADDING * phases
     view = level_bytes(settings, pixels, float_bytes)
     view += (PLANES * padded * (rows + 1) + LIGHT_FLOATS * columns * rows) * float_bytes
-    further = VIEW_FLOATS * pixels * float_bytes if settings.cameras.count or settings.cameras.views else 0
+    further = VIEW_FLOATS * pixels * float_bytes if settings.cameras.views else 0
     samples = _sample_bytes(settings, rows, columns, radius)
     return view + further + samples + (RAY_BYTES if isinstance(settings.visibility, Rays) else 0)
 

@@ -49,7 +49,7 @@ def hssil(frame: "Frame", settings: HssilSettings) -> Array:
         Indirect irradiance, W/m^2, linear RGB.
     """
     irradiance = one_view(frame, settings)
-    if not (settings.cameras.count or settings.cameras.views):
+    if not settings.cameras.views:
         skip("sssil.cameras", "one camera")
         return irradiance
     # Sec. 5, discussion
@@ -126,7 +126,7 @@ def hssil_lobes(frame: "Frame", settings: HssilSettings) -> Array:
     Whatever the pattern but "all", each pixel has samples of its own, and nothing is blurred.
     """
     lobes = view_lobes(frame, frame.glossy_points, settings)
-    if not (settings.cameras.count or settings.cameras.views):
+    if not settings.cameras.views:
         return lobes
     eye = frame.scene.camera.eye
 

@@ -18,7 +18,7 @@ Form = Literal["recursive", "printed"]
 Fetch = Literal["bilinear", "nearest"]
 
 FIRST_LEVEL = {"full": 0, "half": 1, "quarter": 2}
-MOST_LEVELS, MOST_SAMPLES, MOST_SLICES, MOST_CAMERAS = 16, 1 << 16, 256, 16
+MOST_LEVELS, MOST_SAMPLES, MOST_SLICES = 16, 1 << 16, 256
 MOST_CLAMP_RADIUS = 64
 LARGEST_WINDOW, LARGEST_TILE = 16, 16
 LARGEST_RADIUS = 65536.0  # texels: the widest picture there may be
@@ -160,9 +160,8 @@ class Rays(Settings):
 class CameraSettings(Settings):
     """Further cameras, joined by the maximum where depth and normal agree (Sec. 5)."""
 
-    PRINCIPAL = "count"
+    PRINCIPAL = "views"
 
-    count: int = setting(0, "further cameras to place where they add most light", least=0, most=MOST_CAMERAS)
     views: tuple[Camera, ...] = setting((), "further cameras of the user")
     depth_tolerance: float = setting(0.02, "largest difference of depths, a share of the depth", least=0.0, most=1.0,
                                      study=True)
@@ -170,8 +169,9 @@ class CameraSettings(Settings):
 
     def check(self) -> None:
         """Check that `views` are cameras; a list becomes a tuple."""
+        listed = isinstance(self.views, list | tuple) and all(isinstance(view, Camera) for view in self.views)
+        expect(listed, "views", "cameras", self.views)
         object.__setattr__(self, "views", tuple(self.views))
-        expect(all(isinstance(view, Camera) for view in self.views), "views", "cameras", self.views)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -60,8 +60,6 @@ class LobeTree(NamedTuple):
 
 
 class _Groups(NamedTuple):
-    """Groups of one level."""
-
     start: Array  # (g,) int64: first lobe in the order
     size: Array  # (g,)
 

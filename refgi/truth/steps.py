@@ -232,7 +232,6 @@ def path_traced(
 
 
 def _with_row(light: Light, lamps: Lamps, row: int) -> Light:
-    """Return a lamp with its numbers."""
     position, direction, intensity, angles = (np.asarray(one[row], np.float64).tolist() for one in lamps)
     values = {"position": tuple(position), "direction": tuple(direction), "intensity": tuple(intensity),
               "irradiance": tuple(intensity), "inner_half_angle": angles[0], "outer_half_angle": angles[1]}

@@ -167,7 +167,6 @@ APPROXIMATIONS = (
 
 
 def _map_bytes(settings: VplSettings, extent: Extent) -> int:
-    """Return bytes of the maps of all lights."""
     if settings.maps is None or not settings.visibility:
         return 0
     return FLOAT32 * most_lights(settings.lights, extent.maps, extent.texels) * settings.maps.resolution**2

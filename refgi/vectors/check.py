@@ -398,7 +398,6 @@ def _reach(told: Told, difference: Difference) -> float:
 
 
 def _alike(values: Array) -> bool:
-    """Return whether nearly all values are one."""
     counts = np.unique(values, return_counts=True)[1]
     return len(values) > 1 and int(counts.max()) >= EXPLAINED * len(values)
 

@@ -162,7 +162,6 @@ def called_by(function: Any) -> tuple[Function, ...]:
 
 @functools.cache
 def _literal_names(function: Function) -> tuple[Function, ...]:
-    """Return the functions of refgi.literal that a function names."""
     found = []
     for node in ast.walk(ast.parse(code_of(function))):
         known = function.__globals__.get(node.id) if isinstance(node, ast.Name) else None

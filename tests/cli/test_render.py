@@ -172,7 +172,6 @@ def test_a_size_that_does_not_fit_is_refused_with_both_figures(tmp_path, monkeyp
     ("maps.resolution=4096", "clusters.count=30"), ("maps.resolution=4096", "clusters.count=1", "terms=64"),
     ("maps.resolution=2048", "clusters.count=40", "behind=dual_paraboloid"), ("pattern=all", "clusters.count=5000"),
     ("maps.resolution=4096", "clusters.count=2", "prefilter=brute"),
-    ("clusters=adaptive", "target_error=0.1", "maps.resolution=1024"),
 ], ids=str)
 def test_maps_of_area_lights_that_do_not_fit_are_refused(how, tmp_path, monkeypatch):
     monkeypatch.setattr(memory, "available_bytes", lambda: 2 * 10**9)
@@ -181,12 +180,11 @@ def test_maps_of_area_lights_that_do_not_fit_are_refused(how, tmp_path, monkeypa
                    "for the settings of val", "2,000,000,000 are available")
 
 
-@pytest.mark.parametrize("how", [{"maps.resolution": 4096, "visibility": "rays_vpls"},
-                                 {"clusters": "adaptive", "target_error": 0.1}], ids=str)
-def test_what_fits_is_not_refused_for_its_maps(how, monkeypatch):
+def test_what_fits_is_not_refused_for_its_maps(monkeypatch):
     monkeypatch.setattr(memory, "available_bytes", lambda: 10**9)
     scene = load_scene("cornell_box").with_camera(width=24, height=24)
-    memory.require_memory(scene, "float32", 512, settings={"val": of(ValSettings, **how)})
+    memory.require_memory(scene, "float32", 512, settings={
+        "val": of(ValSettings, maps_resolution=4096, visibility="rays_vpls")})
 
 
 def test_where_memory_cannot_be_told_nothing_is_refused(monkeypatch):

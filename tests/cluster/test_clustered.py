@@ -143,7 +143,7 @@ def scene(request):
 def shadowed(frame, lights, count, settings):
     geometry = frame.scene.geometry
     clusters = cluster(lights.position, lights.normal, count, diagonal=geometry.diagonal)
-    areas = area_lights(lights, clusters, settings.area, None)
+    areas = area_lights(lights, clusters, settings.area)
     return areas, shadow_maps(geometry, areas, settings.maps, frame.dtype)
 
 

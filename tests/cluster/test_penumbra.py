@@ -131,7 +131,6 @@ def from_levels(edge, terms, scale, n):
 
 
 def chain(delta, edge, points, facing, resolution, **settings):
-    """Return V by refgi."""
     settings = replaced(SETTINGS, {"maps_resolution": resolution, "occluders_alone": False} | settings)
     areas = square_light(delta)
     maps = shadow_maps(scene(edge).geometry, areas, settings.maps, np.float32)

@@ -8,7 +8,6 @@ import pytest
 from refgi.cluster.kmeans import Clustering, cluster
 from refgi.cluster.rectangle import area_lights, map_frames
 from refgi.cluster.settings import ValSettings
-from refgi.errors import InputError
 from refgi.lights import PixelLights
 from refgi.literal.val_areas import areas as literal_areas
 from refgi.rsm.raster.projection import paraboloid_projection
@@ -127,21 +126,6 @@ def test_frames_are_those_of_the_maps():
     normal /= np.linalg.norm(normal, axis=0)
     expected = paraboloid_projection(np.zeros((normal.shape[1], 3)), normal.T, 1).frame
     np.testing.assert_allclose(map_frames(normal), expected, rtol=0, atol=1e-15)
-
-
-@pytest.mark.feature("VAL-09")
-def test_a_single_light_is_a_point_or_its_footprint():
-    position = np.array([[0.0, 5.0, 6.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    normals = np.repeat([[0.0], [1.0], [0.0]], 3, axis=1)
-    clusters = grouped(position, normals, np.array([0, 1, 1]), 3)
-    lights, footprint = lights_at(position, normals), np.array([0.25, 9.0, 9.0])
-    point = area_lights(lights, clusters, PUBLISHED.area, footprint)
-    assert point.delta.tolist() == pytest.approx([0.0, 1.0, 0.0])
-    spread = area_lights(lights, clusters, replaced(PUBLISHED, {"single_light": "footprint"}).area, footprint)
-    assert spread.delta.tolist() == pytest.approx([0.5, 1.0, 0.0])
-    assert spread.side[:, 0].tolist() == [0.5, 0.5]
-    with pytest.raises(InputError, match="footprint: expected"):
-        area_lights(lights, clusters, replaced(PUBLISHED, {"single_light": "footprint"}).area)
 
 
 @pytest.mark.parametrize("axes", ["fixed", "pca", "min_area"])

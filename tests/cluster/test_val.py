@@ -24,7 +24,6 @@ from refgi.stages import observe, standing_for
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 SMALL = {"lights": 64, "maps_resolution": 32}
-TO_AN_ERROR = {"clusters": "adaptive", "target_error": 0.3}
 SUM = {np.float32: 2e-6, np.float64: 1e-12}  # another order of summation, relative to the brightest pixel
 # a moved or scaled scene: lights beside a texel's border may take its neighbour's depth; away from those it is rounding
 SCALED = 1e-5
@@ -32,8 +31,7 @@ SCALED = 1e-5
 
 def small(how):
     """Few lights, few area lights and small maps."""
-    number = {} if how.get("clusters") == "adaptive" else {"clusters_count": 6}
-    return of(ValSettings, **SMALL | number | how)
+    return of(ValSettings, **SMALL | {"clusters_count": 6} | how)
 
 
 def frame(name="cornell_sphere:faces=400", width=33, height=27, **options):
@@ -49,14 +47,14 @@ def ball():
     {}, {"visibility": "pcss"}, {"visibility": "hard"}, {"visibility": "rays_vpls"}, {"visibility": "rays_rectangle"},
     {"visibility": "back_projection"}, {"visibility": "pcf"}, {"prefilter": "brute"}, {"interleaving": 4},
     {"quantisation": "published"}, {"behind": "dual_paraboloid"}, {"behind": "raytrace"}, {"clamp": "disc"},
-    {"single_light": "footprint"}, {"near_geometry": "keep"}, {"near_geometry": "ball"}, {"renderer": "rays"},
-    TO_AN_ERROR, {"distance": "raw"}, {"distance": "squared"}, {"axes": "pca"}, {"axes": "min_area"},
+    {"near_geometry": "keep"}, {"near_geometry": "ball"}, {"renderer": "rays"},
+    {"distance": "raw"}, {"distance": "squared"}, {"axes": "pca"}, {"axes": "min_area"},
     {"as_published": ("val_alpha", "val_search_solid_angle")}, {"as_published": ("val_alpha_over_pi",)},
 ], ids=str)
 def test_every_setting_gives_a_picture_between_darkness_and_the_unshadowed(ball, how):
     settings = small(how)
     light = val(ball, settings)
-    most = val(ball, replaced(settings, {"visibility": "none", "behind": "visible", "clusters": "fixed"}))
+    most = val(ball, replaced(settings, {"visibility": "none", "behind": "visible"}))
     covered = ball.gbuffer.covered
     assert light.shape == (3, 27, 33)
     assert light.dtype == np.float32
@@ -105,7 +103,7 @@ def test_the_unit_of_length_does_not_matter(ball, scale):
 def test_a_light_that_hits_nothing_gives_darkness(ball):
     light = dataclasses.replace(ball.scene.lights[0], position=(0.0, 1e4, 0.0), direction=(0.0, 1.0, 0.0))
     dark = Frame(ball.scene.with_lights(light), width=9, height=9, rsm_resolution=16)
-    for how in ({}, {"interleaving": 8}, TO_AN_ERROR):
+    for how in ({}, {"interleaving": 8}):
         assert not val(dark, small(how)).any()
 
 
@@ -190,13 +188,12 @@ def test_what_is_not_needed_does_not_run(ball):
     with observe() as log:
         val(ball, small({}))
     assert log.status("cluster.blur") == ["skipped"]
-    assert log.status("cluster.adaptive") == ["skipped"]
     with observe() as log:
         val(ball, small({"visibility": "none"}))
     assert log.status("cluster.shadow_maps") == ["skipped"]
 
 
-IN = {"target_error": {"clusters": "adaptive"}, "cone": {"visibility": "pcss"}, "texels": {"visibility": "pcf"},
+IN = {"cone": {"visibility": "pcss"}, "texels": {"visibility": "pcf"},
       "constant_bias_value": {"visibility": "pcss", "constant_bias": "constant_bias"}}  # choices that have a setting
 
 
@@ -206,8 +203,7 @@ IN = {"target_error": {"clusters": "adaptive"}, "cone": {"visibility": "pcss"}, 
     ("distance", "euclid"), ("visibility", "soft"), ("prefilter", "gauss"), ("bias", -0.1), ("bias", float("nan")),
     ("position_weight", -1), ("normal_weight", float("inf")), ("attenuation", -1), ("interleaving_block", 0),
     ("interleaving_block", 65), ("subsplats_target", 0), ("subsplats_coarsest", 0),
-    ("blur_extent", -1), ("blur_cosine", 2), ("target_error", 0),
-    ("target_error", float("nan")),
+    ("blur_extent", -1), ("blur_cosine", 2),
     ("position_weight", "much"), ("bias", "some"), ("cone", None), ("occluders_alone", "no"), ("near_distance", -1),
     ("as_published", {"val_beta"}), ("assignment", "cards"), ("texels", 4), ("texels", 0),
     ("behind", "mirror"), ("near_geometry", "some"),
@@ -218,10 +214,7 @@ def test_a_setting_that_cannot_be_is_named(key, value):
 
 
 @pytest.mark.parametrize(("key", "how"), [
-    ("single_light", {"single_light": "footprint", "source": "walk"}),
-    ("clusters.count", {"clusters": "adaptive", "count": 12}), ("clusters.target_error", {"target_error": 0.1}),
-    ("visibility.terms", {"visibility": "pcss", "terms": 4}), ("blur.extent", {"blur": "box", "blur_extent": 0.1}),
-    ("visibility", {"visibility": "none", "clusters": "adaptive"})])
+    ("visibility.terms", {"visibility": "pcss", "terms": 4}), ("blur.extent", {"blur": "box", "blur_extent": 0.1})])
 def test_settings_that_do_not_go_together_are_refused(key, how):
     with pytest.raises(InputError, match=key):
         of(ValSettings, **how)

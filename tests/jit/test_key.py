@@ -85,8 +85,8 @@ def test_what_changes_code_changes_the_key(change):
     assert key(BASE) != key(BASE.replace(old, new))
 
 
-def test_a_plain_function_counts_with_its_code():
-    text = """
+CALLED = {  # old text, new text, whether the key is another one, program
+    "a plain function": ("2 * x", "3 * x", True, """
         from numba.extending import register_jitable
         from refgi.jit import kernel
 
@@ -97,12 +97,8 @@ def test_a_plain_function_counts_with_its_code():
         @kernel
         def outer(x):
             return helper(x)
-        """
-    assert key(text) != key(text.replace("2 * x", "3 * x"))
-
-
-def test_overloads_count_with_what_they_choose():
-    text = """
+        """),
+    "what an overload chooses": ("x + 1", "x + 2", True, """
         from refgi.jit import by_type, kernel
 
         @kernel
@@ -122,12 +118,8 @@ def test_overloads_count_with_what_they_choose():
         @kernel
         def outer(x):
             return chosen(x)
-        """
-    assert key(text) != key(text.replace("x + 1", "x + 2"))
-
-
-def test_intrinsics_count_with_their_code():
-    text = """
+        """),
+    "an intrinsic": (", 7)", ", 8)", True, """
         from numba import types
         from numba.extending import intrinsic
         from refgi.jit import kernel
@@ -139,12 +131,8 @@ def test_intrinsics_count_with_their_code():
         @kernel
         def outer():
             return constant()
-        """
-    assert key(text) != key(text.replace(", 7)", ", 8)"))
-
-
-def test_a_global_with_an_attributes_name_does_not_count():
-    text = """
+        """),
+    "a global with an attribute's name": ("object()", "None", False, """
         import numpy as np
         from refgi.jit import kernel
 
@@ -153,8 +141,15 @@ def test_a_global_with_an_attributes_name_does_not_count():
         @kernel
         def outer(n):
             return np.zeros(n)
-        """
-    assert key(text) == key(text.replace("object()", "None"))
+        """),
+}
+
+
+@pytest.mark.parametrize("name", CALLED)
+def test_what_is_called_counts_with_its_code(name):
+    old, new, is_other, text = CALLED[name]
+    assert old in text
+    assert (key(text) != key(text.replace(old, new))) == is_other
 
 
 @cache

@@ -35,7 +35,6 @@ def cube_map(resolution=10):
 
 
 def with_flux(rsm, flux):
-    """Return the map with so much flux in all."""
     return rsm._replace(flux=rsm.flux * (flux / rsm.flux.sum()))
 
 

@@ -271,7 +271,6 @@ def test_a_fixed_pattern_is_steadier_under_a_moving_light_than_fresh_ones(eviden
 
 
 def moved(light, step):
-    """Return the light moved sideways."""
     x, y, z = light.position
     return SpotLight((x + step, y, z), light.direction, light.inner_half_angle, light.outer_half_angle, light.intensity)
 

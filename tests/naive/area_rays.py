@@ -60,7 +60,7 @@ def visible_rectangle(view, area):
     ball = near if settings.near_geometry == "ball" else 0.0
     corners = view.corners
     if settings.near_geometry == "planes":
-        corners = without_near_planes(corners, area.center, near)
+        corners = without_near_planes(view.drawn, area.center, near)
     shares = np.where(ahead, free_points(view, area, points, area.frame[2], ball, corners, ahead), 1.0)
     if settings.behind != "visible":
         shares = np.where(ahead, shares, free_points(view, area, points, -area.frame[2], ball, corners, ~ahead))

@@ -63,7 +63,6 @@ def masked_light(level, around, thickness, form="disc", senders=None, share=1.0)
 
 
 def one_slice(level, senders, receiver, samples, thickness, form, share):
-    """What one slice sends to a receiver."""
     sum_, blocked, highest = np.zeros(3), set(), 0.0
     for ox, oy, weight in samples:
         sender = receiver[0] + oy, receiver[1] + ox
@@ -83,7 +82,6 @@ def one_slice(level, senders, receiver, samples, thickness, form, share):
 
 
 def middle(sector):
-    """The middle of a sector."""
     return (sector + 0.5) * 2 / SECTORS
 
 

@@ -17,12 +17,10 @@ def level_key(seed, number):
 
 
 def row_key(level, row):
-    """Return the key of a row of a level."""
     return mix32(level ^ mix32((row + 0x85EBCA6B) % 2**32))
 
 
 def pixel_key(row, column):
-    """Return the key of a pixel of a row."""
     return mix32(row ^ mix32((column + 0xC2B2AE35) % 2**32))
 
 

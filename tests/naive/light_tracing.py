@@ -87,7 +87,6 @@ def axes(direction):
 
 
 def landed(scene, origin, direction, flux):
-    """Return where rays land."""
     far = crossings(corners_of(scene.geometry), origin, direction)
     hit = np.isfinite(far.min(axis=1))
     triangle, far = far.argmin(axis=1)[hit], far.min(axis=1)[hit]
@@ -163,7 +162,6 @@ def received(scene, receivers, vertices, visibility):
 
 
 def only(vertices, chosen):
-    """Return some vertices."""
     return Vertices(*(part[chosen] for part in vertices))
 
 

@@ -91,15 +91,6 @@ def shares_of_rays(frame):
                       None, frame.tracer.grain)
 
 
-def cameras_sight(frame):
-    from refgi.sssil.cameras import unoccluded
-
-    position, normal = (part[:, frame.gbuffer.covered].T.astype(float)
-                        for part in (frame.gbuffer.position, frame.gbuffer.normal))
-    lifted = position + frame.tracer.offsets(position)[:, None] * normal
-    return unoccluded(frame.tracer, lifted, np.roll(lifted, 7, axis=0)).astype(float)
-
-
 def walked_lights(frame):
     from refgi.lights.walk import walk_lights
 
@@ -117,7 +108,6 @@ USERS = {
     "hssil": hssil_by_rays,
     "multires": multires_by_rays,
     "reference modes of val": shares_of_rays,
-    "further cameras": cameras_sight,
     "random walk": walked_lights,
     "openness": lambda frame: openness(frame.tracer, frame.gbuffer.position, frame.gbuffer.normal,
                                        frame.gbuffer.covered, radius=0.3, rays=16),

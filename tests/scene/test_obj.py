@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.stability.file_formats import spoiled, with_odd_line, with_odd_token
 from refgi.errors import InputError, RefgiWarning
 from refgi.scene import Scene, load_scene
 from refgi.scene.files import reading_as
@@ -361,29 +360,3 @@ def test_very_many_runs_take_time_in_proportion(folder: Folder) -> None:
     scene, said = folder.load(text)
     assert scene.geometry.material_of_face.tolist() == [0, 1] * 3000
     assert said == []
-
-
-RICH = (b"\xef\xbb\xbfmtllib a.mtl b.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.4 0.5 0\nvn 0 0 1\nvn 0 1 0\n"
-        b"vt 0 0\nvt 1 0\nvt 1 1\nusemtl red\nf 1/1/1 2/2/1 3/3/2\nf 1 2 5 4\n"
-        b"usemtl Material #25\nf 1//1 3//1 -2//9\nusemtl red\nf -5/-1 -4/-2 -3/-3\nf 4 1 5 2 3\nl 1 2\n")
-LIBRARY = (b"newmtl red\nKd 0.3\nKs 0.1\nNs 9\nmap_Kd gone.png\nnewmtl Material #25\nKd 0.1 0.2 0.3\nd 0.5\n"
-           b"map_d -o 1 1 gone.png\n")
-
-
-@pytest.mark.parametrize("name", ["mesh.obj", "a.mtl"])
-def test_spoiled_files_are_read_or_refused(folder: Folder, name: str) -> None:
-    random = np.random.default_rng(len(name))
-    folder.put(**{"mesh.obj": RICH, "a.mtl": LIBRARY, "b.mtl": BLUE_MTL})
-    whole = {"mesh.obj": RICH, "a.mtl": LIBRARY}[name]
-    outcomes = {"read": 0, "refused": 0}
-    for number in range(600):
-        (folder.path / name).write_bytes((spoiled, with_odd_line, with_odd_token)[number % 3](whole, random))
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            warnings.simplefilter("ignore", RefgiWarning)
-            try:
-                load_scene(folder.path / "mesh.obj")
-                outcomes["read"] += 1
-            except InputError:
-                outcomes["refused"] += 1
-    assert min(outcomes.values()) > 20

@@ -21,7 +21,6 @@ class Port:
         np.save(self.folder / self.id / f"{name}.npy", array)
 
     def remove(self, name):
-        """Remove an array."""
         (self.folder / self.id / f"{name}.npy").unlink()
 
     def check(self, **asked):

@@ -99,8 +99,6 @@ def test_a_line_that_is_no_row_is_refused(line, monkeypatch):
 
 
 class Text:
-    """A file with one line."""
-
     def __init__(self, line):
         self.line = line
 

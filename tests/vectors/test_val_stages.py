@@ -20,7 +20,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # th
 
 ALL = VAL | VAL_FULL
 STORED = 1e-5  # of the brightest: float32 between some thirty stages, where one over 1 - V >= 0.02 magnifies it
-RANDOM = {"cluster.sampled_pixels.shifts", "lights.halton_points0.shifts"}
+RANDOM = {"lights.halton_points0.shifts"}
 MASKED = 0.01  # of an array's elements, at most
 STEPS = 1e-9  # of the largest: float64, in another order of sums; the same magnified
 OWN = ("cluster.", "rsm.facing", "rsm.visible_extent", "rsm.illuminated_extent")

@@ -18,7 +18,6 @@ from refgi.frame import Frame
 from refgi.scene import Camera, DirectionalLight, Material, Mesh, PointLight, Scene, SpotLight, merge
 from refgi.settings import of
 from refgi.settings.fields import choices_of, hints, is_choice, may_be_none, members
-from tests.sssil.hidden_side import hidden_side
 from tests.truth.scenes import rectangle
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -134,7 +133,6 @@ def tilted(scene):
 SCENES = {
     "lamps": lambda: room(*LAMPS),
     "smooth": lambda: room(*LAMPS, smooth=True),
-    "hidden": hidden_side,
     "close": lambda: tilted(room(*LAMPS)).with_camera(vfov=math.radians(25)),
     "tilted": lambda: tilted(room(*LAMPS)),
     "glass": lambda: room(*LAMPS, glass=True),
@@ -215,5 +213,4 @@ def differences(one: Any, other: Any) -> Iterator[str]:
 
 
 def name_of(choice: Any) -> str:
-    """Return the name of what a choice holds."""
     return "none" if choice is None else choice.name()

@@ -30,7 +30,7 @@ SII = PAIRS | {
 }
 SHADOWS = {
     "clusters.count": "VAL-04", "clusters.distance": "VAL-05", "clusters.normal_weight": "VAL-08",
-    "clusters.position_weight": "VAL-08", "clusters.rounds": "VAL-05 VAL-06", "clusters = adaptive": "VAL-04",
+    "clusters.position_weight": "VAL-08", "clusters.rounds": "VAL-05 VAL-06",
     "area": "VAL-09", "maps.resolution": "VAL-03 VAL-11", "maps.renderer": "VAL-03", "maps.near_geometry": "VAL-22",
     "maps.near_distance": "VAL-22", "maps.occluders_alone": "VAL-22", "maps.behind": "VAL-21",
     "visibility = hard": "VAL-03", "visibility = rays_vpls": "VAL-02", "visibility = back_projection": "REF-15",

@@ -123,11 +123,6 @@ def few(values, over=None, **options):
 def shadow_cases(kind):
     """Return cases of clusters, area lights, maps and soft shadows, by the key that says the kind of the latter."""
     pcss, back = {kind: "pcss"}, {kind: "back_projection"}
-    adaptive = {"clusters": "adaptive", "clusters.target_error": 0.073, "maps.near_distance": 0.6, **pcss}
-
-    def tried(values):  # on flat walls such a target takes nearly every light, whose clusters no key changes
-        return Case(values, adaptive, scene="tilted")
-
     bias = f"{kind}.constant_bias"
     return {
         "more clusters": Case({"clusters.count": 7}),
@@ -136,20 +131,12 @@ def shadow_cases(kind):
         "positions alone": few({"clusters.normal_weight": 0.0}),
         "normals first": few({"clusters.position_weight": 0.05}),
         "one round": few({"clusters.rounds": 1}),
-        "as many as it takes": Case({"clusters": "adaptive"}),
-        "adaptive, a lower target": tried({"clusters.target_error": 0.055}),
-        "adaptive, as printed": tried({"clusters.distance": "raw"}),
-        "adaptive, squared": tried({"clusters.distance": "squared"}),
-        "adaptive, positions alone": tried({"clusters.normal_weight": 0.0}),
-        "adaptive, normals first": tried({"clusters.position_weight": 0.05}),
-        "adaptive, one round": tried({"clusters.rounds": 1}),
         "principal axes": few({"area.axes": "pca"}),
         "least area": few({"area.axes": "min_area"}),
         "the longer side": few({"area.extent": "longer"}),
         "the shorter side": few({"area.extent": "shorter"}),
         "unbiased areas": few({"area.unbiased_area": True}),
         "foreshortened": few({"area.foreshortened": True}),
-        "single lights with their footprint": Case({"area.single_light": "footprint"}, {"clusters.count": 40, **pcss}),
         "finer maps": few({"maps.resolution": 24}),
         "maps by rays": few({"maps.renderer": "rays"}, same="both renderers find the same distances"),
         "near geometry kept": few({"maps.near_geometry": "keep"}, {"maps.near_distance": 0.6}),

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from refgi.scene import Camera
-from refgi.sssil.cameras import place_cameras
 from refgi.sssil.hssil import hssil
 from refgi.sssil.settings import HssilSettings
 from tests.literal.whole.hssil import picture as by_hand
-from tests.sssil.hidden_side import SIDE_VIEW
 from tests.wiring.cases import Case, assert_each_key_counts, uncovered
 from tests.wiring.features import HSSIL, featured
 from tests.wiring.fold import fold
@@ -103,9 +101,6 @@ CASES = {
     # texels of one plane may be equally near where bilateral weights vanish: rounding decides between them, so that
     # views beside others are bilinear
     "further views": Case(VIEWS),
-    "a placed view": Case({"cameras.count": 1}, scene="hidden"),
-    "placed views beside another": Case({"cameras.count": 2}, {"cameras.views": (SIDE_VIEW,), "upsampling": "bilinear"},
-                                        scene="hidden"),
     "views, a larger tolerance": Case({"cameras.depth_tolerance": 0.2},
                                       VIEWS | {"cameras.normal_cosine": -1.0, "upsampling": "bilinear"}),
     "views, any normal": Case({"cameras.normal_cosine": -1.0}, VIEWS | {"cameras.depth_tolerance": 0.2}),
@@ -121,9 +116,8 @@ CASES = {
 
 def known(settings):
     """Tell whether there is a picture: tan f ends below the angle of other cameras, some levels alone are dark."""
-    wide = settings.cameras.views or settings.cameras.count
     alone = settings.senders.only_level is not None and settings.sampling.first_level != 1
-    return not ("hss_tan_f" in settings.as_published and wide) and not alone
+    return not ("hss_tan_f" in settings.as_published and settings.cameras.views) and not alone
 
 
 FOLDED = fold(HssilSettings, CASES, BASE, fits=known)
@@ -137,12 +131,9 @@ def test_every_field_has_a_case():
 
 @pytest.mark.parametrize("name", featured(FOLDED, HSSIL))
 def test_the_literal_text(name, evidence):
-    """Where cameras are placed is tested elsewhere: placed views are views."""
     case = FOLDED[name]
     frame, settings = case.seen(), case.settings(HssilSettings, BASE)
-    placed = place_cameras(frame, settings.cameras.count) if settings.cameras.count else ()
-    assert len(placed) == settings.cameras.count
-    expected = by_hand(frame, settings, placed)
+    expected = by_hand(frame, settings)
     off = np.abs(hssil(frame, settings) - expected).max() / expected.max()
     evidence(f"{case.parts}: off by {off:.0e} of the brightest pixel")
     assert off < ROUNDING

@@ -66,7 +66,6 @@ def test_every_field_has_a_case():
 
 @functools.cache
 def frame_of(scene):
-    """Return the frame of a scene."""
     return Case({}, scene=scene).seen()
 
 
@@ -107,7 +106,6 @@ def rules_of(settings):
 
 @functools.cache
 def mean_of(scene, settings):
-    """Return the picture of a scene."""
     return trace_truth(frame_of(scene), settings).mean
 
 
@@ -332,7 +330,6 @@ def before_a_mirror():
 
 
 def seen_from_above():
-    """Return a frame of it."""
     return Frame(before_a_mirror(), width=12, height=12, dtype=np.float64)
 
 

@@ -46,7 +46,6 @@ class Setup(NamedTuple):
         return f"{self.start}, {self.levels} levels, {self.samples} samples"
 
     def settings(self, frame: Frame) -> HssilSettings:
-        """Return its settings."""
         return settings_of(frame, start=self.start, levels=self.levels, samples=self.samples)
 
 

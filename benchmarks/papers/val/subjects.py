@@ -196,7 +196,6 @@ def clustered(frame: Frame, settings: ValSettings, start: Clustering | None = No
 
 
 def grouped(frame: Frame, lights: PixelLights, settings: ValSettings, start: Clustering | None = None) -> Clustered:
-    """Group given lights."""
     kind = settings.clusters
     assert isinstance(kind, Clusters)
     found = cluster(lights.position, lights.normal, kind.count, distance=kind.distance,

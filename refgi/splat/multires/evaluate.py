@@ -168,8 +168,8 @@ def evaluate_shadowed(
     -> (3, n): Irradiance, W/m^2, linear RGB: that of `val` at the same pixels, to the bit. Excludes the receiver's
         albedo/pi.
 
-    Adaptive clusters are as many as the pixels of `frame` ask for, and shadow maps hold what can block between its
-    lights and the surfaces in its view (Dong et al. 2009, Sec. 4 to 6).
+    Shadow maps hold what can block between the lights of `frame` and the surfaces in its view (Dong et al. 2009, Sec. 4
+    to 6).
     """
     return shadowed_at(frame, buffer, lights, settings, footprint)(subsplats.pixel)
 

@@ -217,12 +217,6 @@ def _back_projection(arguments: Arguments) -> Described:
         "least side, of the farthest place": val_back_projection.LEAST_SIDE})
 
 
-def _sampled_pixels(arguments: Arguments) -> Described:
-    every = np.count_nonzero(arguments["triangle_id"] >= 0) <= len(arguments["shifts"])
-    return Described(form_of(val_areas.sampled_pixels, arguments, ("position", "normal", "triangle_id")),
-                     own("sampled_pixels"), ("shifts",), without=("no shift",) if every else ())
-
-
 FORMS = {
     "rsm.visible_extent": alone(val_areas.visible_extent, ("low", "high"), lists=("visible_extent", "box"),
                                 others={"triangle_id": "covered"}, adapt={"triangle_id": ids}),
@@ -240,7 +234,6 @@ FORMS = {
         "lift, of the illuminated box's largest coordinate": 4e-6}),
     "cluster.frames_behind": alone(val_maps.frames_behind),
     "cluster.map_ranges": alone(val_maps.map_ranges, ("near", "far")),
-    "cluster.sampled_pixels": _sampled_pixels,
     "cluster.disc_means": alone(val_filters.disc_means, lists=("means", "disc_means")),
     "cluster.box_means": alone(val_filters.box_means, lists=("means", "box_means")),
     "cluster.pcss": alone(val_visibility.pcss, others=PLACES, facts=SLACK),

@@ -1,92 +1,13 @@
-"""Maps and discs that the tests of the filters read, and summed areas of the basis.
-
-The table holds the sum over all texels above and to the left of each corner, read bilinearly between: the exact mean
-over the box of `brute`. Its sums are float64 whatever the map is: differences of 256^2 texels cost float32 5 digits.
-"""
-
-from typing import Any, NamedTuple
+"""Maps and discs that the tests of the filters read, and summed areas of the basis."""
 
 import numpy as np
-import numpy.typing as npt
 
-from refgi.cluster.filters.basis import DepthScale, beyond_disc, fill_basis, fill_beyond, normalise
+from refgi.cluster.filters.basis import DepthScale
 from refgi.cluster.filters.mip import mip_means
 from refgi.cluster.filters.mip_build import build_mip
 from refgi.cluster.filters.prefilter import brute_means, brutes, build_brute
 from refgi.cluster.filters.pyramid import mip_of, mips
-from refgi.jit import kernel
-from refgi.literal.val_maps import basis, series_depth
-
-Array = npt.NDArray[Any]
-
-
-class Sat(NamedTuple):
-    """Summed areas of all channels of a map."""
-
-    depth: Array  # (n, n): t
-    sums: Array  # (n + 1, n + 1, 4 M + 1) float64
-    quantised: bool  # 8 bits for the basis, 16 for basis-z
-    beyond: Array  # (count, 2) int32: texels beyond the unit disc and what they copy
-
-
-def sats(size: int, terms: int, dtype: npt.DTypeLike, *, quantised: bool = False, mirrored: bool = False) -> Sat:
-    """Make scratch for one map of n x n texels and M terms, not yet filled; as `mips`."""
-    return Sat(np.zeros((size, size), dtype), np.zeros((size + 1, size + 1, 4 * terms + 1)), quantised,
-               beyond_disc(size, mirrored))
-
-
-@kernel
-def build_sat(depth: Array, scale: DepthScale, sat: Sat) -> None:
-    """Fill the table of one map of radial distances (n, n), m."""
-    normalise(depth, scale, sat.depth)
-    fill_beyond(sat.beyond, sat.depth)
-    n, terms = len(depth), sat.sums.shape[2] // 4
-    basis, basis_z = np.empty((1, n, 2 * terms), depth.dtype), np.empty((1, n, 2 * terms + 1), depth.dtype)
-    along = np.empty(4 * terms + 1)
-    for i in range(n):
-        fill_basis(sat.depth[i : i + 1], terms, sat.quantised, basis, basis_z)
-        along[:] = 0.0
-        for j in range(n):
-            for c in range(2 * terms):
-                along[c] += basis[0, j, c]
-            for c in range(2 * terms + 1):
-                along[2 * terms + c] += basis_z[0, j, c]
-            for c in range(4 * terms + 1):
-                sat.sums[i + 1, j + 1, c] = sat.sums[i, j + 1, c] + along[c]
-
-
-@kernel
-def sat_means(
-    sat: Sat, s: Array, t: Array, radius: Array, active: Array, count: int, with_z: bool, out: Array
-) -> None:
-    """Read the means over the box around a disc for each lane of a tile, as `mip.mip_means`."""
-    n, terms = len(sat.depth), sat.sums.shape[2] // 4
-    real = s.dtype.type
-    channels = 4 * terms + 1 if with_z else 2 * terms
-    for i in range(count):
-        if not active[i]:
-            continue
-        half = max(0.5, 0.5 * radius[i] * n)
-        x, y = min(max(0.0, 0.5 * n * (s[i] + 1.0)), 1.0 * n), min(max(0.0, 0.5 * n * (t[i] + 1.0)), 1.0 * n)
-        left, right = max(x - half, 0.0), min(x + half, 1.0 * n)
-        top, bottom = max(y - half, 0.0), min(y + half, 1.0 * n)
-        area = (right - left) * (bottom - top)
-        for c in range(channels):
-            above = _read(sat.sums, top, right, c) - _read(sat.sums, top, left, c)
-            below = _read(sat.sums, bottom, right, c) - _read(sat.sums, bottom, left, c)
-            out[c, i] = real((below - above) / area)
-
-
-@kernel
-def _read(sums: Array, y: float, x: float, c: int) -> Any:
-    """Return the sum above and to the left of a point, in texels."""
-    last = sums.shape[0] - 2
-    i, j = min(int(y), last), min(int(x), last)
-    fy, fx = y - i, x - j
-    above = sums[i, j, c] + fx * (sums[i, j + 1, c] - sums[i, j, c])
-    below = sums[i + 1, j, c] + fx * (sums[i + 1, j + 1, c] - sums[i + 1, j, c])
-    return above + fy * (below - above)
-
+from refgi.literal.val_maps import basis, map_depths
 
 MOST = 0.85  # far end of the range of depths
 
@@ -96,15 +17,27 @@ def linear(per_metre):
     return DepthScale(False, 0.0, per_metre, MOST)
 
 
-def texels(depth, terms, per_metre=MOST / 4, in_bytes=False):
+def texels(depth, terms, per_metre=MOST / 4, in_bytes=False, mirrored=False):
     """Return the literal basis (1, C, n, n) of one map."""
-    return basis(depths(depth, per_metre)[None], terms, in_bytes)
+    scale = np.zeros(1), np.array([per_metre]), np.array([MOST]), False
+    return basis(map_depths(np.asarray(depth, float)[None], *scale, mirrored), terms, in_bytes)
 
 
-def depths(depth, per_metre=MOST / 4):
-    """Return the literal depths (n, n) of one map."""
-    t = series_depth(np.asarray(depth, float)[None], np.zeros(1), np.array([per_metre]), np.array([MOST]), False)
-    return t[0]
+def sat_means(discs, channels):
+    """Return means of a map's channels (C, n, n) over boxes around discs, (C, count), by sums above and to the left."""
+    n = channels.shape[-1]
+    sums = np.pad(channels, ((0, 0), (1, 0), (1, 0))).cumsum(axis=1).cumsum(axis=2)
+    s, t, half = np.asarray(discs[0], float), np.asarray(discs[1], float), np.maximum(0.5, discs[2] * n / 2)
+
+    def up_to(y, x):
+        i, j = (np.minimum(place.astype(int), n - 1) for place in (y, x))
+        rows = [sums[:, i + k, j] + (x - j) * (sums[:, i + k, j + 1] - sums[:, i + k, j]) for k in (0, 1)]
+        return rows[0] + (y - i) * (rows[1] - rows[0])
+
+    (left, right), (top, bottom) = ([np.clip(np.clip(n * (c + 1) / 2, 0, n) + side * half, 0, n) for side in (-1, 1)]
+                                    for c in (s, t))
+    total = up_to(bottom, right) - up_to(bottom, left) - up_to(top, right) + up_to(top, left)
+    return total / ((right - left) * (bottom - top))
 
 
 def random_map(n, dtype, seed=1):
@@ -129,13 +62,6 @@ def mip(depth, terms, per_metre=MOST / 4, **options):
     return filled
 
 
-def sat(depth, terms, per_metre=MOST / 4, **options):
-    """Build the summed areas of one map."""
-    filled = sats(len(depth), terms, depth.dtype, **options)
-    build_sat(depth, linear(per_metre), filled)
-    return filled
-
-
 def brute(depth, terms, per_metre=MOST / 4, **options):
     """Build the basis of one map."""
     filled = brutes(len(depth), terms, depth.dtype, **options)
@@ -143,13 +69,11 @@ def brute(depth, terms, per_metre=MOST / 4, **options):
     return filled
 
 
-MEANS = {"Mip": mip_means, "Sat": sat_means, "Brute": brute_means}
-
-
 def means(filters, discs, terms, *, with_z=True, wanted=None, count=None):
     """Read discs into an array of NaN with three lanes to spare."""
     s, t, radius = discs
     out = np.full((4 * terms + 1 if with_z else 2 * terms, len(s)), np.nan, s.dtype)
     wanted = np.ones(len(s), bool) if wanted is None else wanted
-    MEANS[type(filters).__name__](filters, s, t, radius, wanted, len(s) if count is None else count, with_z, out)
+    read = mip_means if type(filters).__name__ == "Mip" else brute_means
+    read(filters, s, t, radius, wanted, len(s) if count is None else count, with_z, out)
     return out

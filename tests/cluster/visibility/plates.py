@@ -4,22 +4,10 @@ import numpy as np
 
 from refgi.cluster.maps import ShadowMaps
 from refgi.cluster.rectangle import AreaLights
-from refgi.cluster.settings import ValSettings
-from refgi.cluster.visibility.csm import compare_filtered, find_penumbra
 from refgi.cluster.visibility.search_region import (
     CONSTANTS,
-    RADIUS,
     SCRATCH_ROWS,
-    S,
-    T,
-    filter_sizing,
-    find_search_regions,
-    light_constants,
-    scale_of,
-    series,
 )
-from refgi.settings import of
-from tests.cluster.filters.reads import build_sat, sat_means, sats
 
 
 def directions(n):
@@ -84,22 +72,3 @@ def scratch_arrays(size, terms, dtype=np.float64):
 def are_shares(values, dtype):
     """Whether values are constants from 0 to 1 of a type."""
     return values.dtype == dtype and bool(((values >= 0) & (values <= 1)).all())
-
-
-def shadow_by_summed_areas(areas, maps, points, **settings):
-    """V of the first area light by the series over boxes, which summed areas filter exactly."""
-    settings = of(ValSettings, **settings)
-    csm = settings.visibility
-    chain = series(csm)
-    constants, sizing = light_constants(maps, 0, float(areas.delta[0]), chain), filter_sizing(settings)
-    scale, size, dtype = scale_of(maps, 0, csm.depth_scale, chain), points.shape[1], maps.depth.dtype
-    filters, points = sats(maps.depth.shape[1], csm.terms, dtype, mirrored=True), points.astype(dtype)
-    build_sat(maps.depth[0], scale, filters)
-    weight = chain.weight.astype(dtype)
-    _, rows, means, pending, visible = scratch_arrays(size, csm.terms, dtype)
-    find_search_regions(constants, sizing, points, size, np.ones(size, np.bool_), pending, visible, rows)
-    sat_means(filters, rows[S], rows[T], rows[RADIUS], pending, size, True, means)
-    find_penumbra(constants, sizing, scale, weight, means, size, pending, rows)
-    sat_means(filters, rows[S], rows[T], rows[RADIUS], pending, size, False, means)
-    compare_filtered(constants, weight, means, size, pending, visible, rows)
-    return visible

@@ -18,14 +18,11 @@ from tests.naive.crossings import LIFT, corners_of, face_normals, free
 from tests.naive.draws import mix32
 
 
-def picture(frame, settings, placed=()):
-    """Return the irradiance, (3, h, w): the maximum of this camera's light and of what further cameras found.
-
-    `placed` are the cameras that `cameras.count` asks for.
-    """
+def picture(frame, settings):
+    """Return the irradiance, (3, h, w): the maximum of this camera's light and of what further cameras found."""
     light = one_view(frame, settings)
     cameras = settings.cameras
-    for camera in (*cameras.views, *placed):
+    for camera in cameras.views:
         other = Frame(frame.scene.with_camera(eye=camera.eye, target=camera.target, up=camera.up, vfov=camera.vfov),
                       width=frame.width, height=frame.height, dtype=frame.dtype, shadows=frame.shadows,
                       rsm_resolution=frame.rsm_resolution)

@@ -1,8 +1,8 @@
 """`ValSettings` as arguments of refgi.literal.val, over the n pixels that see a surface.
 
 Of the frame it takes the G-buffer, the shadow maps of lamps and the pixel lights chosen. What the literal text has no
-word for: rays in place of maps (tests/naive), the search for as many area lights as an error asks for. A picture of
-subsplats is within its error of this one, in which every pixel sums all lights.
+word for: rays in place of maps (tests/naive). A picture of subsplats is within its error of this one, in which every
+pixel sums all lights.
 """
 
 import math
@@ -10,19 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from refgi.cluster.settings import AdaptiveClusters, BackProjection, GeometryBlur, RaysRectangle, RaysVpls
+from refgi.cluster.settings import BackProjection, GeometryBlur, RaysRectangle, RaysVpls
 from refgi.lights.selection import choose_lights, footprints
 from refgi.literal import val as literal
 from refgi.literal import val_areas, val_maps
 from refgi.literal.val_filters import blur
-from refgi.pairs.settings import PairSettings
-from refgi.settings import of
 from tests.literal.shadows import shadows_of
 from tests.literal.whole.pairs import contributions
 from tests.naive import area_rays
 from tests.naive.crossings import corners_of
-
-BACK = 0.75  # of the area lights that were enough: the one step back
 
 
 class View(NamedTuple):
@@ -37,6 +33,7 @@ class View(NamedTuple):
     lights: object
     light: np.ndarray  # (N, n, 3) W/m^2 of each pixel light, not shadowed
     corners: np.ndarray  # (T, 3, 3) of all triangles
+    drawn: np.ndarray | None = None  # those of maps, which rays meet where planes are left out
 
 
 def picture(frame, settings):
@@ -79,46 +76,17 @@ def clustered(view, areas, shares):
     return (view.light * shares[areas.of][..., None]).sum(axis=0)
 
 
-# how many area lights
+# area lights
 
 
 def grouped(view):
-    """Return area lights and V (K, n) of each at every pixel, as many as are set or as an error asks for."""
-    clusters = view.settings.clusters
-    if not isinstance(clusters, AdaptiveClusters):
-        return trial(view, clusters.count)
-    members = np.array([area_rays.visible_members(view, [i]) for i in range(len(view.light))])
-    exact = (view.light * members[..., None]).sum(axis=0)
-    assert len(view.pixels) <= 2048  # of more the error is estimated
-
-    def error(attempt):
-        return math.sqrt(((clustered(view, *attempt) - exact) ** 2).mean()) / exact.mean()
-
-    most, count = len(view.light), 1
-    best = latest = trial(view, 1)
-    while error(latest) > clusters.target_error and count < most:
-        count = min(2 * count, most)
-        latest = trial(view, count)
-        best = latest if error(latest) <= clusters.target_error or error(latest) < error(best) else best
-    back = math.ceil(BACK * count)
-    if error(latest) <= clusters.target_error and (count + 1) // 2 < back < count:
-        latest = trial(view, back)
-        best = latest if error(latest) <= clusters.target_error else best
-    return best
-
-
-def trial(view, count):
-    """Return so many area lights and V of each at every pixel."""
+    """Return area lights and V (K, n) of each at every pixel."""
     kind, how, lights = view.settings.clusters, view.settings.area, view.lights
     normal = lights.normal.astype(float) / np.linalg.norm(lights.normal.astype(float), axis=0)
     areas = literal.area_lights(
-        lights.position.astype(float), normal, illuminated(view.frame), count=count, distance=kind.distance,
+        lights.position.astype(float), normal, illuminated(view.frame), count=kind.count, distance=kind.distance,
         w_x=kind.position_weight, w_a=kind.normal_weight, rounds=kind.rounds, axes=how.axes, extent=how.extent,
         unbiased=how.unbiased_area)
-    if how.single_light == "footprint":
-        surface = footprints(view.frame, view.settings.lights, of(PairSettings, clamp="disc"))
-        for k in np.flatnonzero(areas.members == 1):
-            areas.side[:, k] = areas.delta[k] = math.sqrt(surface[areas.of == k].item())
     return areas, visibility(view, areas)
 
 
@@ -138,6 +106,8 @@ def visibility(view, areas):
         return np.ones((len(areas.members), len(view.pixels)))
     parts = [area_rays.Area(areas.center[:, k], areas.frame[k], areas.axes[k], areas.side[:, k], areas.offset[:, k],
                             areas.radius[k], np.flatnonzero(areas.of == k)) for k in range(len(areas.members))]
+    if view.settings.maps.near_geometry == "planes":
+        view = view._replace(drawn=drawn(view))
     if isinstance(kind, RaysVpls | RaysRectangle):
         rays = area_rays.visible_rectangle if isinstance(kind, RaysRectangle) else (
             lambda view, area: area_rays.visible_members(view, area.members))
@@ -152,19 +122,25 @@ def visibility(view, areas):
     return shares
 
 
+def drawn(view):
+    """Return the corners of the triangles that maps are drawn from, (T, 3, 3)."""
+    seen = val_maps.seen_vertices(*indexed(view.corners), view.frame.gbuffer.triangle_id)
+    boxes = val_areas.box(view.position.T), illuminated(view.frame)
+    return view.corners[val_maps.occluders(*indexed(view.corners), seen, view.lights.position.astype(float), *boxes,
+                                           not view.settings.maps.occluders_alone)]
+
+
 def by_maps(view, areas, sign):
     """Return V by the maps ahead (1), or by those of the hemispheres behind (-1): right and forward turned round."""
     settings, boxes = view.settings.maps, (val_areas.box(view.position.T), illuminated(view.frame))
     center, ball, far = val_maps.map_views(*boxes, areas.center, areas.normal, areas.radius,
                                            area_rays.near_share(view.settings))
-    seen = val_maps.seen_vertices(*indexed(view.corners), view.frame.gbuffer.triangle_id)
-    blocks = val_maps.occluders(*indexed(view.corners), seen, view.lights.position.astype(float), *boxes,
-                                not settings.occluders_alone)
+    blockers = drawn(view)
     turned = areas._replace(frame=areas.frame * np.array([sign, 1.0, sign])[:, None], normal=sign * areas.normal)
     ignored = ball if settings.near_geometry == "ball" else 0 * ball
     depth = []
     for k in range(len(center)):
-        corners = view.corners[blocks]
+        corners = blockers
         if settings.near_geometry == "planes":
             corners = area_rays.without_near_planes(corners, center[k], ball[k])
         one = slice(k, k + 1)

@@ -250,7 +250,6 @@ BAD = {
                                  {"visibility": "val", "representative": "mean"}],
     "subsplats.visibility": [{"visibility": "map"}, {"subsplats": "error", "visibility": "map"},
                              {"subsplats": "irradiance", "subsplats.visibility": "val"}],
-    "area.single_light": [{"visibility": "val", "single_light": "footprint", "lights.source": "walk"}],
     "subsplats.visibility.shadow": [{"visibility": "val", "shadow": "none"}],
     "subsplats.visibility.as_published": [{"visibility": "val", "subsplats.visibility.as_published": {"ams_disc"}}],
     "subsplats.upsampling": [{"upsampling": "cubic"}],

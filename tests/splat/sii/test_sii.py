@@ -168,24 +168,6 @@ def test_lobe_code_is_skipped_without_glossy_materials(box):
     assert log.status("pairs.sum") == ["ran"]
 
 
-@pytest.mark.parametrize("change", [
-    {"warp": "A"}, {"warp": "B", "importance": "peak", "defensive": 0.2}, {"warp": "A", "importance": "openness"},
-    {"warp": "B", "filtered": True}, {"warp": "A", "renormalise_weights": True}, {"openness_flux": "scale"},
-    {"openness_flux": "roulette"}, {"source": "walk", "bounces": 2}, {"stochastic": True},
-    {"half_resolution": True}, {"clamp": "disc", "warp": "A"}, {"as_published": {"per_light_ilow"}},
-])
-@pytest.mark.parametrize("lamps", [1, 2])
-def test_settings_work_together_and_again(box, change, lamps):
-    light = box.scene.lights[0]
-    frame = Frame(box.scene.with_lights(*[light] * lamps), width=13, height=9, rsm_resolution=32)
-    settings = of(SiiSettings, lights=50, cut_share=0.05, reference_length=0.3, **change)
-    picture = sii(frame, settings)
-    assert np.isfinite(picture).all()
-    assert picture.any()
-    assert (picture >= 0).all()
-    np.testing.assert_array_equal(sii(frame, settings), picture)
-
-
 @pytest.mark.feature("REF-20")
 @pytest.mark.parametrize("lamps", [1, 2])
 def test_without_the_weight_a_picture_has_its_lights_share_of_the_texels(box, lamps, evidence):

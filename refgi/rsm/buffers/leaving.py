@@ -176,28 +176,50 @@ def glossy_points(buffer: GBuffer, materials: MaterialTable, eye: npt.ArrayLike)
     eye (3,): Where the camera is, m.
     -> GlossyPoints: Without points whose normal faces away from the eye, as interpolated normals may.
     """
-    material_id, position, normal = buffer.resolve("material_id", "position", "normal")
-    glossy = np.append(glossy_materials(materials), False)  # the last one stands for no surface, -1
-    pixel = np.flatnonzero(glossy[material_id])
-    at, up = (np.take(channel.reshape(3, -1), pixel, axis=1) for channel in (position, normal))
-    mirror, faces_eye = np.empty_like(at), np.empty(len(pixel), np.bool_)
-    _mirror(at, up, np.asarray(eye, np.float64), mirror, faces_eye)
-    material = material_id.reshape(-1)[pixel]
-    found = GlossyPoints(pixel, at, up, mirror, materials.exponent.astype(at.dtype)[material],
-                         np.take(materials.specular.T.astype(at.dtype), material, axis=1))
+    position, normal = (channel.reshape(3, -1) for channel in buffer.resolve("position", "normal"))
+    pixel, material = np.empty(buffer.covered.size, np.int64), np.empty(buffer.covered.size, np.int32)
+    count = _list_glossy(glossy_materials(materials), buffer._geometry.material_of_face, buffer.triangle_id.reshape(-1),
+                         pixel, material)
+    real = position.dtype
+    found = GlossyPoints(pixel[:count].copy(), *(np.empty((3, count), real) for _ in range(3)), np.empty(count, real),
+                         np.empty((3, count), real))
+    faces_eye = np.empty(count, np.bool_)
+    _fill_glossy(position, normal, np.asarray(eye, np.float64), material, materials.exponent.astype(real),
+                 materials.specular.T.astype(real), found, faces_eye)
     return found if faces_eye.all() else found.at(np.flatnonzero(faces_eye))
 
 
+@kernel
+def _list_glossy(glossy: Array, material_of_face: Array, triangle_id: Array, pixel: Array, material: Array) -> int:
+    """List the pixels of glossy materials, and these; return how many there are."""
+    count = np.uint64(0)
+    for i in range(len(triangle_id)):
+        face = triangle_id[i]
+        m = material_of_face[np.uint64(max(face, 0))]
+        pixel[count], material[count] = i, m
+        count += np.uint64((face >= 0) & glossy[m])
+    return int(count)
+
+
 @kernel(parallel=True)
-def _mirror(position: Array, normal: Array, eye: Array, mirror: Array, faces_eye: Array) -> None:
-    """Fill m, computed in float64, and whether n . w_o > 0."""
-    for i in prange(position.shape[1]):
-        x, y, z = eye[0] - position[0, i], eye[1] - position[1, i], eye[2] - position[2, i]
-        nx, ny, nz = np.float64(normal[0, i]), np.float64(normal[1, i]), np.float64(normal[2, i])
+def _fill_glossy(
+    position: Array, normal: Array, eye: Array, material: Array, exponent: Array, specular: Array,
+    points: GlossyPoints, faces_eye: Array,
+) -> None:
+    """Fill all but the pixels of the points; m computed in float64, and whether n . w_o > 0."""
+    for i in prange(len(points.pixel)):
+        pixel, m = points.pixel[i], material[i]
+        for c in range(3):
+            points.position[c, i], points.normal[c, i] = position[c, pixel], normal[c, pixel]
+            points.specular[c, i] = specular[c, m]
+        points.exponent[i] = exponent[m]
+        x, y, z = eye[0] - position[0, pixel], eye[1] - position[1, pixel], eye[2] - position[2, pixel]
+        nx, ny, nz = np.float64(normal[0, pixel]), np.float64(normal[1, pixel]), np.float64(normal[2, pixel])
         length = math.sqrt(x * x + y * y + z * z)
         faces_eye[i] = x * nx + y * ny + z * nz > 0.0
         scale = 1.0 / length if length > 0.0 else 0.0
-        mirror[0, i], mirror[1, i], mirror[2, i] = mirrored(x * scale, y * scale, z * scale, nx, ny, nz)
+        mx, my, mz = mirrored(x * scale, y * scale, z * scale, nx, ny, nz)
+        points.mirrored[0, i], points.mirrored[1, i], points.mirrored[2, i] = mx, my, mz
 
 
 @stage("rsm.direct_lobes")

@@ -207,8 +207,9 @@ def glossy_summed(
     step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(packed.shines)) // TILE * TILE)
     for first in range(0, len(order), step):
         part = order[first : first + step]
-        vectors = (taken(vector, part) for vector in (points.position, points.normal, points.mirrored))
-        some = GlossyPoints(part, *vectors, points.exponent[part], taken(points.specular, part))
+        position, normal, mirrored, specular = (
+            taken(vector, part) for vector in (points.position, points.normal, points.mirrored, points.specular))
+        some = GlossyPoints(part, position, normal, mirrored, points.exponent[part], specular)
         sums = np.zeros((3, len(part)), points.position.dtype)
         _add_lights(some, packed, ranges, (None, None) if lists is None else lists(some.position, some.normal), sums)
         put(result, part, sums * some.specular)

@@ -134,7 +134,8 @@ class GBuffer:
         self.dtype = np.dtype(dtype)
         self._geometry = geometry
         self._materials = materials
-        self._channels: dict[str, Array] = dict(known or {})
+        self._known = known or {}
+        self._channels: dict[str, Array] = dict(self._known)
 
     @property
     def height(self) -> int:
@@ -193,9 +194,9 @@ class GBuffer:
 
     @property
     def plain_albedo(self) -> PlainAlbedo | None:
-        """What `albedo` is made of, where that is materials alone and nobody has asked for its plane; else None."""
+        """What `albedo` is made of, where that is materials alone; else None."""
         materials, geometry = self._materials, self._geometry
-        if "albedo" in self._channels or geometry.colours is not None or painted(geometry, materials) is not None:
+        if "albedo" in self._known or geometry.colours is not None or painted(geometry, materials) is not None:
             return None
         return PlainAlbedo(self.triangle_id, geometry.material_of_face, _reflectances(materials, self.dtype))
 

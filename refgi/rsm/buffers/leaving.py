@@ -181,8 +181,8 @@ def glossy_points(buffer: GBuffer, materials: MaterialTable, eye: npt.ArrayLike)
     count = _list_glossy(glossy_materials(materials), buffer._geometry.material_of_face, buffer.triangle_id.reshape(-1),
                          pixel, material)
     real = position.dtype
-    found = GlossyPoints(pixel[:count].copy(), *(np.empty((3, count), real) for _ in range(3)), np.empty(count, real),
-                         np.empty((3, count), real))
+    vectors = np.empty((4, 3, count), real)
+    found = GlossyPoints(pixel[:count].copy(), vectors[0], vectors[1], vectors[2], np.empty(count, real), vectors[3])
     faces_eye = np.empty(count, np.bool_)
     _fill_glossy(position, normal, np.asarray(eye, np.float64), material, materials.exponent.astype(real),
                  materials.specular.T.astype(real), found, faces_eye)

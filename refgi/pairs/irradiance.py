@@ -207,7 +207,9 @@ def glossy_summed(
     step = max(1 << 14, PAIRS_AT_ONCE // max(1, len(packed.shines)) // TILE * TILE)
     for first in range(0, len(order), step):
         part = order[first : first + step]
-        some = points.at(part)
+        position, normal, mirrored, specular = (
+            taken(vector, part) for vector in (points.position, points.normal, points.mirrored, points.specular))
+        some = GlossyPoints(part, position, normal, mirrored, points.exponent[part], specular)
         sums = np.zeros((3, len(part)), points.position.dtype)
         _add_lights(some, packed, ranges, (None, None) if lists is None else lists(some.position, some.normal), sums)
         put(result, part, sums * some.specular)
@@ -238,8 +240,8 @@ def block_order(pixel: Array, width: int) -> Array:
 
     Tiles of receivers that follow each other in it are compact.
     """
-    row, column = np.divmod(pixel, width)
-    key = row // 16 * (width // 16 + 1) + column // 16
-    for side in (8, 4):
-        key = key * 4 + row // side % 2 * 2 + column // side % 2
-    return np.argsort(key * 16 + row % 4 * 4 + column % 4, kind="stable")
+    shown = np.zeros((int(pixel.max(initial=0)) // width + 1, width), np.bool_)
+    shown.reshape(-1)[pixel] = True
+    place = plane((shown.size,), np.int64)
+    place[pixel] = np.arange(len(pixel))
+    return np.take(place, block_by_block(shown))

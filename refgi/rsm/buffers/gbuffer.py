@@ -5,7 +5,7 @@ Besides, face normals where shading normals are interpolated, and backs that are
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from refgi.errors import expect
 from refgi.jit import kernel, prange, thread_count
 from refgi.rsm.buffers.attributes import ChannelMask, Planes, allocate, resolve, tint
 from refgi.rsm.buffers.surfaces import Surface
-from refgi.rsm.buffers.textures import paint
+from refgi.rsm.buffers.textures import paint, painted
 from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection, camera_projection
 from refgi.rsm.raster.visibility_buffer import Visibility, rasterize
@@ -85,6 +85,14 @@ def _unit_normal(vertices: Array, faces: Array, face: int) -> Any:
     return nx / length, ny / length, nz / length
 
 
+class PlainAlbedo(NamedTuple):
+    """What an albedo without textures and vertex colours is made of."""
+
+    triangle_id: Array  # (h, w) int32, -1: no surface
+    material_of_face: Array  # (m,) int32
+    diffuse: Array  # (3, materials + 1), the last one black
+
+
 MANY = 8  # as soon as one texel in so many is asked for, all are computed
 NO_TEXELS = np.zeros(0, np.int64)
 
@@ -126,7 +134,8 @@ class GBuffer:
         self.dtype = np.dtype(dtype)
         self._geometry = geometry
         self._materials = materials
-        self._channels: dict[str, Array] = dict(known or {})
+        self._known = known or {}
+        self._channels: dict[str, Array] = dict(self._known)
 
     @property
     def height(self) -> int:
@@ -182,6 +191,14 @@ class GBuffer:
     def albedo(self) -> Array:
         """Diffuse reflectance, (3, h, w)."""
         return self.resolve("albedo")[0]
+
+    @property
+    def plain_albedo(self) -> PlainAlbedo | None:
+        """What `albedo` is made of, where that is materials alone; else None."""
+        materials, geometry = self._materials, self._geometry
+        if "albedo" in self._known or geometry.colours is not None or painted(geometry, materials) is not None:
+            return None
+        return PlainAlbedo(self.triangle_id, geometry.material_of_face, _reflectances(materials, self.dtype))
 
     @property
     def emission(self) -> Array:
@@ -309,14 +326,18 @@ def _filled(
     planes = _planes(names, seen.shape, dtype)
     if seen.size:
         channels = ChannelMask(*(name in names for name in ChannelMask._fields))
-        diffuse = np.append(materials.diffuse.T.astype(dtype), np.zeros((3, 1), dtype), axis=1)
         surface = Surface(geometry.vertices, geometry.faces, geometry.vertex_normals, geometry.material_of_face,
-                          diffuse)
+                          _reflectances(materials, dtype))
         resolve(surface, projection, triangle_id, NO_TEXELS if texel is None else texel, seen, channels, planes,
                 allocate(thread_count()) if texel is None else allocate(1, 1))
     paint(geometry, materials, projection, triangle_id, planes.albedo, texel)
     tint(geometry, projection, triangle_id, planes.albedo, texel)
     return planes
+
+
+def _reflectances(materials: MaterialTable, dtype: np.dtype[Any]) -> Array:
+    """Return the materials' diffuse reflectances, (3, materials + 1), the last one black."""
+    return np.append(materials.diffuse.T.astype(dtype), np.zeros((3, 1), dtype), axis=1)
 
 
 def _planes(names: tuple[str, ...], shape: tuple[int, ...], dtype: np.dtype[Any]) -> Planes:

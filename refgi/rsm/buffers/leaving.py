@@ -16,13 +16,13 @@ import numpy.typing as npt
 
 from refgi.jit import kernel, prange
 from refgi.radiometry import incident_light, mirrored, receiver_lobe
-from refgi.rsm.buffers.gbuffer import GBuffer
+from refgi.rsm.buffers.gbuffer import GBuffer, PlainAlbedo
 from refgi.rsm.pool import plane, zeros
 from refgi.scene.model import Light, LightTable, MaterialTable, light_table
 from refgi.stages import stage
 from refgi.types import Array
 
-NONE = np.zeros((0, 0), np.int32)
+NONE = np.zeros((3, 0, 0), np.float32)
 
 
 def leaving_radiance(irradiance: Array, extra: Array | None, buffer: GBuffer, materials: MaterialTable) -> Array:
@@ -45,12 +45,12 @@ def leaving_radiance(irradiance: Array, extra: Array | None, buffer: GBuffer, ma
         Radiance, W/m^2/sr, linear RGB.
     """
     radiance = plane(irradiance.shape, irradiance.dtype if extra is None else np.result_type(irradiance, extra))
-    emits = bool(materials.emission.any())
-    material_id = buffer.material_id if emits else NONE
-    _reflect(irradiance, irradiance if extra is None else extra, extra is not None, buffer.albedo, radiance)
-    if emits and materials.emissive is None:
-        _emit(materials.emission, material_id, radiance)
-    elif emits:
+    plain = buffer.plain_albedo
+    albedo = buffer.albedo if plain is None else NONE
+    _reflect(irradiance, irradiance if extra is None else extra, extra is not None, albedo, plain, radiance)
+    if materials.emission.any() and materials.emissive is None:
+        _emit(materials.emission, buffer._geometry.material_of_face, buffer.triangle_id, radiance)
+    elif materials.emission.any():
         radiance += buffer.emission
     return radiance
 
@@ -64,7 +64,7 @@ def emission_of(triangle_id: Array, material_of_face: Array, emission: Array) ->
     -> (3, h, w): Radiance, W/m^2/sr; 0 without surface.
     """
     radiance = np.zeros((3, *triangle_id.shape), emission.dtype)
-    _emit(emission, np.where(triangle_id >= 0, material_of_face[triangle_id], np.int32(-1)), radiance)
+    _emit(emission, material_of_face, triangle_id, radiance)
     return radiance
 
 
@@ -78,7 +78,7 @@ def radiance_of(irradiance: Array, extra: Array | None, albedo: Array, emission:
     -> (3, h, w): Radiance, W/m^2/sr, linear RGB; 0 without surface.
     """
     radiance = np.empty_like(irradiance)
-    _reflect(irradiance, irradiance if extra is None else extra, extra is not None, albedo, radiance)
+    _reflect(irradiance, irradiance if extra is None else extra, extra is not None, albedo, None, radiance)
     return radiance if emission is None else radiance + emission
 
 
@@ -92,26 +92,41 @@ def leaving_steps(direct: Array, indirect: Array | None, buffer: GBuffer, materi
 
 
 @kernel(parallel=True)
-def _reflect(irradiance: Array, extra: Array, both: bool, albedo: Array, radiance: Array) -> None:
-    pi = irradiance.dtype.type(np.pi)
+def _reflect(
+    irradiance: Array, extra: Array, both: bool, albedo: Array, plain: PlainAlbedo | None, radiance: Array
+) -> None:
+    pi, width = irradiance.dtype.type(np.pi), radiance.shape[2]
     for row in prange(radiance.shape[1]):
+        material = np.empty(width, np.uint64)
+        if plain is not None:
+            _materials_of(plain, row, material)
         for channel in range(3):
-            for x in range(radiance.shape[2]):
+            for x in range(width):
                 arriving = irradiance[channel, row, x]
                 if both:
                     arriving = arriving + extra[channel, row, x]
+                own = albedo[channel, row, x] if plain is None else plain.diffuse[channel, material[x]]
                 # L = albedo/pi E, the BRDF of a diffuse surface
-                radiance[channel, row, x] = arriving * albedo[channel, row, x] / pi
+                radiance[channel, row, x] = arriving * own / pi
+
+
+@kernel
+def _materials_of(plain: PlainAlbedo, row: int, material: Array) -> None:
+    """Fill the material of each pixel of a row, the last one without surface."""
+    none = np.uint64(plain.diffuse.shape[1] - 1)
+    for x in range(len(material)):
+        face = plain.triangle_id[row, x]
+        material[x] = np.uint64(plain.material_of_face[np.uint64(max(face, 0))]) if face >= 0 else none
 
 
 @kernel(parallel=True)
-def _emit(emission: Array, material_id: Array, radiance: Array) -> None:
+def _emit(emission: Array, material_of_face: Array, triangle_id: Array, radiance: Array) -> None:
     for row in prange(radiance.shape[1]):
         for x in range(radiance.shape[2]):
-            material = material_id[row, x]
-            if material >= 0:
+            face = triangle_id[row, x]
+            if face >= 0:
                 for channel in range(3):
-                    radiance[channel, row, x] += emission[material, channel]
+                    radiance[channel, row, x] += emission[material_of_face[face], channel]
 
 
 class GlossyPoints(NamedTuple):
@@ -161,28 +176,50 @@ def glossy_points(buffer: GBuffer, materials: MaterialTable, eye: npt.ArrayLike)
     eye (3,): Where the camera is, m.
     -> GlossyPoints: Without points whose normal faces away from the eye, as interpolated normals may.
     """
-    material_id, position, normal = buffer.resolve("material_id", "position", "normal")
-    glossy = np.append(glossy_materials(materials), False)  # the last one stands for no surface, -1
-    pixel = np.flatnonzero(glossy[material_id])
-    at, up = (np.take(channel.reshape(3, -1), pixel, axis=1) for channel in (position, normal))
-    mirror, faces_eye = np.empty_like(at), np.empty(len(pixel), np.bool_)
-    _mirror(at, up, np.asarray(eye, np.float64), mirror, faces_eye)
-    material = material_id.reshape(-1)[pixel]
-    found = GlossyPoints(pixel, at, up, mirror, materials.exponent.astype(at.dtype)[material],
-                         np.take(materials.specular.T.astype(at.dtype), material, axis=1))
+    position, normal = (channel.reshape(3, -1) for channel in buffer.resolve("position", "normal"))
+    pixel, material = np.empty(buffer.covered.size, np.int64), np.empty(buffer.covered.size, np.int32)
+    count = _list_glossy(glossy_materials(materials), buffer._geometry.material_of_face, buffer.triangle_id.reshape(-1),
+                         pixel, material)
+    real = position.dtype
+    vectors = np.empty((4, 3, count), real)
+    found = GlossyPoints(pixel[:count].copy(), vectors[0], vectors[1], vectors[2], np.empty(count, real), vectors[3])
+    faces_eye = np.empty(count, np.bool_)
+    _fill_glossy(position, normal, np.asarray(eye, np.float64), material, materials.exponent.astype(real),
+                 materials.specular.T.astype(real), found, faces_eye)
     return found if faces_eye.all() else found.at(np.flatnonzero(faces_eye))
 
 
+@kernel
+def _list_glossy(glossy: Array, material_of_face: Array, triangle_id: Array, pixel: Array, material: Array) -> int:
+    """List the pixels of glossy materials, and these; return how many there are."""
+    count = np.uint64(0)
+    for i in range(len(triangle_id)):
+        face = triangle_id[i]
+        m = material_of_face[np.uint64(max(face, 0))]
+        pixel[count], material[count] = i, m
+        count += np.uint64((face >= 0) & glossy[m])
+    return int(count)
+
+
 @kernel(parallel=True)
-def _mirror(position: Array, normal: Array, eye: Array, mirror: Array, faces_eye: Array) -> None:
-    """Fill m, computed in float64, and whether n . w_o > 0."""
-    for i in prange(position.shape[1]):
-        x, y, z = eye[0] - position[0, i], eye[1] - position[1, i], eye[2] - position[2, i]
-        nx, ny, nz = np.float64(normal[0, i]), np.float64(normal[1, i]), np.float64(normal[2, i])
+def _fill_glossy(
+    position: Array, normal: Array, eye: Array, material: Array, exponent: Array, specular: Array,
+    points: GlossyPoints, faces_eye: Array,
+) -> None:
+    """Fill all but the pixels of the points; m computed in float64, and whether n . w_o > 0."""
+    for i in prange(len(points.pixel)):
+        pixel, m = points.pixel[i], material[i]
+        for c in range(3):
+            points.position[c, i], points.normal[c, i] = position[c, pixel], normal[c, pixel]
+            points.specular[c, i] = specular[c, m]
+        points.exponent[i] = exponent[m]
+        x, y, z = eye[0] - position[0, pixel], eye[1] - position[1, pixel], eye[2] - position[2, pixel]
+        nx, ny, nz = np.float64(normal[0, pixel]), np.float64(normal[1, pixel]), np.float64(normal[2, pixel])
         length = math.sqrt(x * x + y * y + z * z)
         faces_eye[i] = x * nx + y * ny + z * nz > 0.0
         scale = 1.0 / length if length > 0.0 else 0.0
-        mirror[0, i], mirror[1, i], mirror[2, i] = mirrored(x * scale, y * scale, z * scale, nx, ny, nz)
+        mx, my, mz = mirrored(x * scale, y * scale, z * scale, nx, ny, nz)
+        points.mirrored[0, i], points.mirrored[1, i], points.mirrored[2, i] = mx, my, mz
 
 
 @stage("rsm.direct_lobes")

@@ -7,7 +7,8 @@ the mirror direction r = d - 2 (n . d) n of the incoming direction d, with its o
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,7 @@ from refgi.rsm.buffers.gbuffer import MANY, GBuffer, values_at
 from refgi.rsm.buffers.light_projection import MapShape, incident_flux, light_projection
 from refgi.rsm.buffers.solid_angle import texel_solid_angles, texel_solid_angles_at
 from refgi.rsm.buffers.surfaces import texel_ray
+from refgi.rsm.pool import plane
 from refgi.rsm.raster.projection import Projection, project
 from refgi.rsm.raster.visibility_buffer import rasterize
 from refgi.scene.model import Geometry, Light, MaterialTable
@@ -28,7 +30,7 @@ __all__ = ["Rsm", "reflective_shadow_map"]
 
 VIEW_CHANNELS = ("depth", "position", "normal")  # channels of the light's view
 LOBE = ("lobe_flux", "lobe_axis", "lobe_exponent")
-LOBE_READS = ("normal", "material_id", "covered")
+LOBE_READS = ("normal", "material_id")
 
 
 class Rsm:
@@ -160,17 +162,21 @@ class Rsm:
                     for name, channel in self._known.items() if name in names}
         return tuple(surface.get(name) for name in names)
 
+    @cached_property
+    def _incident(self) -> Array:
+        """Flux that arrives through each texel, (3, H, W), W."""
+        return incident_flux(self.light, self.projection, None, self._view.dtype)
+
     @property
     def _reflecting(self) -> tuple[str, ...]:
         """Channels of the view that the flux depends on."""
         return ("albedo", "material_id") if self._glossy or self._materials.ior.any() else ("albedo",)
 
     def _flux(self, incident: Array, surface: Mapping[str, Array]) -> Array:
-        """Return what the diffuse part reflects of the incident flux, in its place."""
-        if "material_id" in surface:
-            incident *= (self._materials.ior == 0)[surface["material_id"]]
-        incident *= surface["albedo"]  # Phi_t = albedo I(w) solid_angle_t (SII Sec. 3.1, calibrated)
-        return incident
+        """Return what the diffuse part reflects of the incident flux."""
+        if self._materials.ior.any():
+            incident = incident * (self._materials.ior == 0)[surface["material_id"]]
+        return incident * surface["albedo"]  # Phi_t = albedo I(w) solid_angle_t (SII Sec. 3.1, calibrated)
 
     def _whole(self, name: str) -> Array:
         if name in VIEW_CHANNELS and name not in self._known:
@@ -179,9 +185,8 @@ class Rsm:
             if name == "solid_angle":
                 self._known[name] = texel_solid_angles(self.projection).astype(self._view.dtype)
             else:
-                incident = incident_flux(self.light, self.projection, None, self._view.dtype)
                 surface = zip(self._reflecting, self._view.resolve(*self._reflecting), strict=True)
-                self._known[name] = self._flux(incident, dict(surface))
+                self._known[name] = self._flux(self._incident, dict(surface))
         channel = self._known[name]
         assert channel is not None
         return channel
@@ -190,19 +195,17 @@ class Rsm:
         if name not in self._known and not self._glossy:
             return None
         if name not in self._known:
-            incident = incident_flux(self.light, self.projection, None, self._view.dtype).reshape(3, -1)
+            self._view.resolve("depth", "position", *LOBE_READS)  # in one pass with what lights and shadows read next
             planes = zip(LOBE_READS, self._view.resolve(*LOBE_READS), strict=True)
             surface = {key: plane.reshape(*plane.shape[:-2], -1) for key, plane in planes}
-            lobes = self._lobes(np.arange(self.texels), surface, incident)
+            lobes = self._lobes(np.arange(self.texels), surface, self._incident.reshape(3, -1))
             whole = {key: lobe.reshape(*lobe.shape[:-1], *self.projection.shape) for key, lobe in lobes.items()}
             self._known = {**whole, **self._known}
         return self._known[name]
 
     def _lobes(self, texel: Array, surface: Mapping[str, Array], incident: Array) -> dict[str, Array]:
         """Return flux, axis and exponent of the lobes at texels (n,), by name."""
-        material = surface["material_id"]
-        reflected = incident * (self._materials.ior == 0)[material] * surface["covered"]
-        lobe = _lobe(self._materials, self.projection, texel, material, surface["normal"], reflected)
+        lobe = _lobe(self._materials, self.projection, texel, surface["material_id"], surface["normal"], incident)
         return dict(zip(LOBE, lobe, strict=True))
 
     @property
@@ -247,26 +250,44 @@ def reflective_shadow_map(
     return Rsm(light, GBuffer(geometry, materials, maps, rasterize(geometry, maps), dtype), materials)
 
 
+class Lobes(NamedTuple):
+    """Lobes of n texels."""
+
+    flux: Array  # (3, n) W
+    axis: Array  # (3, n) unit vectors, 0 without lobe
+    exponent: Array  # (n,) 0 without lobe
+
+
 def _lobe(
     materials: MaterialTable, maps: Projection, texel: Array, material: Array, normal: Array, incident: Array
-) -> tuple[Array, Array, Array]:
-    """Return flux, axis and exponent of the lobes at texels (n,)."""
-    flux = np.take(materials.specular.T.astype(normal.dtype), material, axis=1) * incident
-    has_lobe: Array = np.asarray(flux.any(axis=0))
-    exponent = materials.exponent.astype(normal.dtype)[material] * has_lobe
-    axis = np.zeros_like(normal)
-    _mirror(maps, texel, normal, has_lobe, axis)
-    return flux, axis, exponent
+) -> Lobes:
+    """Return the lobes at texels (n,)."""
+    specular = np.append(np.where(materials.ior == 0, materials.specular.T, 0.0), np.zeros((3, 1)), axis=1)
+    lobes = Lobes(*(plane(shape, normal.dtype) for shape in (normal.shape, normal.shape, texel.shape)))
+    _fill_lobes(maps, texel, material, normal, incident, specular.astype(normal.dtype),
+                materials.exponent.astype(normal.dtype), lobes)
+    return lobes
 
 
 @kernel(parallel=True)
-def _mirror(maps: Projection, texel: Array, normal: Array, has_lobe: Array, axis: Array) -> None:
+def _fill_lobes(
+    maps: Projection, texel: Array, material: Array, normal: Array, incident: Array, specular: Array, exponent: Array,
+    lobes: Lobes,
+) -> None:
+    """Fill lobes from the flux (3, n) that arrives; `specular` (3, materials + 1) is black for glass and no surface."""
+    zero = normal.dtype.type(0.0)
     for i in prange(len(texel)):
-        if has_lobe[i]:
+        m, has_lobe = material[i], False
+        for c in range(3):
+            lobes.flux[c, i] = specular[c, m] * incident[c, i]
+            has_lobe |= lobes.flux[c, i] != zero
+        lobes.exponent[i] = exponent[m] if has_lobe else zero
+        lobes.axis[0, i] = lobes.axis[1, i] = lobes.axis[2, i] = zero
+        if has_lobe:
             _, _, _, dx, dy, dz = texel_ray(maps, texel[i] // maps.width, texel[i] % maps.width)
             nx, ny, nz = normal[0, i], normal[1, i], normal[2, i]
             # r = d - 2 (n . d) n
             twice = 2.0 * (dx * nx + dy * ny + dz * nz)
             rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
             scale = 1.0 / math.sqrt(rx * rx + ry * ry + rz * rz)
-            axis[0, i], axis[1, i], axis[2, i] = rx * scale, ry * scale, rz * scale
+            lobes.axis[0, i], lobes.axis[1, i], lobes.axis[2, i] = rx * scale, ry * scale, rz * scale

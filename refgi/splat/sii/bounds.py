@@ -90,16 +90,17 @@ def half_ball_radius(square_range: Array, widening: float, literal: bool = False
 
 
 def light_solids(
-    position: Array, axis: Array, exponent: Array, square: Array, tangent: bool, widening: float = 0.0,
+    position: Array, axis: Array, exponent: npt.ArrayLike, square: Array, tangent: bool, widening: float = 0.0,
     literal: bool = False,
 ) -> Solids:
     """Return the bounds of lights at `position` (3, N, m) about `axis` (3, N: normal or lobe axis), in float64.
 
-    `exponent` (N,) is n, 1 for diffuse lights, `square` (N,) R_0^2 in m^2; `tangent` picks tangent ellipsoids over
+    `exponent` (N,) is n, one 1 for diffuse lights, `square` (N,) R_0^2 in m^2; `tangent` picks tangent ellipsoids over
     those of the appendix. Exponents fall within `widening` (m), with `literal` as printed.
     """
-    ellipsoid = (tangent_ellipsoid if tangent else appendix_ellipsoid)(exponent)
     square = np.asarray(square, np.float64)
+    ellipsoid = Ellipsoid(*(np.broadcast_to(part, square.shape) for part in (
+        tangent_ellipsoid if tangent else appendix_ellipsoid)(exponent)))
     ball = half_ball_radius(square, widening, literal) if widening > 0 else None
     return Solids(np.asarray(position, np.float64), np.asarray(axis, np.float64), square, ellipsoid, ball)
 

@@ -18,7 +18,7 @@ from refgi.pairs.pair_sum import TILE
 from refgi.pairs.pixel_lights import Packed, Range
 from refgi.pairs.ranged_sum import LANES
 from refgi.pairs.tiles import extremes
-from refgi.rsm.pool import zeros
+from refgi.rsm.pool import plane
 from refgi.skips import left_out
 from refgi.splat.sii.bounds import (
     Solids,
@@ -71,7 +71,7 @@ def list_lights(position: Array, normal: Array, solids: Array) -> Array:
     solids (SOLID_ROWS, light): The lights' bounds.
     -> (ceil(n / LANES), N) bool: Whether a light may count for some receiver of a tile.
     """
-    listed = zeros((-(-position.shape[1] // LANES), solids.shape[1]), np.bool_)
+    listed = plane((-(-position.shape[1] // LANES), solids.shape[1]), np.bool_)
     _list(position, normal, solids, bool((solids[BALL] > 0).any()), listed)
     return listed
 
@@ -82,6 +82,7 @@ def _list(position: Array, normal: Array, solids: Array, balls: bool, listed: Ar
     for strip in prange((count + WIDEST - 1) // WIDEST):
         first = strip * WIDEST
         here = min(WIDEST, count - first)
+        listed[first : first + here] = False
         low, high = np.empty((WIDEST + 1, 6), position.dtype), np.empty((WIDEST + 1, 6), position.dtype)
         _bound_parts(position, normal, first * LANES, here, low, high)
         near = np.empty((3, *solids.shape), solids.dtype)
@@ -232,7 +233,7 @@ class LightLists:
         """Return the bounds of the diffuse lights, without the black one."""
         assert self.diffuse is not None
         lights, square = self._packed.diffuse[:, :-1], _square(self.diffuse)[:-1]
-        return light_solids(lights[:3], -lights[3:6], np.ones(len(square)), square, self._tangent)
+        return light_solids(lights[:3], -lights[3:6], 1.0, square, self._tangent)
 
     def lobe_solids(self) -> Solids:
         """Return the bounds of the lobes."""

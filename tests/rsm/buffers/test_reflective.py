@@ -186,6 +186,8 @@ def test_lobes_only_where_a_material_has_one():
     bright = rsm.flux.any(axis=0)
     assert (rsm.lobe_flux[:, ~glossy] == 0).all()
     assert (rsm.lobe_exponent[glossy & bright] == 20).all()
+    assert (glossy & ~bright).any()
+    assert (rsm.lobe_exponent[~(glossy & bright)] == 0).all()
     ratio = rsm.lobe_flux[:, glossy & bright] / rsm.flux[:, glossy & bright]
     np.testing.assert_allclose(ratio, np.broadcast_to([[3.0], [4.0], [5.0]], ratio.shape))
     for row, column in np.argwhere(glossy & bright)[::40]:

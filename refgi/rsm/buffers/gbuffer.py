@@ -193,6 +193,11 @@ class GBuffer:
         return self.resolve("albedo")[0]
 
     @property
+    def material_of_face(self) -> Array:
+        """Material of each triangle, (m,) int32."""
+        return self._geometry.material_of_face
+
+    @property
     def plain_albedo(self) -> PlainAlbedo | None:
         """What `albedo` is made of, where that is materials alone; else None."""
         materials, geometry = self._materials, self._geometry

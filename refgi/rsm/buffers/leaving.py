@@ -49,7 +49,7 @@ def leaving_radiance(irradiance: Array, extra: Array | None, buffer: GBuffer, ma
     albedo = buffer.albedo if plain is None else NONE
     _reflect(irradiance, irradiance if extra is None else extra, extra is not None, albedo, plain, radiance)
     if materials.emission.any() and materials.emissive is None:
-        _emit(materials.emission, buffer._geometry.material_of_face, buffer.triangle_id, radiance)
+        _emit(materials.emission, buffer.triangle_id, buffer.material_of_face, radiance)
     elif materials.emission.any():
         radiance += buffer.emission
     return radiance
@@ -64,7 +64,7 @@ def emission_of(triangle_id: Array, material_of_face: Array, emission: Array) ->
     -> (3, h, w): Radiance, W/m^2/sr; 0 without surface.
     """
     radiance = np.zeros((3, *triangle_id.shape), emission.dtype)
-    _emit(emission, material_of_face, triangle_id, radiance)
+    _emit(emission, triangle_id, material_of_face, radiance)
     return radiance
 
 
@@ -87,7 +87,7 @@ def leaving_steps(direct: Array, indirect: Array | None, buffer: GBuffer, materi
     emission = None
     if materials.emission.any():
         emission = buffer.emission if materials.emissive is not None else emission_of(
-            buffer.triangle_id, buffer._geometry.material_of_face, materials.emission)
+            buffer.triangle_id, buffer.material_of_face, materials.emission)
     return radiance_of(direct, indirect, buffer.albedo, emission)
 
 
@@ -120,7 +120,7 @@ def _materials_of(plain: PlainAlbedo, row: int, material: Array) -> None:
 
 
 @kernel(parallel=True)
-def _emit(emission: Array, material_of_face: Array, triangle_id: Array, radiance: Array) -> None:
+def _emit(emission: Array, triangle_id: Array, material_of_face: Array, radiance: Array) -> None:
     for row in prange(radiance.shape[1]):
         for x in range(radiance.shape[2]):
             face = triangle_id[row, x]
@@ -178,8 +178,8 @@ def glossy_points(buffer: GBuffer, materials: MaterialTable, eye: npt.ArrayLike)
     """
     position, normal = (channel.reshape(3, -1) for channel in buffer.resolve("position", "normal"))
     pixel, material = np.empty(buffer.covered.size, np.int64), np.empty(buffer.covered.size, np.int32)
-    count = _list_glossy(glossy_materials(materials), buffer._geometry.material_of_face, buffer.triangle_id.reshape(-1),
-                         pixel, material)
+    count = _list_glossy(glossy_materials(materials), buffer.triangle_id.reshape(-1), buffer.material_of_face, pixel,
+                         material)
     real = position.dtype
     vectors = np.empty((4, 3, count), real)
     found = GlossyPoints(pixel[:count].copy(), vectors[0], vectors[1], vectors[2], np.empty(count, real), vectors[3])
@@ -190,14 +190,14 @@ def glossy_points(buffer: GBuffer, materials: MaterialTable, eye: npt.ArrayLike)
 
 
 @kernel
-def _list_glossy(glossy: Array, material_of_face: Array, triangle_id: Array, pixel: Array, material: Array) -> int:
+def _list_glossy(glossy: Array, triangle_id: Array, material_of_face: Array, pixel: Array, material: Array) -> int:
     """List the pixels of glossy materials, and these; return how many there are."""
     count = np.uint64(0)
     for i in range(len(triangle_id)):
-        face = triangle_id[i]
-        m = material_of_face[np.uint64(max(face, 0))]
-        pixel[count], material[count] = i, m
-        count += np.uint64((face >= 0) & glossy[m])
+        if triangle_id[i] >= 0:
+            m = material_of_face[np.uint64(triangle_id[i])]
+            pixel[count], material[count] = i, m
+            count += np.uint64(glossy[m])
     return int(count)
 
 

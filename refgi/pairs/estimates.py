@@ -196,20 +196,19 @@ def seen_light(camera: "Camera", albedo: Array, direct: Array, receivers: Receiv
     """Return the light that visible surfaces under direct light send to each other, over that of all pixel lights.
 
     direct (3, h, w): Direct irradiance, W/m^2.
-    -> float: Both without visibility and at the same sampled pixels; 0 without any light. Pixels send as discs, which
-        rather lowers their light.
+    -> float: Both without visibility and at the same sampled pixels; 0 without any light, inf where pixel lights alone
+        have none. Pixels send as discs, which rather lowers their light.
     """
     sample = sample_pixels(receivers, SENDERS)
     some, _ = thinned(lights, None, MANY)
     share = some.flux.shape[1] / max(1, lights.flux.shape[1])
     whole = light_at(sample, some, PairSettings(clamp=UNREACHED)) / (share or 1.0)
-    if whole <= 0:
-        return 0.0
     area = _areas(camera, direct.shape[1], sample) * (np.count_nonzero(receivers.covered) / max(1, len(sample.place)))
     reflected = [plane.reshape(3, -1)[:, sample.place] for plane in (albedo, direct)]
     sent = lights._replace(position=sample.position, normal=sample.normal, flux=reflected[0] * reflected[1] * area,
                            lobe_flux=None, lobe_axis=None, lobe_exponent=None, texel=None, map_index=None, half=None)
-    return light_at(sample, sent, PairSettings(clamp=DiscClamp()), area) / whole
+    seen = light_at(sample, sent, PairSettings(clamp=DiscClamp()), area)
+    return seen / whole if whole > 0 else math.inf if seen > 0 else 0.0
 
 
 def _areas(camera: "Camera", rows: int, sample: Sample) -> Array:
@@ -247,13 +246,17 @@ def with_seen_light(
     Warns where none that was drawn has flux, which a picture alone does not tell from a scene without indirect light.
     """
     if stated is None:
-        if lights.drawn and not lights.flux.any() and (frame.direct * frame.sent_albedo).any():
-            warnings.warn(RefgiWarning(f"none of {lights.drawn:,} pixel lights has flux, but the camera sees lit "
-                                       "surfaces: more of them, or another seed, bring light"), stacklevel=3)
+        if lights.drawn and not lights.flux.any() and math.isinf(_seen_light(frame, receivers, lights)):
+            warnings.warn(RefgiWarning(f"sampling error: none of {lights.drawn:,} pixel lights has flux, but surfaces "
+                                       "that are seen light each other; more of them bring light"), stacklevel=3)
         return None
-    lacking = seen_light(frame.scene.camera, frame.sent_albedo, frame.direct, receivers, lights) - 1
+    lacking = _seen_light(frame, receivers, lights) - 1
     return stated._replace(pixel=max(stated.pixel, lacking), mean=max(stated.mean, lacking),
                            most=max(stated.most, lacking))
+
+
+def _seen_light(frame: "Frame", receivers: Receivers, lights: "PixelLights") -> float:
+    return seen_light(frame.scene.camera, frame.sent_albedo, frame.direct, receivers, lights)
 
 
 def warn_of_sampling(error: SamplingError | None, method: str) -> None:

@@ -194,7 +194,7 @@ def test_lights_without_flux_are_no_scene_without_indirect_light(method):
     with pytest.warns(RefgiWarning, match="none of 1 pixel lights has flux"):
         assert not render("cornell_box", method, settings, **options).irradiance.any()
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error")  # also what pytest's settings ignore
         scene = load_scene("cornell_box")
         outside = dataclasses.replace(scene.lights[0], position=(0.0, 9.0, 0.0), direction=(0.0, 1.0, 0.0))
         render(scene.with_lights(outside), method, settings, **options)

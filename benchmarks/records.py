@@ -51,7 +51,8 @@ RECORDS = {
     "accuracy": Record((("-m", "benchmarks", "accuracy", "--out", "benchmarks/results"),), "docs/accuracy.md"),
     "frames": Record((("-m", "benchmarks", "frames", "modes", "scaling", "--out", "out/frames"),),
                      "docs/frames.md", ("refgi/**/*.py", "benchmarks/frames.py", "benchmarks/modes.py")),
-    "papers": Record((*(("-m", "benchmarks", "paper", name, "--out", f"out/papers/{name}") for name in PAPERS),
+    "papers": Record((*(("-m", "benchmarks", "paper", name, "--parents", "--out", f"out/papers/{name}")
+                        for name in PAPERS),
                       ("docs/papers_page.py", *(f"out/papers/{name}/results.json" for name in PAPERS))),
                      "docs/papers.md", ("refgi/**/*.py", "benchmarks/papers/**/*.py")),
     "gallery": Record((("docs/gallery_page.py",),), "docs/gallery.md", ("refgi/**/*.py", "docs/gallery_page.py")),

@@ -52,6 +52,10 @@ def test_records_rest_on_files_that_are_there():
     assert all((ROOT / record.read_by).exists() for record in RECORDS.values())
 
 
+def test_papers_are_made_in_a_clone_that_has_no_folder_for_them():
+    assert all("--parents" in command for command in RECORDS["papers"].commands[:-1])
+
+
 def test_what_pictures_rest_on_imports_nothing_of_what_lies_around_them(root):
     sources = {path: ast.parse(path.read_text()) for path in (ROOT / "refgi").rglob("*.py")}
     around = tuple(f"refgi.{name.removesuffix('.py')}" for name in AROUND)

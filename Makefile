@@ -58,9 +58,7 @@ records: $(VENV)/dev.stamp
 	$(BIN)/python -m benchmarks records --make
 
 wheel: $(VENV)/dev.stamp
-	$(BIN)/python -m refgi.jit.ahead
-	$(BIN)/pip wheel --no-deps -w dist .
-	rm -r refgi/jit/brought
+	trap 'rm -rf refgi/jit/brought' EXIT; $(BIN)/python -m refgi.jit.ahead && $(BIN)/pip wheel --no-deps -w dist .
 
 docs: $(VENV)/dev.stamp docs/extra
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html

@@ -25,7 +25,8 @@ from refgi.image import write_text
 
 ROOT = Path(__file__).parent.parent
 STAMPS = Path("benchmarks/results/stamps.json")
-AROUND = ("cli", "literal", "vectors", "batch", "stress", "testing.py", "__main__.py")  # no picture or time rests on it
+AROUND = ("cli", "literal", "vectors", "batch", "stress", "testing.py", "__main__.py", "bench")  # of no picture or time
+JUDGED = AROUND[:-1]  # of what `bench` measures
 
 
 class Record(NamedTuple):
@@ -48,13 +49,15 @@ class Stamp(NamedTuple):
 
 PAPERS = "sii", "multires", "val", "hssil"
 RECORDS = {
-    "accuracy": Record((("-m", "benchmarks", "accuracy", "--out", "benchmarks/results"),), "docs/accuracy.md"),
-    "frames": Record((("-m", "benchmarks", "frames", "modes", "scaling", "--out", "out/frames"),),
-                     "docs/frames.md", ("refgi/**/*.py", "benchmarks/frames.py", "benchmarks/modes.py")),
+    "accuracy": Record((("-m", "benchmarks", "accuracy", "--out", "benchmarks/results"),), "docs/accuracy.md",
+                       around=JUDGED),
+    "frames": Record((("-m", "benchmarks", "frames", "modes", "scaling", "--out", "out/frames"),
+                      ("-m", "benchmarks.frames_page", "out/frames")), "docs/frames.md",
+                     ("refgi/**/*.py", *(f"benchmarks/{name}.py" for name in ("frames", "modes", "scaling")))),
     "papers": Record((*(("-m", "benchmarks", "paper", name, "--parents", "--out", f"out/papers/{name}")
                         for name in PAPERS),
                       ("docs/papers_page.py", *(f"out/papers/{name}/results.json" for name in PAPERS))),
-                     "docs/papers.md", ("refgi/**/*.py", "benchmarks/papers/**/*.py")),
+                     "docs/papers.md", ("refgi/**/*.py", "benchmarks/papers/**/*.py"), JUDGED),
     "gallery": Record((("docs/gallery_page.py",),), "docs/gallery.md", ("refgi/**/*.py", "docs/gallery_page.py")),
     "stability": Record((("-m", "benchmarks", "stability", "--out", "out/stability", "--page", "docs/precision.md"),),
                         "docs/precision.md", ("refgi/**/*.py", "benchmarks/stability/*.py"), around=()),

@@ -119,7 +119,7 @@ def draw(folder: Path, path: Path) -> Path:
     import matplotlib.pyplot as plt
 
     found = json.loads((folder / "results.json").read_text())["results"]["scaling"]
-    figure, axes = plt.subplots(1, len(SWEEPS), figsize=(12, 4), sharey=True)
+    figure, axes = plt.subplots(1, len(SWEEPS), figsize=(12, 4), sharey=True, layout="constrained")
     for axis, sweep in zip(axes, SWEEPS, strict=True):
         for number, name in enumerate(OF_SIZE):
             points = [(int(row["name"].rpartition(", ")[2]), row["value"]) for row in found
@@ -129,8 +129,7 @@ def draw(folder: Path, path: Path) -> Path:
         axis.set(xlabel=sweep)
         axis.grid(alpha=0.3)
     axes[0].set(ylabel="processor time of a frame, s")
-    axes[1].legend()
-    figure.tight_layout()
+    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside right center")
     figure.savefig(path)
     return path
 

@@ -165,7 +165,7 @@ def term(x: Any) -> Any:
 def term_bound(x: Any, real: Any) -> Any:  # noqa: ARG001
     """What `add_lobes` promises of a float32 term; beyond it what is lost among subnormal numbers."""
     square, h, _, power, cosine = _shape(x)
-    h = np.minimum(h, 0.999)
+    h = np.minimum(h, 0 * h + 0.999)  # of the numbers' own kind
     value = power * cosine / square
     rounding = value * (17 + 5 * -x[12] * np.log1p(-h) / np.log(2 + 0 * h) + 6.5 * x[12] * (
         np.sqrt(2 * h) + h) / (1 - h)) + 4 * power / square

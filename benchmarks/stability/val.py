@@ -69,7 +69,7 @@ def _discs(x: Any, y: Any, z: Any, d: Any, tangent: Any) -> Any:
 @kernel
 def _angle(ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any) -> Any:
     zero = ax - ax
-    return linear(zero, zero, zero, ax, ay, az, zero, zero, zero, bx, by, bz, zero, zero + 1)
+    return linear(zero, zero, zero, ax, ay, az, bx, by, bz, zero, zero + 1)
 
 
 def _series_weights(real: Any) -> Array:

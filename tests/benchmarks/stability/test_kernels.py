@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from benchmarks.stability import again, elementary_range, kernels, pairs, places
+from benchmarks.stability import again, elementary_range, kernels, lobes, pairs, places
 from benchmarks.stability import ladder as ladders
 from benchmarks.stability.kernels import tasks
 from benchmarks.stability.ladder import conditions, errors, inputs_of, measure, rows
@@ -114,6 +114,13 @@ def test_both_references_agree(name):
         apart = np.array([abs(float(DIGITS.of(float(p)) + DIGITS.of(float(p - np.longdouble(float(p)))) - q))
                           for p, q in zip(a, b, strict=True)])
         assert (apart <= 0.1 * (unit[k] * condition[k]).astype(float)).all()
+
+
+def test_a_lobe_s_bound_has_its_digits_where_the_lobe_is_dark():
+    """Senders seen from behind their axis: h = 2, where log(1 - h) is of no number."""
+    x = np.array([0, 0, 2, 0, 0, 1, 0, 0, -1, 0, 0, 1, 3.0])[:, None]
+    wide, exact = (lobes.term_bound(precision.of(x), np.float32) for precision in (EXTENDED, DIGITS))
+    assert float(wide[0]) == pytest.approx(float(exact[0]), rel=1e-12)
 
 
 def scaled(ladder, factor):

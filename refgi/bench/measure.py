@@ -8,6 +8,7 @@ loaded, before the first round.
 import contextlib
 import dataclasses
 import json
+import math
 import subprocess
 import sys
 import time
@@ -47,11 +48,11 @@ render(sys.argv[1], sys.argv[2], **json.loads(sys.argv[3]))
 LONGEST = 600.0  # s that a new process may take
 
 
-def works_of(scene: Scene, choices: Sequence[Choice], options: Mapping[str, Any], tell: Tell) -> dict[int, Work]:
+def works_of(scene: Scene, choices: Mapping[int, Choice], options: Mapping[str, Any], tell: Tell) -> dict[int, Work]:
     """Count what each of some choices takes, by its number; those that give no picture are left out."""
     found = {}
-    for number, choice in enumerate(choices):
-        tell(f"counting {choice.method}: {choice.label}", number / len(choices))
+    for done, (number, choice) in enumerate(choices.items()):
+        tell(f"counting {choice.method}: {choice.label}", done / len(choices))
         with quietly():
             found[number] = work_of(scene, choice, options)
     return found
@@ -105,6 +106,8 @@ def cold_seconds(source: str, method: str, options: Mapping[str, Any]) -> float:
     return time.perf_counter() - started
 
 
+RUNS = 0.95  # of a budget
+WRITING = 0.3  # of the time of judging a picture: what its file and its share of the page take
 REFERENCE_SEED = 2**31  # of the truth: none of the rounds'
 SEEN, SEEN_UNOCCLUDED = "seen", "seen_unoccluded"  # names of references, beside those of a comparison
 LIMITS: Mapping[str, Mapping[str, Any]] = MappingProxyType({  # what each further reference leaves out
@@ -125,14 +128,18 @@ class Made(NamedTuple):
 
 def bench_scene(
     scene: Scene, grid: Grid, *, rounds: int = 3, truth: TruthSettings | None = None, tell: Tell = lambda *_: None,
-    place: Place | None = None, source: str | None = None, **frame_options: Any,
+    place: Place | None = None, source: str | None = None, budget: float = math.inf, **frame_options: Any,
 ) -> SceneResult:
     """Run a grid on a scene, each choice `rounds` times, a seed each; from two on bias and variance are told apart.
 
     The truth's seed is one that no round has. Pictures of the first seed and of the references are written to `place`,
     if any; new processes load the scene from `source` for `SceneResult.cold`. A choice that gives no picture is in
     `failures` and stops none of the others. InputError if the camera sees no surface.
+
+    Of a `budget`, s, runs and judging may take `RUNS`, the cheapest choices first; what does not fit is in `left_out`,
+    and new processes are not timed.
     """
+    ends = time.perf_counter() + RUNS * budget
     frame = Frame(scene, **frame_options)
     covered = frame.gbuffer.covered
     expect(bool(covered.any()), f"scene {scene.name!r}: camera", "a view of some surface", "a view past all of it")
@@ -142,9 +149,12 @@ def bench_scene(
     references |= {name: traced(frame, limited(settings, name, LIMITS[name]), tell, name) for name in names}
     stops = [stop(settings, passes) for passes in grid.passes]
     size = {"width": frame.width, "height": frame.height}
-    made, failures = _in_turn(scene, [*grid.choices, *stops], rounds, {**frame_options, **size}, tell)
+    judging = 0.0 if budget == math.inf else _judging([*grid.choices, *stops], references, frame)
+    made, failures, left_out = _in_turn(scene, [*grid.choices, *stops], rounds, {**frame_options, **size}, tell, ends,
+                                        judging)
     methods = dict.fromkeys(choice.method for choice in grid.choices)
-    cold = {} if source is None else first_frames(source, list(methods), {**frame_options, **size}, tell)
+    cold = {} if source is None or budget < math.inf else first_frames(
+        source, list(methods), {**frame_options, **size}, tell)
     done = [(choice, made[number]) for number, choice in enumerate((*grid.choices, *stops)) if number in made]
     runs = [judged(choice, one, references, frame) for choice, one in done]
     if place is not None:
@@ -158,7 +168,7 @@ def bench_scene(
     return SceneResult(scene=scene.name, width=frame.width, height=frame.height, covered=int(covered.sum()),
                        mean=float(references[TRUTH].irradiance[:, covered].mean(dtype=np.float64)),
                        truth=references[TRUTH].statement, runs=compared(others, line), line=tuple(line),
-                       failures=failures, cold=cold)
+                       failures=failures, left_out=left_out, cold=cold)
 
 
 def references_of(choice: Choice) -> list[str]:
@@ -194,33 +204,84 @@ def stopped(settings: TruthSettings, samples: int) -> TruthSettings:
 
 
 def _in_turn(
-    scene: Scene, choices: list[Choice], rounds: int, options: Mapping[str, Any], tell: Tell
-) -> tuple[dict[int, Made], dict[str, str]]:
-    """Run all choices once a round; return what they made by number, and why the others made nothing."""
+    scene: Scene, choices: list[Choice], rounds: int, options: Mapping[str, Any], tell: Tell, ends: float,
+    judging: float,
+) -> tuple[dict[int, Made], dict[str, str], dict[str, str]]:
+    """Run all choices once a round; return what they made by number, why others made nothing, and what was left out.
+
+    All ends at `ends`, of `time.perf_counter`, with the `judging` of each choice, s, that comes later.
+    """
     made: dict[int, Made] = {}
     failures: dict[str, str] = {}
-    small = small_frame(scene, options)
-    for number, choice in enumerate(choices):
-        tell(f"warming up {choice.method}: {choice.label}", number / len(choices))
-        load_kernels(small, choice, options["width"] * options["height"])
-    seeded = [choice._replace(settings=with_seed(choice.settings, 0)) for choice in choices]
-    works = works_of(scene, seeded, options, tell)
+    names = [f"{choice.method}: {choice.label}" for choice in choices]
+    takes = _expected(scene, choices, options, tell, ends)
+    works: dict[int, Work] = {}
     for turn in range(rounds):
-        for number, choice in enumerate(choices):
-            name = f"{choice.method}: {choice.label}"
-            if name in failures:
+        for place, number in enumerate(sorted(takes, key=lambda one: takes[one])):
+            new = judging if number not in made else 0.0
+            if names[number] in failures or not _fits(takes[number] + new, ends):
                 continue
-            tell(name, (turn + number / len(choices)) / rounds)
+            choice = choices[number]
+            tell(f"{names[number]}, run {turn + 1} of {rounds}{_left(ends)}", (turn + place / len(choices)) / rounds)
             try:
                 run = timed(Frame(scene, **options), choice.method, with_seed(choice.settings, turn))
             except RefgiError as error:
-                failures[name] = str(error)
+                failures[names[number]] = str(error)
                 made.pop(number, None)
                 continue
-            one = made.setdefault(number, Made([], [], run.stages, works.get(number), run.lobes))
+            if ends < math.inf:
+                ends -= new
+                alike = [one for one in takes if choices[one].method == choice.method and one not in made]
+                ratio = min(1.0, run.seconds / takes[number])  # fixed costs do not grow with pixels
+                takes |= {one: takes[one] * ratio for one in alike} | {number: run.seconds}
+            one = made.setdefault(number, Made([], [], run.stages, None, run.lobes))
             one.pictures.append(run.picture)
             one.times.append(run.seconds)
-    return made, failures
+        if turn == 0:
+            works = works_of(scene, {number: choices[number]._replace(settings=with_seed(choices[number].settings, 0))
+                                     for number in made if _fits(takes[number], ends)}, options, tell)
+    made = {number: made[number]._replace(work=works.get(number)) for number in sorted(made)}
+    left_out = {names[number]: f"some {takes[number]:.3g} s a run" if number in takes else "no time to load it"
+                for number in range(len(choices)) if number not in made and names[number] not in failures}
+    left_out |= {names[number]: f"{rounds - len(one.times)} of {rounds} runs" for number, one in made.items()
+                 if len(one.times) < rounds}
+    return made, failures, left_out
+
+
+def _expected(scene: Scene, choices: Sequence[Choice], options: Mapping[str, Any], tell: Tell,
+              ends: float) -> dict[int, float]:
+    """Load all kernels; return what a run of each choice takes by a small picture, s, 0 where time has no end."""
+    small, takes = small_frame(scene, options), {}
+    pixels = options["width"] * options["height"]
+    for number, choice in enumerate(choices):
+        if not _fits(0.0, ends):
+            break
+        tell(f"warming up {choice.method}: {choice.label}{_left(ends)}", number / len(choices))
+        load_kernels(small, choice, pixels)
+        takes[number] = 0.0
+        if ends < math.inf:
+            started = time.perf_counter()
+            load_kernels(small_frame(scene, options), choice, pixels)
+            takes[number] = (time.perf_counter() - started) * max(1.0, pixels / WARM_UP_SIZE**2)
+    return takes
+
+
+def _judging(choices: Sequence[Choice], references: Mapping[str, Reference], frame: Frame) -> float:
+    """Return what judging and writing a picture takes, s, by those that have most to be judged by."""
+    choice = max(choices, key=lambda one: len(references_of(one)))
+    made = Made([references[TRUTH].irradiance.astype(frame.dtype)], [0.0], {})
+    judged(choice, made, references, frame)  # loads what judges
+    started = time.perf_counter()
+    judged(choice, made, references, frame)
+    return (1 + WRITING) * (time.perf_counter() - started)
+
+
+def _fits(seconds: float, ends: float) -> bool:
+    return time.perf_counter() + seconds < ends
+
+
+def _left(ends: float) -> str:
+    return f", {max(0.0, ends - time.perf_counter()):.0f} s left" if ends < math.inf else ""
 
 
 class Timed(NamedTuple):

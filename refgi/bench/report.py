@@ -212,9 +212,9 @@ def _scene(scene: SceneResult, number: int, view: int | None, record: Record) ->
     cold = {name: f"{one:.3g} s" for name, one in scene.cold.items()}
     return {"name": scene.scene, "number": number, "cold": cold, "size": f"{scene.width} x {scene.height}",
             "truth": scene.truth, "doubts": scene.doubts, "plot": markup(plot_of(scene, number)),
-            "splits": splits_of(scene.splits), "said": list(said_of(scene)), "failures": scene.failures, "view": view,
-            "rows": [_row(name, run) for name, run in runs], "provenance": list(provenance_of(record)),
-            "made": [_made(run) for _, run in runs]}
+            "splits": splits_of(scene.splits), "said": list(said_of(scene)), "failures": scene.failures,
+            "left_out": scene.left_out_said, "view": view, "rows": [_row(name, run) for name, run in runs],
+            "provenance": list(provenance_of(record)), "made": [_made(run) for _, run in runs]}
 
 
 def _made(run: Run) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from refgi.compare.pages import number, require_environment
 
 SPLIT_COLUMNS = ("approximation", "mean, %", "RMS, %", "spread, %", "share, %", "RMSE without, %", "mean without, %")
 ALL = "all together"
+REASONS = 6  # why settings were left out that are said
 LEAST = 0.01  # of the mean square: what is taken back and not said
 
 
@@ -205,6 +206,7 @@ class SceneResult(Strict):
     runs: tuple[Run, ...]
     line: tuple[Run, ...]  # the path tracer, stopped early
     failures: dict[str, str]  # what gave no picture, and why
+    left_out: dict[str, str] = {}  # what a budget of time has not run, or not as often as others, and what it takes
     cold: dict[str, float] = {}  # s to the first frame of a new process, by method, kernels in the cache
     splits: tuple[Split, ...] = ()
 
@@ -214,6 +216,18 @@ class SceneResult(Strict):
         names = {name: None for run in (*self.runs, *self.line) for name, one in run.errors.items() if one.in_doubt}
         return [f"the error of the {'truth' if name == 'truth' else f'truth ({name})'} is not to be trusted, nor are "
                 "figures against it" for name in names]
+
+
+    @property
+    def left_out_said(self) -> list[str]:
+        """What a budget of time has left out: settings of the same reason together, and of the reasons the first."""
+        names: dict[str, list[str]] = {}
+        for name, what in self.left_out.items():
+            names.setdefault(what, []).append(name)
+        groups = sorted(names.items(), key=lambda one: -len(one[1]))
+        said = [f"{some[0] if len(some) == 1 else f'{len(some)} settings'}: {what}" for what, some in groups[:REASONS]]
+        more = sum(len(some) for _, some in groups[REASONS:])
+        return [*said, f"{more} more, which results.json names"] if more else said
 
 
 class PathResult(Strict):
@@ -288,7 +302,8 @@ def markdown(result: Result) -> str:
             told = (f"{name} {number(seconds)} s" for name, seconds in scene.cold.items())
             lines += ["", f"First frame of a new process, kernels in the cache: {', '.join(told)}."]
         lines += tables_of(scene.splits)
-        lines += ["", *(f"{name} gave no picture: {why}" for name, why in scene.failures.items()), ""]
+        lines += ["", *(f"{name} gave no picture: {why}" for name, why in scene.failures.items()),
+                  *(f"Left out for time: {said}" for said in scene.left_out_said), ""]
     return "\n".join(lines).rstrip() + "\n"
 
 

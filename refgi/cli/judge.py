@@ -6,6 +6,7 @@ the cheapest settings that meet a wish.
 
 import math
 import os
+import time
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,7 @@ from refgi.cli.session import DONE, FAILED, Session, progress, say, table
 if TYPE_CHECKING:
     from refgi.bench.choose import Chosen, Probe, Wish
     from refgi.compare import Comparison
+    from refgi.scene import Scene
 
 SHOWN = {"relmse": "relMSE", "rmse": "RMSE", "bias": "bias", "psnr": "PSNR", "ssim": "SSIM"}
 INDIRECT = "irradiance."  # channels that hold it begin with that
@@ -170,10 +172,11 @@ def _check(session: Session, asked: Asked) -> int:
 
 
 FILES = ("index.html", "results.json", "results.csv", "results.md")
+QUICK_SIDE = 256  # pixels of a quick bench along the longer side at most
 
 
-@verb("bench", "SCENES", "methods", "grid", "quick", "rounds", "size", "set", "split", "split-size", "split-frames",
-      "threads", "out", *WRITING,
+@verb("bench", "SCENES", "methods", "grid", "quick", "budget", "rounds", "size", "set", "split", "split-size",
+      "split-frames", "threads", "out", *WRITING,
       SCENES={"nargs": -1}, methods="Methods of the grid to run; all where absent.",
       set="A setting of the truth, such as samples=1024 or checkpoint=DIR; repeatable.",
       size="Picture size in pixels; the scenes' own where absent.",
@@ -198,6 +201,7 @@ def _bench(session: Session, asked: Asked) -> int:
 
     out, rounds = asked.out, asked.rounds
     expect(not (asked.quick and asked.grid_file), "--grid", "--quick or --grid, not both", "both")
+    expect(not (asked.split and asked.budget), "--budget", "no --split beside it", "both")
     for option, given in (("--split-size", asked.split_size), ("--split-frames", asked.split_frames)):
         expect(asked.split or given is None, option, "--split beside it", "none")
     grid = chosen(read_grid(Path(asked.grid_file)) if asked.grid_file else built_in(asked.quick),
@@ -206,9 +210,12 @@ def _bench(session: Session, asked: Asked) -> int:
     truth = settings_for(TRUTH, asked.pairs)
     sources = asked.scenes or ("cornell_box",)
     loaded = [scene_of(Asked(scene=source, size=asked.size)) for source in sources]
+    if asked.quick and asked.size is None:
+        loaded = [_smaller(scene) for scene in loaded]
     kept = (str(file.relative_to(out)) for file in Path(out, FOLDER).rglob("*.exr"))
     path = folder(out, Permission(asked.parents, asked.force), (*FILES, *kept))
     path.mkdir(parents=True, exist_ok=True)
+    ends = time.perf_counter() + (asked.budget or math.inf)
     made: list[Any] = []
     with on_threads(asked.threads), progress() as tell, warnings.catch_warnings():
         warnings.simplefilter("ignore", RefgiWarning)  # of each of many settings in each round
@@ -217,7 +224,8 @@ def _bench(session: Session, asked: Asked) -> int:
                 tell(f"{name} ({number + 1} of {len(loaded)}): {what}", done)
 
             one = bench_scene(scene, grid, rounds=rounds, truth=truth, tell=told, place=place,
-                              source=sources[number], shadows="exact")
+                              source=sources[number], shadows="exact",
+                              budget=(ends - time.perf_counter()) / (len(loaded) - number))
             if asked.split:
                 options: dict[str, Any] = dict(zip(("width", "height"), asked.split_size or (), strict=False))
                 one = with_splits(one, scene, grid, seeds=rounds, truth=truth, tell=told, still=still,
@@ -228,11 +236,18 @@ def _bench(session: Session, asked: Asked) -> int:
             write_page(result, path)
     lines = [f"{one.scene}: {said}" for one in made for said in said_of(one)]
     failures = [f"{one.scene}: {name} gave no picture: {why}" for one in made for name, why in one.failures.items()]
-    for said in (*failures, *(f"{one.scene}: {doubt}" for one in made for doubt in one.doubts)):
+    left = [f"{one.scene}: left out for time: {said}" for one in made for said in one.left_out_said]
+    for said in (*failures, *left, *(f"{one.scene}: {doubt}" for one in made for doubt in one.doubts)):
         say(said)
     session.result("\n".join([markdown(result), *lines, "", f"open {out.rstrip('/')}/index.html"]),
                    result.model_dump(mode="json"))
     return FAILED if failures else DONE
+
+
+def _smaller(scene: "Scene") -> "Scene":
+    width, height = scene.camera.width, scene.camera.height
+    scale = min(1.0, QUICK_SIDE / max(width, height))
+    return scene.with_camera(width=max(1, round(width * scale)), height=max(1, round(height * scale)))
 
 
 @verb("choose", "SCENE", "error", "time", "methods", "size", "rounds", "set", "emit", "force", "threads",

@@ -1,6 +1,7 @@
 """A bench of one scene: pictures, seeds and references are those of the methods run by hand."""
 
 import math
+import time
 import warnings
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from refgi.bench import measure
 from refgi.bench.error import error_of
 from refgi.bench.grid import Grid
-from refgi.bench.measure import REFERENCE_SEED, bench_scene, load_kernels, small_frame, with_seed
+from refgi.bench.measure import REFERENCE_SEED, bench_scene, load_kernels, small_frame, with_seed, works_of
 from refgi.errors import InputError, RefgiWarning
 from refgi.frame import Frame
 from refgi.methods import METHODS
@@ -138,3 +139,77 @@ def test_what_gives_no_picture_stops_nothing_else(box):
     assert found.failures == {"val: maps.resolution=64, lights=16": "refused here"}
     assert found.runs[0].errors["truth"].spread is None
     assert found.runs[0].in_equal_time is None  # no line
+
+
+def with_budget(box, monkeypatch, expected, budget=1e3):
+    """Return what a bench of `GRID` finds whose choices are expected to take some time, and the order of its runs."""
+    order, real = [], measure.timed
+
+    def timed(frame, method, settings):
+        order.append(settings)
+        return real(frame, method, settings)
+
+    monkeypatch.setattr(measure, "_expected", lambda *_: dict(expected))
+    monkeypatch.setattr(measure, "timed", timed)
+    found = bench_scene(box, GRID, rounds=2, truth=TruthSettings(samples=48), budget=budget, **SIZE)
+    return found, order
+
+
+def test_a_budget_runs_the_cheapest_first_and_names_what_does_not_fit(box, monkeypatch):
+    found, order = with_budget(box, monkeypatch, {0: 30.0, 1: 20.0, 2: 1e4, 3: 10.0, 4: 5.0})
+    assert order[1:4] == [with_seed(GRID.choices[number].settings, 0) for number in (3, 1, 0)]
+    assert isinstance(order[0], TruthSettings)
+    assert [run.changes for run in found.runs] == [GRID.choices[number].changes for number in (0, 1, 3)]
+    assert [len(run.times) for run in (*found.runs, *found.line)] == [2] * 4
+    assert found.left_out == {"vpl: lights=32": "some 1e+04 s a run", "truth: samples=96": "no time to load it"}
+    assert all(run.work is not None for run in found.runs)
+    assert found.failures == {}
+
+
+def test_a_budget_that_is_over_leaves_all_out(box):
+    found = bench_scene(box, GRID, rounds=2, truth=TruthSettings(samples=48), budget=1e-3, **SIZE)
+    assert (found.runs, found.line, found.failures) == ((), (), {})
+    assert len(found.left_out) == len(GRID.choices) + len(GRID.passes)
+    assert found.left_out_said == ["6 settings: no time to load it"]
+
+
+def test_later_rounds_are_left_out_where_time_is_up(box, monkeypatch):
+    """The clock jumps to the end after the first round."""
+    begin, real = time.perf_counter(), works_of
+
+    def late(*arguments):
+        monkeypatch.setattr(measure, "_fits", lambda *_: False)
+        return real(*arguments)
+
+    monkeypatch.setattr(measure, "works_of", late)
+    found = bench_scene(box, GRID, rounds=3, truth=TruthSettings(samples=48), budget=1e3, **SIZE)
+    assert [len(run.times) for run in (*found.runs, *found.line)] == [1] * 6
+    assert set(found.left_out.values()) == {"2 of 3 runs"}
+    assert time.perf_counter() - begin < 1e3
+
+
+def test_what_a_run_takes_is_expected_by_a_small_picture_where_time_ends(box):
+    size = {**SIZE, "width": 192, "height": 192}
+    choices = [choice("sii", lights=32), choice("vpl", lights=512)]
+    takes = measure._expected(box, choices, size, lambda *_: None, time.perf_counter() + 1e3)
+    assert takes[1] > 5 * takes[0] > 0
+    assert measure._expected(box, choices, size, lambda *_: None, math.inf) == {0: 0.0, 1: 0.0}
+    assert measure._expected(box, choices, size, lambda *_: None, 0.0) == {}
+
+
+def test_time_for_judging_is_kept(box, monkeypatch):
+    """Judging that takes all of the budget leaves no run."""
+    monkeypatch.setattr(measure, "_judging", lambda *_: 1e4)
+    found, order = with_budget(box, monkeypatch, dict.fromkeys(range(6), 1.0))
+    assert (found.runs, order) == ((), [])
+    monkeypatch.setattr(measure, "_judging", lambda *_: 400.0)
+    found, order = with_budget(box, monkeypatch, dict.fromkeys(range(6), 1.0))
+    assert len(found.runs) == 2
+    assert len(found.left_out) == 4
+
+
+def test_a_method_s_first_run_corrects_what_its_others_are_expected_to_take(box, monkeypatch):
+    """Both of `sii` are expected to take longer than they do; the second would not fit otherwise."""
+    found, _ = with_budget(box, monkeypatch, {0: 20.0, 1: 2e3, 2: 2e3, 3: 10.0})
+    assert [run.method for run in found.runs] == ["sii", "sii", "gather"]
+    assert found.left_out["vpl: lights=32"] == "some 2e+03 s a run"

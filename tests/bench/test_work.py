@@ -166,7 +166,7 @@ def test_memory_holds_the_frame_s_buffers_and_not_the_scene(box):
 def test_choices_without_a_picture_are_left_out(box):
     told = []
     choices = [choice("sii", f"lights={LIGHTS}"), Choice("sii", (), None)._replace(settings=Failing())]
-    assert list(works_of(box, choices, SIZE, lambda *said: told.append(said))) == [0]
+    assert list(works_of(box, dict(enumerate(choices)), SIZE, lambda *said: told.append(said))) == [0]
     assert len(told) == 2
 
 

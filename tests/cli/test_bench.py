@@ -1,12 +1,15 @@
 """`refgi bench`: files, what is said, exit codes, wrong grids."""
 
 import json
+import math
 
 import pytest
 
 from refgi.bench import measure
 from refgi.bench.results import Result
+from refgi.cli.judge import _smaller
 from refgi.errors import InputError
+from refgi.scene import load_scene
 from tests.cli.command import runner
 
 SMALL = ("--size", "24x18", "--rounds", "2", "--set", "samples=48", "--threads", "2")
@@ -47,6 +50,33 @@ def test_scenes_of_a_grid(tmp_path, grid, new_processes):
     again = run("--grid", grid, *SMALL, "--methods", "gather", "--out", tmp_path / "out")
     assert again.exit_code == 0, again.output  # over its own files
     assert "gather comes to" in again.stdout
+
+
+def test_what_a_budget_leaves_out_is_said_in_every_file(tmp_path, grid, new_processes):
+    done = run("--grid", grid, *SMALL, "--budget", "0.001s", "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    assert "cornell_box: left out for time: 4 settings: no time to load it" in done.stderr
+    for name in ("results.md", "index.html"):
+        assert "Left out for time: 4 settings: no time to load it" in (tmp_path / "out" / name).read_text()
+    scene, = Result.model_validate_json((tmp_path / "out" / "results.json").read_text()).scenes
+    assert list(scene.left_out) == ["sii: lights=16", "sii: lights=64", "gather: samples=20", "truth: samples=48"]
+    assert new_processes == []
+
+
+def test_a_quick_bench_is_small_and_scenes_share_the_time(tmp_path, monkeypatch):
+    asked = []
+
+    def refusing(scene, *_, budget, **__):
+        asked.append((scene.camera.width, scene.camera.height, budget))
+        raise InputError("enough")
+
+    monkeypatch.setattr(measure, "bench_scene", refusing)
+    for more in (["--budget", "2m"], ["--size", "600x300"], []):
+        run("cornell_box", "ring", "--quick", *more, "--out", tmp_path / "out")
+    assert [size for *size, _ in asked] == [[256, 256], [600, 300], [256, 256]]
+    assert [budget for *_, budget in asked] == [pytest.approx(60, abs=5), math.inf, math.inf]
+    wide = load_scene("cornell_box").with_camera(width=1000, height=10)
+    assert (_smaller(wide).camera.width, _smaller(wide).camera.height) == (256, 3)
 
 
 def test_errors_are_split_where_asked_for(tmp_path):
@@ -126,6 +156,8 @@ def test_pictures_of_others_are_spared(tmp_path, grid, monkeypatch):
     (["cornel_box", "--quick"], "cornel_box"),
     (["--quick", "--rounds", "0"], "rounds"),
     (["--quick", "--split-size", "8x6"], "--split-size: expected --split"),
+    (["--quick", "--split", "--budget", "2m"], "--budget: expected no --split"),
+    (["--quick", "--budget", "2 weeks"], "a time such as 90s or 2m"),
 ])
 def test_wrong_use_is_one_clear_error_before_anything_runs(tmp_path, grid, monkeypatch, arguments, said):
     monkeypatch.setattr(measure, "bench_scene", lambda *_, **__: pytest.fail("ran"))

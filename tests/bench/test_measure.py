@@ -137,6 +137,7 @@ def test_what_gives_no_picture_stops_nothing_else(box):
         found = bench_scene(box, grid, rounds=1, truth=TruthSettings(samples=48), **SIZE)
     assert [run.method for run in found.runs] == ["sii"]
     assert found.failures == {"val: maps.resolution=64, lights=16": "refused here"}
+    assert found.left_out == {}
     assert found.runs[0].errors["truth"].spread is None
     assert found.runs[0].in_equal_time is None  # no line
 
@@ -171,6 +172,10 @@ def test_a_budget_that_is_over_leaves_all_out(box):
     assert (found.runs, found.line, found.failures) == ((), (), {})
     assert len(found.left_out) == len(GRID.choices) + len(GRID.passes)
     assert found.left_out_said == ["6 settings: no time to load it"]
+    left_out = {f"sii: lights={one}": f"some {one // 2} s a run" for one in range(16)}
+    many = found.model_copy(update={"left_out": left_out})
+    assert many.left_out_said == [*(f"2 settings: some {one} s a run" for one in range(6)),
+                                  "4 more, which results.json names"]
 
 
 def test_later_rounds_are_left_out_where_time_is_up(box, monkeypatch):
@@ -188,13 +193,16 @@ def test_later_rounds_are_left_out_where_time_is_up(box, monkeypatch):
     assert time.perf_counter() - begin < 1e3
 
 
-def test_what_a_run_takes_is_expected_by_a_small_picture_where_time_ends(box):
+def test_what_a_run_takes_is_expected_by_a_small_picture_where_time_ends(box, monkeypatch):
     size = {**SIZE, "width": 192, "height": 192}
     choices = [choice("sii", lights=32), choice("vpl", lights=512)]
     takes = measure._expected(box, choices, size, lambda *_: None, time.perf_counter() + 1e3)
     assert takes[1] > 5 * takes[0] > 0
     assert measure._expected(box, choices, size, lambda *_: None, math.inf) == {0: 0.0, 1: 0.0}
     assert measure._expected(box, choices, size, lambda *_: None, 0.0) == {}
+    monkeypatch.setattr(measure, "load_kernels", lambda *_: time.sleep(0.1))
+    large = {**SIZE, "width": 960, "height": 96}  # ten times the small picture
+    assert 1.0 <= measure._expected(box, choices[:1], large, lambda *_: None, time.perf_counter() + 1e3)[0] < 5.0
 
 
 def test_time_for_judging_is_kept(box, monkeypatch):

@@ -77,6 +77,8 @@ def test_a_quick_bench_is_small_and_scenes_share_the_time(tmp_path, monkeypatch)
     assert [budget for *_, budget in asked] == [pytest.approx(60, abs=5), math.inf, math.inf]
     wide = load_scene("cornell_box").with_camera(width=1000, height=10)
     assert (_smaller(wide).camera.width, _smaller(wide).camera.height) == (256, 3)
+    small = wide.with_camera(width=24, height=18)
+    assert (_smaller(small).camera.width, _smaller(small).camera.height) == (24, 18)
 
 
 def test_errors_are_split_where_asked_for(tmp_path):

@@ -26,6 +26,7 @@ from refgi.errors import InputError, RefgiError, expect, nearest
 COMPUTING = frozenset({"render", "sequence", "compare", "bench", "batch", "choose", "vectors", "explain", "warm"})
 LIBRARIES = 600 << 20  # bytes: with NumPy, SciPy, LLVM, Embree and a small picture 650 MiB in all, some of it loaded
 KERNELS = 64 << 20  # ... where the libraries are loaded; a small picture by sii takes 32 MiB
+NO_THREAD = "can't start new thread"  # what Python says where a thread's stack finds no room
 
 THREADS, MOST_THREADS = "NUMBA_NUM_THREADS", 4096  # a million end the process
 
@@ -92,7 +93,7 @@ def fault_of(error: BaseException, *, debug: bool = False) -> Fault:
         return Fault(USAGE, _one_line(error.format_message()))
     if isinstance(error, RefgiError):
         return Fault(USAGE, str(error), *_place(error))
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or NO_THREAD in str(error):
         return Fault(USAGE, f"out of memory: {_one_line(str(error)) or 'try a smaller --size'}")
     hint = "" if debug else " (a fault of refgi; REFGI_DEBUG=1 shows where)"
     return Fault(FAILED, f"unexpected {type(error).__name__}: {_one_line(str(error))}{hint}")

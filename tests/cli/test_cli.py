@@ -122,6 +122,7 @@ def test_an_unexpected_error_is_one_line_and_debug_shows_the_traceback(monkeypat
 @pytest.mark.parametrize(("error", "code", "line"), [
     (KeyboardInterrupt, 130, "interrupted"),
     (MemoryError, 2, "out of memory: try a smaller --size"),
+    (RuntimeError("can't start new thread"), 2, "out of memory: can't start new thread"),
     (MemoryError("Embree's tree over 9 triangles does not fit"), 2,
      "out of memory: Embree's tree over 9 triangles does not fit"),
     (refgi.errors.InputError("key: expected a, got b"), 2, "key: expected a, got b"),

@@ -179,8 +179,8 @@ def test_a_budget_that_is_over_leaves_all_out(box):
 
 
 def test_later_rounds_are_left_out_where_time_is_up(box, monkeypatch):
-    """The clock jumps to the end after the first round."""
-    begin, real = time.perf_counter(), works_of
+    """Nothing fits any more once the first round is done."""
+    real = works_of
 
     def late(*arguments):
         monkeypatch.setattr(measure, "_fits", lambda *_: False)
@@ -190,7 +190,6 @@ def test_later_rounds_are_left_out_where_time_is_up(box, monkeypatch):
     found = bench_scene(box, GRID, rounds=3, truth=TruthSettings(samples=48), budget=1e3, **SIZE)
     assert [len(run.times) for run in (*found.runs, *found.line)] == [1] * 6
     assert set(found.left_out.values()) == {"2 of 3 runs"}
-    assert time.perf_counter() - begin < 1e3
 
 
 def test_what_a_run_takes_is_expected_by_a_small_picture_where_time_ends(box, monkeypatch):

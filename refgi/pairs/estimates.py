@@ -216,9 +216,10 @@ def _areas(camera: "Camera", rows: int, sample: Sample) -> Array:
     ahead = np.subtract(camera.target, camera.eye)
     ray = sample.position - np.asarray(camera.eye, sample.position.dtype)[:, None]
     depth = (ray.T @ (ahead / np.linalg.norm(ahead))).astype(ray.dtype)
-    cosine = np.maximum(np.abs((ray * sample.normal).sum(axis=0)) / depth, GRAZING)
-    pixel = (2 * math.tan(camera.vfov / 2) / rows) ** 2
-    return np.asarray(depth**2 * ray.dtype.type(pixel) / cosine)
+    height = np.maximum(np.abs((ray * sample.normal).sum(axis=0)), GRAZING * depth)
+    pixel = ray.dtype.type((2 * math.tan(camera.vfov / 2) / rows) ** 2)
+    # in the plane of the eye a pixel shows nothing
+    return np.divide(pixel * depth**3, height, out=np.zeros_like(depth), where=(depth > 0) & (height > 0))
 
 
 def report_sampling(

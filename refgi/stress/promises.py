@@ -186,11 +186,10 @@ def asked(method: str, change: Change, scene: Scene, size: tuple[int, int] | Non
     few = FEW.get(method, ())
     if method == "hssil" and change.name == "flux x 2^-60":
         return Asked("rounding", few, limit=LEAST, kind="derived", source=SUBNORMAL)
-    sampled_anew = SAMPLED_ANEW + PAINTED_ANEW * any(material.textures for material in scene.materials)
-    if change.promise == "bits" and not (method == "truth" and change.name in sampled_anew):
-        return Asked("bits", few, source=POWER_OF_TWO if " x 2^" in change.name else SAME)
-    if method == "truth" and change.name in sampled_anew:
+    if method == "truth" and _samples_anew(change.name, scene):
         return Asked("estimate", few, kind="statistics", source=f"Student's t of both estimates, {UNLIKELY:g}")
+    if change.promise == "bits":
+        return Asked("bits", few, source=POWER_OF_TWO if " x 2^" in change.name else SAME)
     if change.name == "hidden plane":
         return Asked("rounding", few, limit=LEAST, kind="derived", source="no light comes from it, none goes to it")
     limit, source = _observed(method, change.name)
@@ -199,6 +198,13 @@ def asked(method: str, change: Change, scene: Scene, size: tuple[int, int] | Non
     if change.name in DRAWN_ANEW or (method, change.name) == ("multires", "turned"):
         return rounded._replace(settings=EVERY.get(method, few), options=SMALL_MAP)
     return rounded
+
+
+def _samples_anew(change: str, scene: Scene) -> bool:
+    """Return whether the truth's samples are others after a change, so that both are one estimate's draws."""
+    if change == "faces split" and scene.geometry.vertex_normals is not None:
+        return any(any(material.specular) for material in scene.materials)  # cells of lobes bend as a face's corners do
+    return change in SAMPLED_ANEW or (change in PAINTED_ANEW and any(m.textures for m in scene.materials))
 
 
 def _require_whole_texels(width: int, height: int) -> None:

@@ -212,14 +212,15 @@ class _Method:
         if whole and how.promise != "mean":
             yield Found(self._surfaces(change, before, after, changed))
         figure, unit = _figure(how, before, after, changed)
-        limit, doubt = how.limit, ""
         if how.promise == "estimate":
-            figure, degrees = estimates_apart(before, after, changed)
-            limit = float(student.isf(UNLIKELY / 6, degrees))  # either side of three channels
             doubt = before.estimate.doubt or after.estimate.doubt
+            if doubt:
+                self._silent(Silence(self._method, change.name, doubt))
+                return
+            figure, degrees = estimates_apart(before, after, changed)
+            how = how._replace(limit=float(student.isf(UNLIKELY / 6, degrees)))  # either side of three channels
         shown = None if how.promise == "mean" else (before.light[:, *changed.part], changed.back(after.light))
-        yield Found(self._row(change.name, how._replace(limit=limit), math.nan if doubt else figure, unit,
-                              f"{change.about}; {doubt}" if doubt else change.about), shown)
+        yield Found(self._row(change.name, how, figure, unit, change.about), shown)
 
     def as_it_is(self) -> Iterator[Found]:
         """Yield rows of the scene as it is: the same bits again and on one thread, sound numbers, energy."""

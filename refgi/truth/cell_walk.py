@@ -48,6 +48,11 @@ class Found(NamedTuple):
 
 
 @kernel
+def _not_zero(square: Any) -> Any:
+    return square if square > LEAST else LEAST
+
+
+@kernel
 def _expected(cell: Any, x: Any, n: Any, lobe: Any) -> Any:
     """Return about what a cell sends a receiver without visibility: flux, cosine, lobes and distance, each widened.
 
@@ -56,7 +61,7 @@ def _expected(cell: Any, x: Any, n: Any, lobe: Any) -> Any:
     cx, cy, cz, radius, ax, ay, az, spread, flux, gx, gy, gz, thick, tilt = cell
     zero, one, quarter = np.float32(0), np.float32(1), np.float32(0.25)
     dx, dy, dz = cx - x[0], cy - x[1], cz - x[2]
-    size, square = radius * radius + LEAST, dx * dx + dy * dy + dz * dz + LEAST
+    size, square = _not_zero(radius * radius), _not_zero(dx * dx + dy * dy + dz * dz)
     inverse = one / np.sqrt(square)
     along, height = n[0] * gx + n[1] * gy + n[2] * gz, n[0] * dx + n[1] * dy + n[2] * dz
     # the highest point of the cell above the receiver's horizon, and the receiver above the cell's

@@ -18,7 +18,7 @@ from refgi.pairs.estimates import seen_light
 from refgi.pairs.irradiance import Receivers, irradiance
 from refgi.pairs.sample import sample_pixels
 from refgi.pairs.settings import PairSettings
-from refgi.scene import PointLight, load_scene
+from refgi.scene import Camera, PointLight, load_scene
 from refgi.settings import of
 from refgi.splat import GatherSettings, MultiresSettings, SiiSettings, gather, multires, sii
 from refgi.splat.gather.gather_sum import disc_loss
@@ -216,3 +216,13 @@ def test_one_of_every_few_lights_stands_for_many(monkeypatch):
     some = seen_light(frame.scene.camera, frame.sent_albedo, frame.direct, receivers, lights)
     assert some != whole
     assert some == pytest.approx(whole, rel=A_QUARTER_OF_LIGHTS)
+
+
+def test_a_pixel_shows_its_solid_angle_over_the_cosine_and_nothing_in_the_plane_of_the_eye():
+    """A surface through the eye is seen edge-on: its depth is 0, and 0 over 0 is no area."""
+    camera = Camera((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), vfov=np.pi / 2)
+    position = np.array([[0.0, 0.0, -2.0], [3.0, 0.0, -2.0], [0.0, 0.0, -2.0], [1.0, 0.0, 0.0]], np.float32).T
+    normal = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], np.float32).T
+    sample = sample_pixels(Receivers(position[:, None], normal[:, None], np.ones((1, 4), bool)), 4)
+    areas = estimates._areas(camera, 10, sample)
+    np.testing.assert_allclose(areas, [0.16, 0.16, 0.16 / estimates.GRAZING, 0.0], rtol=1e-6)

@@ -178,3 +178,16 @@ def test_paths_among_images_are_judged_as_estimates() -> None:
         assert not moved or kept in ("bits", "rounding")
         if moved:
             assert promises.asked("gather", change, painted).promise == kept
+
+
+def test_lobes_on_bent_faces_pick_anew_where_faces_are_split() -> None:
+    """Normals within a face are rounded otherwise, and cells of lobes with them; of what is diffuse none are asked."""
+    split = next(one for one in CHANGES if one.name == "faces split")
+    ring = load_scene("ring:faces=600")
+    assert ring.geometry.vertex_normals is not None
+    assert promises.asked("truth", split, ring).promise == "estimate"
+    for other in (dataclasses.replace(ring, materials=tuple(dataclasses.replace(one, specular=(0.0, 0.0, 0.0))
+                                                            for one in ring.materials)),
+                  dataclasses.replace(ring, geometry=dataclasses.replace(ring.geometry, vertex_normals=None))):
+        assert promises.asked("truth", split, other).promise == "rounding"
+    assert promises.asked("sii", split, ring).promise == "rounding"

@@ -24,6 +24,7 @@ from refgi.stress.run import (
     stress,
     unsound,
 )
+from refgi.truth.result import TruthResult
 
 SIZE = {"width": 16, "height": 12}
 EXACT = ["flux x 2^27", "length x 2^-27", "moved aside", "faces permuted", "hidden plane"]
@@ -125,6 +126,16 @@ def test_truth_after_a_turn_is_judged_by_its_errors(box):
         assert broken(box, turns, "truth") == set(turns)
     finally:
         refgi.methods.render = render
+
+
+def test_an_estimate_in_doubt_is_not_judged(box, monkeypatch):
+    """Of several scenes the truth says itself that its error is not to be trusted; its bits are judged still."""
+    doubt = "the error is not to be trusted"
+    monkeypatch.setattr(TruthResult, "doubt", doubt)
+    silent: list[Silence] = []
+    found = list(stress(box, ["truth"], changes=["quarter turn", "flux x 2^27"], silent=silent.append, **SIZE))
+    assert silent == [Silence("truth", "quarter turn", doubt)]
+    assert [one.row.property for one in found if one.row.subject == "truth"] == ["flux x 2^27"]
 
 
 def test_what_is_not_promised_is_said(box):

@@ -219,7 +219,7 @@ def _areas(camera: "Camera", rows: int, sample: Sample) -> Array:
     height = np.maximum(np.abs((ray * sample.normal).sum(axis=0)), GRAZING * depth)
     pixel = ray.dtype.type((2 * math.tan(camera.vfov / 2) / rows) ** 2)
     # in the plane of the eye a pixel shows nothing
-    return np.divide(pixel * depth**3, height, out=np.zeros_like(depth), where=(depth > 0) & (height > 0))
+    return np.asarray(np.divide(pixel * depth**3, height, out=np.zeros_like(depth), where=(depth > 0) & (height > 0)))
 
 
 def report_sampling(

@@ -99,13 +99,20 @@ def _reached(function: Function, parts: Mapping[Function, str | ast.Module]) -> 
     return {one: text for one, text in parts.items() if one in reached}
 
 
-_results: ContextVar[dict[Any, Any] | None] = ContextVar("refgi_literal_results", default=None)
+MOST_SHARED = 1 << 29  # bytes of arguments and results: a picture for each of many triangles would fill any memory
+
+
+class _Results(dict[Any, Any]):
+    room = MOST_SHARED  # bytes that are left
+
+
+_results: ContextVar[_Results | None] = ContextVar("refgi_literal_results", default=None)
 
 
 @contextmanager
 def sharing() -> Iterator[None]:
     """Let edited functions inside the block share what unedited ones that they call return for equal arguments."""
-    token = _results.set({})
+    token = _results.set(_Results())
     try:
         yield
     finally:
@@ -121,9 +128,12 @@ def _shared(function: Function) -> Callable[..., Any]:
         given = None if results is None else _key((args, sorted(kwargs.items())))
         if results is None or given is None:
             return function(*args, **kwargs)
-        if (key := (function, given)) not in results:
-            results[key] = function(*args, **kwargs)
-        return _copied(results[key])
+        if (key := (function, given)) in results:
+            return _copied(results[key])
+        made = function(*args, **kwargs)
+        if (size := _size((args, tuple(kwargs.values()), made))) <= results.room:
+            results[key], results.room = _copied(made), results.room - size
+        return made
 
     return call
 
@@ -137,6 +147,10 @@ def _key(value: Any) -> Any:
         return None if None in parts else (type(value), parts)
     known = value is None or isinstance(value, bool | int | float | str | np.generic)
     return (type(value), repr(value)) if known else None
+
+
+def _size(value: Any) -> int:
+    return sum(map(_size, value)) if isinstance(value, list | tuple) else getattr(value, "nbytes", 0)
 
 
 def _copied(value: Any) -> Any:

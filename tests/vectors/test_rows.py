@@ -173,3 +173,18 @@ def test_shared_are_copies_of_equal_arguments_results_alone():
     with rows.sharing():
         shared(values)
         assert len(calls) == 14
+
+
+def test_no_more_is_shared_than_there_is_room_for(monkeypatch):
+    calls = []
+
+    def doubled(values):
+        calls.append(values[0])
+        return 2 * values
+
+    monkeypatch.setattr(rows._Results, "room", 100)  # bytes: of two arrays of 40 of argument and result, one
+    shared = rows._shared(doubled)
+    with rows.sharing():
+        for first in (1.0, 2.0, 1.0, 2.0, 2.0):
+            np.testing.assert_array_equal(shared(np.full(5, first)), np.full(5, 2 * first))
+    assert calls == [1.0, 2.0, 2.0, 2.0]

@@ -21,7 +21,7 @@ from tests import lamps
 pytestmark = pytest.mark.filterwarnings("ignore:.* of the indirect light")  # that is told: tests/pairs/test_loss
 
 ALL = of(SiiSettings, pattern="all", clamp="none")  # the sum without a cut
-DRAWS = 120
+DRAWS = 400
 STANDARD_ERRORS = 4.0  # of a mean: one in 16,000 means of unbiased estimates is farther off
 TELLING = 0.1  # largest standard error: another map's share is 6 times or a sixth of the own
 

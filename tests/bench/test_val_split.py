@@ -36,10 +36,10 @@ MANY = {"lights.source.pattern": "all", "visibility": "rays_vpls", "clusters.cou
 ROUNDING = 2e-6  # of the maximum: float32 sums of a hundred terms against float64 ones
 GRAZING = 5e-4  # of a step: a ray of float32 that meets an edge of the ball or not, one of 256 to a rectangle
 # How the steps of visibility add up: the root of their squares over the error of all, 1 where they are independent,
-# less where they are alike, more where some take back what others did: 4 on cornell_horse, whose rectangle darkens
+# less where they are alike, more where some take back what others did: 3 on cornell_horse, whose rectangle darkens
 # what one view from its centre brightens.
 ROOTS, AROUND = {"cornell_box": 1.01, "cornell_sphere:faces=600": 1.32}, 0.1
-LEAST_ROOT, MOST_ROOT = 1.0, 4.5
+LEAST_ROOT, MOST_ROOT = 1.0, 3.5
 
 
 def chain(name, settings, size, resolution, **options):

@@ -24,7 +24,6 @@ SIGMAS = 4
 MIDDLE = (0.0, -0.003, 0.0)  # nearly; the light in the middle sees a plate there edge-on
 CERTAIN = 1e-4  # tail of a chi-square value
 RUNS = 12  # of other seeds each
-CHANCE = 1e-3  # of a chi-square beyond, were stated errors the true ones
 FOOTPRINT = 0.02  # of 24 x 24 pixels: photons make means over them, the closed form holds at their middle
 
 
@@ -176,7 +175,7 @@ def test_every_texel_of_the_map_gives_the_same(exponent, senders, evidence):
     assert sigma.max() < 0.01
     assert (np.abs(ratio - 1) < 3 * np.hypot(sigma, own) + 2e-3).all()
     blocks = RUNS * np.count_nonzero(used)
-    assert chi2 < chi2_of.isf(CHANCE, blocks) / blocks
+    assert chi2 < chi2_of.isf(CERTAIN, blocks) / blocks
 
 
 FEW = 1 << 13  # photons of a light in a pass

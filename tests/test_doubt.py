@@ -10,13 +10,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from refgi import load_scene
 from refgi.batch.plan import broken, read_threshold
 from refgi.bench.results import markdown
 from refgi.cli.group import VerbGroup
 from refgi.compare.outcome import measure
 from refgi.image import read_exr
-from refgi.stress.run import stress
 from refgi.truth import TruthResult
 from tests.batch.made import path_of, result_of, run_of, scene_of
 
@@ -149,17 +147,6 @@ def test_a_bench_s_page_and_table_say_it():
     result = result_of(scene)
     assert f"**{scene.doubts[1]}**" in markdown(result)
     assert result_of(scene_of("box", [run_of("sii")])).scenes[0].doubts == []
-
-
-@pytest.mark.usefixtures("doubted")
-def test_stress():
-    rows = [found.row for found in stress(load_scene("cornell_box"), ["truth"], width=16, height=12,
-                                          changes=["mirrored", "moved aside"])]
-    estimates = [row for row in rows if row.kind == "statistics"]
-    assert estimates
-    assert not any(row.passed for row in estimates)
-    assert all(SAID in row.detail for row in estimates)
-    assert all(row.passed for row in rows if row.kind != "statistics")
 
 
 @pytest.mark.usefixtures("doubted")

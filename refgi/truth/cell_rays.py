@@ -18,7 +18,6 @@ from refgi.truth.cell_walk import (
     Found,
     Path,
     Receiver,
-    cell_at,
     fill_tops,
     found_up,
     go_down,
@@ -26,7 +25,7 @@ from refgi.truth.cell_walk import (
     plane_chance,
 )
 from refgi.truth.light_grid import ray_through
-from refgi.truth.lobe_cells import LobeCells
+from refgi.truth.lobe_cells import LobeCells, cell_at
 from refgi.truth.paths import Paths, dot, paths_for
 from refgi.truth.surfaces import around
 from refgi.types import Array
@@ -91,7 +90,7 @@ def _pick_rays(beside: Beside, to: Receiver, word: Any, grain: float, sums: Arra
         picks.paths.reach[start + s] = 0
         if place < EVEN:
             k = min(lights - 1, int(place / EVEN * lights))
-            found = found_up(cells, cell_at(cells, k, u, v), to, sums)
+            found = found_up(cells, cell_at(cells.child, k, u, v), to, sums)
             _send(cells, k, found, (u, v, grain), beside.counts, start + s, picks)
         elif total > 0:
             place = (place - EVEN) / (1 - EVEN) * total

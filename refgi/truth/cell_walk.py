@@ -11,12 +11,11 @@ import numpy as np
 
 from refgi.jit import kernel
 from refgi.truth.light_grid import place_of
-from refgi.truth.lobe_cells import LobeCells
+from refgi.truth.lobe_cells import ROUND, LobeCells, cell_at
 from refgi.truth.lobe_tree import LobeTree
 from refgi.types import Array
 
 CHUNK = 64  # receivers that one parallel iteration owns
-ROUND = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)], np.float64)  # neighbours
 SAME_FACE, OFF_FACE = 0.9, 0.04  # cosine of normals, and square of the sine off the plane, of points of one face
 LEAST = np.float32(1e-30)  # m^2, against 0 / 0
 
@@ -122,7 +121,7 @@ def found_at(cells: LobeCells, k: int, y: tuple[float, float, float], g: tuple[f
     a, b = place_of(cells.squares, k, y)
     if a < 0:
         return Found(np.int64(k), 0.0, np.int64(-1), 0.0)
-    cell = cell_at(cells, k, a, b)
+    cell = cell_at(cells.child, k, a, b)
     own = found_up(cells, cell, to, sums)
     if on_face(cells, cell, y, g):
         return own
@@ -130,21 +129,11 @@ def found_at(cells: LobeCells, k: int, y: tuple[float, float, float], g: tuple[f
     for i in range(8):
         da, db = a + side * ROUND[i, 0], b + side * ROUND[i, 1]
         if 0 <= da < 1 and 0 <= db < 1:
-            other = cell_at(cells, k, da, db)
+            other = cell_at(cells.child, k, da, db)
             if on_face(cells, other, y, g):
                 found = found_up(cells, other, to, sums)
                 return Found(cell, own.chance, found.mirror, found.mirror_chance)
     return Found(cell, own.chance, np.int64(-1), 0.0)
-
-
-@kernel
-def cell_at(cells: LobeCells, k: int, a: float, b: float) -> Any:
-    """Return the cell of light k that holds a place of its square."""
-    cell = np.int64(k)
-    while cells.child[cell] >= 0:
-        i, j = int(2 * a), int(2 * b)
-        cell, a, b = np.int64(cells.child[cell] + 2 * i + j), 2 * a - i, 2 * b - j
-    return cell
 
 
 @kernel

@@ -20,7 +20,7 @@ A = r^2 n_a / n_b.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -127,6 +127,8 @@ PLACES = np.array([[0.5, 0.5], [0.01, 0.01], [0.01, 0.99], [0.99, 0.01], [0.99, 
 HALF_DIAGONAL = 0.75  # of a cell, in square roots of its measure
 EDGE_LEVELS = 2  # how often cells that hold an edge are halved on its account
 GRAZING = 0.05  # cosine below which a cell's footprint grows no more
+ROUND = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)], np.float64)  # neighbours
+GUARD, MOST_GUARDS = 0.1, 0.25  # brightness of dark cells beside lit ones, of theirs; what all have at most, of all
 
 
 class LobeCells(NamedTuple):
@@ -178,6 +180,7 @@ def lobe_cells(scene: Scene, tracer: Tracer, surfaces: Surfaces, lights: LightTa
     within = np.arange(len(parents)) - np.repeat(first, np.diff(np.append(first, len(parents))))
     child[parents] = below + 4 * within
     lobes = Lobe(*(np.concatenate(fields) for fields in zip(*(level.lobe for _, level in levels), strict=True)))
+    _guard(child, corner, light, lobes)
     lit = np.flatnonzero(~split & (lobes.power > 0))
     if not len(lit):
         return None
@@ -187,6 +190,49 @@ def lobe_cells(scene: Scene, tracer: Tracer, surfaces: Surfaces, lights: LightTa
     rank[node] = np.arange(len(node))
     return LobeCells(light_squares(scene.lights, scene.geometry), child, corner.astype(np.int32), rank,
                      node.astype(np.int32), light[node].astype(np.int32), tree)
+
+
+def _guard(child: Array, corner: Array, light: Array, lobes: Lobe) -> None:
+    """Give dark cells that touch lit ones a faint copy of the brightest of these, in place.
+
+    A lobe may reach into a cell between its rays: what it sends from there would be met by chance alone.
+    """
+    power = np.where(child < 0, lobes.power, 0)
+    beside = _brightest_beside(child, corner, light, power * 4.0 ** corner[:, 2])
+    dark = np.flatnonzero(beside >= 0)
+    lit = beside[dark]
+    larger = 2.0 ** (corner[lit, 2] - corner[dark, 2])
+    for field in lobes:
+        field[dark] = field[lit]
+    given = GUARD * power[lit] * larger**2
+    lobes.power[dark] = given * min(1.0, MOST_GUARDS * power.sum() / max(given.sum(), 1e-300))
+
+
+@kernel
+def _brightest_beside(child: Array, corner: Array, light: Array, brightness: Array) -> Array:
+    """Return the brightest lit cell that touches each dark one; -1: none, or not a dark cell."""
+    best = np.full(len(child), -1, np.int64)
+    for cell in range(len(child)):
+        side = math.ldexp(1.0, -corner[cell, 2])
+        for i in range(8 if child[cell] < 0 else 0):
+            a, b = (corner[cell, 0] + 0.5 + ROUND[i, 0]) * side, (corner[cell, 1] + 0.5 + ROUND[i, 1]) * side
+            if 0 <= a < 1 and 0 <= b < 1:
+                other = cell_at(child, light[cell], a, b)
+                lit, dark = (cell, other) if brightness[cell] > 0 else (other, cell)
+                if brightness[lit] > 0 and brightness[dark] <= 0 and (
+                        best[dark] < 0 or brightness[lit] > brightness[best[dark]]):
+                    best[dark] = lit
+    return best
+
+
+@kernel
+def cell_at(child: Array, k: int, a: float, b: float) -> Any:
+    """Return the cell of light k that holds a place of its square."""
+    cell = np.int64(k)
+    while child[cell] >= 0:
+        i, j = int(2 * a), int(2 * b)
+        cell, a, b = np.int64(child[cell] + 2 * i + j), 2 * a - i, 2 * b - j
+    return cell
 
 
 def _grown(source: _Source, k: int) -> list[_Level]:

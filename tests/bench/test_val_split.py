@@ -36,10 +36,11 @@ MANY = {"lights.source.pattern": "all", "visibility": "rays_vpls", "clusters.cou
 ROUNDING = 2e-6  # of the maximum: float32 sums of a hundred terms against float64 ones
 GRAZING = 5e-4  # of a step: a ray of float32 that meets an edge of the ball or not, one of 256 to a rectangle
 # How the steps of visibility add up: the root of their squares over the error of all, 1 where they are independent,
-# less where they are alike, more where some take back what others did: 3 on cornell_horse, whose rectangle darkens
-# what one view from its centre brightens.
+# less where they are alike, more where some take back what others did: 4.1 on cornell_horse. A rectangle darkens what
+# one view from its centre brightens (correlation -0.96 there, -0.16 on sponza, -0.64 on the kitchen), so both are one
+# step where roots of real scenes are bounded: 1.8, 1.7 and 2.2.
 ROOTS, AROUND = {"cornell_box": 1.01, "cornell_sphere:faces=600": 1.32}, 0.1
-LEAST_ROOT, MOST_ROOT = 1.0, 3.5
+LEAST_ROOT, MOST_ROOT = 1.0, 2.5
 
 
 def chain(name, settings, size, resolution, **options):
@@ -90,7 +91,8 @@ def test_the_picture_of_exact_shadows_is_that_of_vpl(evidence):
 
 
 def judge(name, settings, size, resolution, evidence):
-    """Split a scene's error and return the root of the squares of the steps of visibility over their error."""
+    """Split a scene's error; return the root of the squares of the steps of visibility over their error, and the steps.
+    """
     made = chain(name, settings, size, resolution, samples=384)
     links = {link.name: link.pictures[0][:, made.covered].astype(np.float64) for link in made.links}
     names = ["clamp", *list(LITERAL)[2:-1]]
@@ -101,13 +103,13 @@ def judge(name, settings, size, resolution, evidence):
         f"; steps of visibility together {whole / mean:.3f}, root of their squares {root / mean:.3f} "
         f"({root / whole:.2f})")
     assert all(0 < rms(step) < mean for step in steps)
-    return root / whole
+    return root / whole, dict(zip(names[1:], steps, strict=True))
 
 
 @pytest.mark.feature("VAL-27", "REF-15")
 @pytest.mark.parametrize("name", ROOTS)
 def test_steps_of_visibility_are_independent_or_take_back_some_of_each_other(name, evidence):
-    assert judge(name, SETTINGS, 32, 64, evidence) == pytest.approx(ROOTS[name], abs=AROUND)
+    assert judge(name, SETTINGS, 32, 64, evidence)[0] == pytest.approx(ROOTS[name], abs=AROUND)
 
 
 @pytest.mark.slow
@@ -116,7 +118,11 @@ def test_steps_of_visibility_are_independent_or_take_back_some_of_each_other(nam
 def test_steps_in_real_scenes(name, data_dir, evidence):
     found = load_scene(data_dir / f"{name}.json")
     settings = of(ValSettings, lights=256, clamp="distance", clamp_value=0.05 * found.geometry.diagonal)
-    assert LEAST_ROOT < judge(data_dir / f"{name}.json", settings, 24, 128, evidence) < MOST_ROOT
+    _, steps = judge(data_dir / f"{name}.json", settings, 24, 128, evidence)
+    rectangle, view = steps.pop("rectangle"), steps.pop("single view")
+    assert (rectangle * view).mean() < 0
+    joined = [*steps.values(), rectangle + view]
+    assert LEAST_ROOT < math.hypot(*map(rms, joined)) / rms(sum(joined)) < MOST_ROOT
 
 
 def test_rays_behind_an_area_light_are_steps_as_well():

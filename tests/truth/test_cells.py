@@ -9,18 +9,20 @@ import pytest
 from scipy.stats import chi2
 
 from refgi.frame import Frame
-from refgi.rays import Tracer
+from refgi.rays import MISS, Tracer
 from refgi.scene import DirectionalLight, Material, PointLight, SpotLight, load_scene
 from refgi.truth import TruthSettings, trace_truth
 from refgi.truth.cell_densities import even_density, image_of, receiver_at
 from refgi.truth.cell_pass import beside_of
 from refgi.truth.cell_rays import pick_cells, picks_for
-from refgi.truth.cell_walk import cell_at, fill_tops, found_up
-from refgi.truth.light_grid import fill_rays, light_squares, place_of
-from refgi.truth.lobe_cells import glossy_triangles
+from refgi.truth.cell_walk import fill_tops, found_up
+from refgi.truth.light_grid import LightRays, fill_rays, light_squares, place_of
+from refgi.truth.light_vertices import closest_of
+from refgi.truth.lobe_cells import cell_at, glossy_triangles
 from refgi.truth.passes import one_pass
 from refgi.truth.task import spans
 from refgi.truth.truth import _guided, _with_lobes, task_of
+from tests.truth.glossy_scenes import SCENES, frame
 from tests.truth.scenes import rectangle
 from tests.truth.scenes import scene as by_hand
 
@@ -93,7 +95,8 @@ def test_rays_fall_as_densely_as_their_weights_say(lamps, lobes, evidence):
     corner, light = cells.corner[leaf], np.full(len(leaf), -1)
     for k in range(len(lamps)):
         a, b = ((corner[:, :2] + 0.5) / 2.0 ** corner[:, 2:]).T
-        light[[cell_at(cells, k, *place) == at for place, at in zip(zip(a, b, strict=True), leaf, strict=True)]] = k
+        light[[cell_at(cells.child, k, *place) == at
+               for place, at in zip(zip(a, b, strict=True), leaf, strict=True)]] = k
     chance = np.array([found_up(cells, at, to, sums).chance for at in leaf])
     assert chance.sum() == pytest.approx(1, abs=1e-6)
     rays_in = [even_density(cells, k, at, p, picks) * cells.squares.measure[k] * 0.25**level
@@ -133,6 +136,28 @@ def test_images_are_aimed_at_as_their_density_says(evidence):
     assert np.mean(2 / np.array(exponents)) > 5 / math.sqrt(len(logs))  # what an exponent off by 2 moves the mean by
     evidence(f"mean of {len(logs)} rays: {np.mean(logs):.3f}")
     assert np.mean(logs) == pytest.approx(1, abs=4 / math.sqrt(len(logs)))
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if name != "diffuse"])
+def test_no_lobe_is_lit_outside_the_cells_that_picks_draw(name):
+    """Light through points of faces with lobes, those at their edges among them, lies in a cell that has a chance."""
+    glossy = frame(name)
+    buffer, geometry = glossy.gbuffer, glossy.scene.geometry
+    task = task_of(glossy.scene, glossy.tracer, buffer.position, buffer.normal, buffer.triangle_id, TruthSettings())
+    has_lobe = task.surfaces.specular.any(axis=1)[geometry.material_of_face]
+    random, count = np.random.default_rng(5), 4000
+    corners = geometry.vertices[geometry.faces[random.choice(np.flatnonzero(has_lobe), count)]]
+    points = (corners * random.dirichlet((0.5, 0.5, 0.5), count)[..., None]).sum(axis=1)
+    for k in range(len(glossy.scene.lights)):
+        places = np.array([place for place in (place_of(task.cells.squares, k, tuple(at)) for at in points)
+                           if place[0] >= 0])
+        origins, directions = np.empty((2, len(places), 3))
+        fill_rays(task.cells.squares, k, places, origins, directions)
+        triangle, _ = closest_of(glossy.tracer, LightRays(origins, directions, 1.0, np.ones(len(places))))
+        lit = (triangle != MISS) & has_lobe[triangle]
+        ranks = [task.cells.rank[cell_at(task.cells.child, k, *place)] for place in places[lit]]
+        assert len(ranks) > 100
+        assert min(ranks) >= 0
 
 
 def test_cells_are_split_where_mirrors_bend():

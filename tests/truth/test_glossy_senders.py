@@ -25,6 +25,8 @@ LOW, HIGH = 0.9, 1.15  # claimed over true variance
 # Standard errors of that ratio, relative, over SEEDS runs. With more, the few runs that met the light decide it.
 KNOWN_TO = {"pixel": 0.1, "block": 0.2, "picture": 0.4}
 SEEDS, PASSES, LONG_RUN = 60, 3, 10  # many runs of few passes; one of more
+# A pixel beside a mirror that shows it the lamp's image beyond its edge; a camera between a ball and a block.
+RARE, RARE_KNOWN_TO = {"mirror_like": 16, "ball_and_block": 8}, 0.2  # times as many runs, by which a pixel is known
 # What has the oracle's mean within an error that it can know in LONG_RUN passes. Alone, the light side knows no corner,
 # where its terms have no bound; directions meet a lamp's reflection in a lobe with a chance of 1 / P.
 ALONE = [("diffuse", "hemisphere"), ("diffuse", "light"), ("sun_on_blocks", "hemisphere"), ("far_wall", "light"),
@@ -108,7 +110,7 @@ def test_each_estimator_has_that_mean_where_it_knows_its_error(name, estimator, 
 @cache
 def claimed(name):
     """Return {level: (ratio, standard error)} of claimed over true variance, over many seeds."""
-    runs = [run(name, 100 + seed, PASSES) for seed in range(SEEDS)]
+    runs = [run(name, 100 + seed, PASSES) for seed in range(SEEDS * RARE.get(name, 1))]
     return {level: (ratio, error) for level, ratio, error in
             claimed_over_true(reference(name), frame(name).gbuffer.covered, runs)}
 
@@ -120,7 +122,7 @@ def claimed(name):
 def test_claimed_variance_is_the_true_one(name, level, evidence):
     ratio, error = claimed(name)[level]
     evidence(f"{name}, P = {EXPONENTS[name]}, {level}: claimed over true variance {ratio:.3f} +- {error:.3f}")
-    assert error < KNOWN_TO[level] * ratio
+    assert error < (RARE_KNOWN_TO if name in RARE and level == "pixel" else KNOWN_TO[level]) * ratio
     assert LOW - 3 * error < ratio < HIGH + 3 * error
 
 

@@ -212,11 +212,12 @@ class _Method:
         if whole and how.promise != "mean":
             yield Found(self._surfaces(change, before, after, changed))
         figure, unit = _figure(how, before, after, changed)
-        if how.promise == "estimate":
+        if how.promise in ("estimate", "mean") and before.estimate is not None:
             doubt = before.estimate.doubt or after.estimate.doubt
             if doubt:
                 self._silent(Silence(self._method, change.name, doubt))
                 return
+        if how.promise == "estimate":
             figure, degrees = estimates_apart(before, after, changed)
             how = how._replace(limit=float(student.isf(UNLIKELY / 6, degrees)))  # either side of three channels
         shown = None if how.promise == "mean" else (before.light[:, *changed.part], changed.back(after.light))

@@ -133,8 +133,9 @@ def test_an_estimate_in_doubt_is_not_judged(box, monkeypatch):
     doubt = "the error is not to be trusted"
     monkeypatch.setattr(TruthResult, "doubt", doubt)
     silent: list[Silence] = []
-    found = list(stress(box, ["truth"], changes=["quarter turn", "flux x 2^27"], silent=silent.append, **SIZE))
-    assert silent == [Silence("truth", "quarter turn", doubt)]
+    found = list(stress(box, ["truth"], changes=["quarter turn", "resolution x 2", "flux x 2^27"],
+                        silent=silent.append, **SIZE))
+    assert silent == [Silence("truth", name, doubt) for name in ("quarter turn", "resolution x 2")]
     assert [one.row.property for one in found if one.row.subject == "truth"] == ["flux x 2^27"]
 
 

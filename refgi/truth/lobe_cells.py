@@ -219,7 +219,8 @@ def _brightest_beside(child: Array, corner: Array, light: Array, brightness: Arr
             if 0 <= a < 1 and 0 <= b < 1:
                 other = cell_at(child, light[cell], a, b)
                 lit, dark = (cell, other) if brightness[cell] > 0 else (other, cell)
-                if brightness[lit] > 0 and brightness[dark] <= 0 and (
+                # a smaller cell there may lie further in; where it touches, it finds this one
+                if corner[other, 2] <= corner[cell, 2] and brightness[lit] > 0 and brightness[dark] <= 0 and (
                         best[dark] < 0 or brightness[lit] > brightness[best[dark]]):
                     best[dark] = lit
     return best

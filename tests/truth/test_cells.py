@@ -12,6 +12,7 @@ from refgi.frame import Frame
 from refgi.rays import MISS, Tracer
 from refgi.scene import DirectionalLight, Material, PointLight, SpotLight, load_scene
 from refgi.truth import TruthSettings, trace_truth
+from refgi.truth import lobe_cells as lobe_cells_module
 from refgi.truth.cell_densities import even_density, image_of, receiver_at
 from refgi.truth.cell_pass import beside_of
 from refgi.truth.cell_rays import pick_cells, picks_for
@@ -138,26 +139,54 @@ def test_images_are_aimed_at_as_their_density_says(evidence):
     assert np.mean(logs) == pytest.approx(1, abs=4 / math.sqrt(len(logs)))
 
 
+def glossy_task(name):
+    scene, buffer = frame(name).scene, frame(name).gbuffer
+    return task_of(scene, frame(name).tracer, buffer.position, buffer.normal, buffer.triangle_id, TruthSettings())
+
+
 @pytest.mark.parametrize("name", [name for name in SCENES if name != "diffuse"])
 def test_no_lobe_is_lit_outside_the_cells_that_picks_draw(name):
     """Light through points of faces with lobes, those at their edges among them, lies in a cell that has a chance."""
-    glossy = frame(name)
-    buffer, geometry = glossy.gbuffer, glossy.scene.geometry
-    task = task_of(glossy.scene, glossy.tracer, buffer.position, buffer.normal, buffer.triangle_id, TruthSettings())
+    task, geometry = glossy_task(name), frame(name).scene.geometry
     has_lobe = task.surfaces.specular.any(axis=1)[geometry.material_of_face]
     random, count = np.random.default_rng(5), 4000
     corners = geometry.vertices[geometry.faces[random.choice(np.flatnonzero(has_lobe), count)]]
     points = (corners * random.dirichlet((0.5, 0.5, 0.5), count)[..., None]).sum(axis=1)
-    for k in range(len(glossy.scene.lights)):
+    for k in range(len(task.scene.lights)):
         places = np.array([place for place in (place_of(task.cells.squares, k, tuple(at)) for at in points)
                            if place[0] >= 0])
         origins, directions = np.empty((2, len(places), 3))
         fill_rays(task.cells.squares, k, places, origins, directions)
-        triangle, _ = closest_of(glossy.tracer, LightRays(origins, directions, 1.0, np.ones(len(places))))
+        triangle, _ = closest_of(task.tracer, LightRays(origins, directions, 1.0, np.ones(len(places))))
         lit = (triangle != MISS) & has_lobe[triangle]
         ranks = [task.cells.rank[cell_at(task.cells.child, k, *place)] for place in places[lit]]
         assert len(ranks) > 100
         assert min(ranks) >= 0
+
+
+@pytest.mark.parametrize("name", ["corner", "sun_on_blocks"])
+def test_dark_cells_beside_lit_ones_are_a_tenth_as_bright(name, monkeypatch):
+    """Oracle: all pairs of cells of a light whose squares touch; together they send a quarter of the rest at most."""
+    found = glossy_task(name).cells
+    monkeypatch.setattr(lobe_cells_module, "GUARD", 0.0)
+    bare, leaf, light = glossy_task(name).cells, np.flatnonzero(found.child < 0), np.full(len(found.child), -1)
+    for k in range(len(frame(name).scene.lights)):
+        below = np.array([k])
+        while len(below):
+            light[below] = k
+            below = (found.child[below[found.child[below] >= 0], None] + np.arange(4)).ravel()
+    side = 0.25 ** found.corner[leaf, 2]
+    power, lit = (np.where(cells.rank[leaf] >= 0, cells.tree.row[cells.tree.single[cells.rank[leaf]], 8], 0.0)
+                  for cells in (found, bare))
+    unit, light = 2.0 ** -found.corner[leaf, 2, None], light[leaf]
+    low = found.corner[leaf, :2] * unit
+    expected = np.zeros(len(leaf))
+    for at in np.flatnonzero(lit == 0):
+        touching = ((low <= low[at] + unit[at]) & (low + unit >= low[at])).all(axis=1) & (light == light[at])
+        expected[at] = 0.1 * side[at] * (lit / side)[touching].max()
+    expected *= min(1.0, 0.25 * lit.sum() / expected.sum())
+    assert (expected > 0).sum() > 100
+    np.testing.assert_allclose(power, np.where(lit > 0, lit, expected), rtol=1e-5)
 
 
 def test_cells_are_split_where_mirrors_bend():

@@ -204,8 +204,8 @@ def _guard(child: Array, corner: Array, light: Array, lobes: Lobe) -> None:
     larger = 2.0 ** (corner[lit, 2] - corner[dark, 2])
     for field in lobes:
         field[dark] = field[lit]
-    given = GUARD * power[lit] * larger**2
-    lobes.power[dark] = given * min(1.0, MOST_GUARDS * power.sum() / max(given.sum(), 1e-300))
+    given, most = GUARD * power[lit] * larger**2, MOST_GUARDS * power.sum()
+    lobes.power[dark] = given * (most / max(most, given.sum(), 1e-300))
 
 
 @kernel

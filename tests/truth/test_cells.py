@@ -19,7 +19,8 @@ from refgi.truth.cell_rays import pick_cells, picks_for
 from refgi.truth.cell_walk import fill_tops, found_up
 from refgi.truth.light_grid import LightRays, fill_rays, light_squares, place_of
 from refgi.truth.light_vertices import closest_of
-from refgi.truth.lobe_cells import cell_at, glossy_triangles
+from refgi.truth.lobe_cells import _guard, cell_at, glossy_triangles
+from refgi.truth.lobe_tree import Lobe
 from refgi.truth.passes import one_pass
 from refgi.truth.task import spans
 from refgi.truth.truth import _guided, _with_lobes, task_of
@@ -187,6 +188,22 @@ def test_dark_cells_beside_lit_ones_are_a_tenth_as_bright(name, monkeypatch):
     expected *= min(1.0, 0.25 * lit.sum() / expected.sum())
     assert (expected > 0).sum() > 100
     np.testing.assert_allclose(power, np.where(lit > 0, lit, expected), rtol=1e-5)
+
+
+def test_dark_cells_hold_a_copy_and_at_most_a_quarter_of_the_light():
+    """Four cells, the first of them four again, of which the one in the middle of the square is lit."""
+    child = np.array([1, 5, *[-1] * 7], np.int32)
+    corner = np.array([(0, 0, 0), *((i, j, level) for level in (1, 2) for i in (0, 1) for j in (0, 1))])
+    lobes = Lobe.dark(9)
+    for number, field in enumerate(lobes):
+        field[8] = number + 1.0
+    _guard(child, corner, np.zeros(9, np.int64), lobes)
+    _guard(child[:1], corner[:1], np.zeros(1, np.int64), Lobe.dark(1))  # nothing is lit: no warning of NumPy
+    shares = np.array([4.0, 4.0, 4.0, 1.0, 1.0, 1.0])  # of areas
+    np.testing.assert_allclose(lobes.power[2:8], 0.25 * lobes.power[8] * shares / shares.sum())
+    assert not lobes.power[:2].any()
+    for number, field in enumerate(lobes._replace(power=np.full(9, lobes._fields.index("power") + 1.0))):
+        np.testing.assert_array_equal(field[2:], number + 1.0)
 
 
 def test_cells_are_split_where_mirrors_bend():

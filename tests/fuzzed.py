@@ -154,7 +154,7 @@ def _kit_file(name: str) -> bytes:
 def _bugs() -> bytes:
     bugs, values = BugWriter(), {"sum": np.arange(6, dtype=np.float32).reshape(2, 3)}
     entry = BugEntry(cause="half", shapes={"sum": (2, 3)}, arrays={})
-    bugs.add("sum", entry, {"sum": Told(np.array([1, 2]), np.array([0.5, 1.0], np.float32))}, values,
+    bugs.add("sum", entry, {"sum": Told(np.array([1, 2]), np.array([0.5, 1.0], np.float32), 2)}, values,
              {"sum": np.full((2, 3), 1e-6, np.float32)})
     return bugs.content()
 

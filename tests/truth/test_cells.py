@@ -83,6 +83,17 @@ def test_equal_parts_of_the_square_are_equal_solid_angles(light):
     assert ((counts - 2000) ** 2 / 2000).sum() < chi2.isf(CERTAIN, 19)
 
 
+def light_of(cells):
+    """Return which light each node belongs to; node k is the root of light k."""
+    light = np.full(len(cells.child), -1)
+    for k in range(len(cells.squares.kind)):
+        below = np.array([k])
+        while len(below):
+            light[below] = k
+            below = (cells.child[below[cells.child[below] >= 0], None] + np.arange(4)).ravel()
+    return light
+
+
 @pytest.mark.parametrize(("lamps", "lobes"), [
     (("point",), False), (("spot", "sun", "point"), False), (("spot",), True)])
 def test_rays_fall_as_densely_as_their_weights_say(lamps, lobes, evidence):
@@ -94,11 +105,7 @@ def test_rays_fall_as_densely_as_their_weights_say(lamps, lobes, evidence):
     found, sums = np.empty(len(cells.tree.top), np.float32), np.empty(len(cells.tree.top) + 1)
     fill_tops(cells.tree, to, found, sums)
     grid, leaf = 8, np.flatnonzero(cells.child < 0)
-    corner, light = cells.corner[leaf], np.full(len(leaf), -1)
-    for k in range(len(lamps)):
-        a, b = ((corner[:, :2] + 0.5) / 2.0 ** corner[:, 2:]).T
-        light[[cell_at(cells.child, k, *place) == at
-               for place, at in zip(zip(a, b, strict=True), leaf, strict=True)]] = k
+    corner, light = cells.corner[leaf], light_of(cells)[leaf]
     chance = np.array([found_up(cells, at, to, sums).chance for at in leaf])
     assert chance.sum() == pytest.approx(1, abs=1e-6)
     rays_in = [even_density(cells, k, at, p, picks) * cells.squares.measure[k] * 0.25**level
@@ -170,16 +177,11 @@ def test_dark_cells_beside_lit_ones_are_a_tenth_as_bright(name, monkeypatch):
     """Oracle: all pairs of cells of a light whose squares touch; together they send a quarter of the rest at most."""
     found = glossy_task(name).cells
     monkeypatch.setattr(lobe_cells_module, "GUARD", 0.0)
-    bare, leaf, light = glossy_task(name).cells, np.flatnonzero(found.child < 0), np.full(len(found.child), -1)
-    for k in range(len(frame(name).scene.lights)):
-        below = np.array([k])
-        while len(below):
-            light[below] = k
-            below = (found.child[below[found.child[below] >= 0], None] + np.arange(4)).ravel()
-    side = 0.25 ** found.corner[leaf, 2]
+    bare, leaf = glossy_task(name).cells, np.flatnonzero(found.child < 0)
+    side, light = 0.25 ** found.corner[leaf, 2], light_of(found)[leaf]
     power, lit = (np.where(cells.rank[leaf] >= 0, cells.tree.row[cells.tree.single[cells.rank[leaf]], 8], 0.0)
                   for cells in (found, bare))
-    unit, light = 2.0 ** -found.corner[leaf, 2, None], light[leaf]
+    unit = 2.0 ** -found.corner[leaf, 2, None]
     low = found.corner[leaf, :2] * unit
     expected = np.zeros(len(leaf))
     for at in np.flatnonzero(lit == 0):

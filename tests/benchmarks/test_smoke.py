@@ -1,9 +1,11 @@
-"""A task of each part of `python -m benchmarks stability`, and whether its faults fit the sources as they are."""
+"""A task of each part of `python -m benchmarks stability`; whether its faults and bugs of ports fit today's sources."""
 
+import tomllib
 from pathlib import Path
 
 import pytest
 
+from benchmarks.kit_score import BUGS, SOURCES
 from benchmarks.stability.runner import run_parts
 from benchmarks.stability.seeded import faults
 
@@ -27,3 +29,9 @@ def test_a_fault_of_precision_stands_once_in_its_file():
         text = (ROOT / fault.file).read_text("utf-8")
         assert text.count(fault.old) == 1, fault.name
         assert fault.put_into(text) != text, fault.name
+
+
+@pytest.mark.parametrize("port", SOURCES)
+def test_a_bug_of_a_port_stands_once_in_its_file(port):
+    for bug in tomllib.loads((BUGS / f"{port}.toml").read_text("utf-8"))["bug"]:
+        assert (SOURCES[port] / bug["file"]).read_text("utf-8").count(bug["old"]) == 1, bug["what"]

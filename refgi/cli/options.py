@@ -169,7 +169,7 @@ OPTIONS: Mapping[str, Mapping[str, Any]] = MappingProxyType({
     "clock": _option("Of --measure: the time of day, or that of processors, all threads together.",
                      ["wall", "processor"], default="wall"),
     "grid": _option("Settings of each method as TOML.", metavar="FILE", to="grid_file"),
-    "quick": _flag("Three settings a method in place of ten and more, pictures of 256 pixels at most."),
+    "quick": _flag("Three or four settings a method in place of ten and more, pictures of 256 pixels at most."),
     "budget": _option("Time that all may take, such as 2m: what does not fit is left out, and said.",
                       Read("duration", _quantity({"s": 1.0, "": 1.0, "m": 60.0, "h": 3600.0},
                                                  "a time such as 90s or 2m"))),

@@ -212,7 +212,7 @@ class _Method:
         if whole and how.promise != "mean":
             yield Found(self._surfaces(change, before, after, changed))
         figure, unit = _figure(how, before, after, changed)
-        if how.promise in ("estimate", "mean") and before.estimate is not None:
+        if how.kind in ("statistics", "observed x 2") and before.estimate is not None:  # one sample may be any share
             doubt = before.estimate.doubt or after.estimate.doubt
             if doubt:
                 self._silent(Silence(self._method, change.name, doubt))
